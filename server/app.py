@@ -30,12 +30,15 @@ def create_app(settings: Settings) -> FastAPI:
     from server.http.cross_site import CrossSiteGuard
     from server.http.headers import SecurityHeaders
     from server.http.hosts import HostGuard
+    from server.http.requests import RequestObserver
     from server.lifespan import run_installation
+    from server.metrics import RequestMetrics
     from server.pages.assets import STATIC, Assets
     from server.pages.routes import ROUTERS
     from server.services.provenance import CODE_VERSION
     from server.viewer import live_proxy, proxy
 
+    metrics = RequestMetrics()
     app = FastAPI(
         title="Sagittal",
         summary="Gait analysis from body-worn IMUs; research software, not a medical device.",
@@ -46,14 +49,16 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
         lifespan=run_installation,
         middleware=[
+            Middleware(RequestObserver, line=settings.log_format == "json", observe=metrics.observe),
             Middleware(Compression),
-            Middleware(SecurityHeaders),
+            Middleware(SecurityHeaders, behind_tls=settings.behind_tls),
             Middleware(HostGuard, allowed=settings.hosts),
             Middleware(CrossSiteGuard),
             Middleware(BodyLimit),
         ],
     )
     app.state.settings = settings
+    app.state.metrics = metrics
     problems.install(app)
     for router in (build_api(app), *BESIDE, *ROUTERS, proxy.router, live_proxy.router):
         app.include_router(router)

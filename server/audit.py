@@ -49,6 +49,7 @@ def record(
     at: dt.datetime | None = None,
 ) -> None:
     """Append one row; the connection must be a writing one, actor None = the system itself, at None = now."""
+    token = getattr(actor, "token_id", None)  # who asks by an API token (server/auth/identity.py)
     last = c.execute(select(audit.c.seq, audit.c.hash).order_by(audit.c.seq.desc()).limit(1)).first()
     row = {
         "seq": 1 if last is None else last.seq + 1,
@@ -58,7 +59,7 @@ def record(
         "action": action,
         "resource": resource,
         "resource_id": resource_id,
-        "detail": dict(detail or {}),
+        "detail": dict(detail or {}) | ({} if token is None else {"token": token}),
         "previous": GENESIS if last is None else last.hash,
     }
     c.execute(insert(audit).values(**row, hash=_seal(row)))

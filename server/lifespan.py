@@ -7,6 +7,7 @@ import contextlib
 import datetime as dt
 import logging
 from collections.abc import AsyncIterator
+from functools import partial
 
 from fastapi import FastAPI
 
@@ -15,6 +16,8 @@ from server.auth.throttle import Throttle
 from server.jobs.feed import JobFeed
 from server.jobs.table import TableQueue
 from server.live.hub import Hub
+from server.metrics import StateCollector
+from server.processes.supervisor import Workers
 from server.services import custody, erasure
 from server.services.custody import refuse_strangers
 from server.services.films import FilmIntake
@@ -39,6 +42,21 @@ def _look_after(db: Database, blobs: BlobStore, settings: Settings) -> None:
         log.warning("%s No stored file is taken away until `sagittal accept`.", doubted)
 
 
+def _say_workers(app: FastAPI) -> str:
+    """Whether the worker processes that `sagittal serve` started live; others tell nobody."""
+    workers: Workers | None = getattr(app.state, "workers", None)
+    if workers is None or workers.healthy:
+        return "ok"
+    return f"{len(workers.pids)} of {app.state.settings.workers} worker processes run; see the server's log."
+
+
+def _say_estimators(app: FastAPI) -> str:
+    living, wanted = len(app.state.hub.pool.pids), app.state.settings.live_workers
+    if living >= wanted:
+        return "ok"
+    return f"{living} of {wanted} estimator processes run; see the server's log."
+
+
 @contextlib.asynccontextmanager
 async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     """Open database, files, queue and live takes of `app.state.settings` while the block runs."""
@@ -51,7 +69,6 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     app.state.reviewed = ReviewedAnalyses(app.state.blobs)
     await asyncio.to_thread(_look_after, db, app.state.blobs, settings)
     app.state.trail = AuditTrail(db)
-    app.state.readiness = Readiness(settings, db, app.state.blobs)
     app.state.queue = TableQueue(db, settings.lease_s)
     app.state.feed = JobFeed(db)
     app.state.throttle = Throttle()
@@ -63,10 +80,15 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     app.state.films = FilmIntake(settings, db, app.state.blobs)
     app.state.hub = Hub(settings, db, app.state.reviewed, app.state.queue)
     await app.state.hub.start()
+    parts = {"workers": partial(_say_workers, app), "estimators": partial(_say_estimators, app)}
+    app.state.readiness = Readiness(settings, db, app.state.blobs, parts=parts)
+    figures = StateCollector(settings, db, app.state.readiness.checks)
+    app.state.metrics.registry.register(figures)
     try:
         async with app.state.trail.run():
             yield
     finally:
+        app.state.metrics.registry.unregister(figures)
         await app.state.hub.stop()
         app.state.films.close()
         app.state.feed.close()

@@ -147,9 +147,24 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--seed", type=_whole, default=0)
     for name in ("particles", "iterations", "rounds", "random-rounds"):
         p.add_argument(f"--{name}", type=int, metavar="N", help="of the swarm (default: the thesis')")
-    _data_option(
-        add("check", "Check the database, every stored file by its hash, live logs, trash, the audit chain.")
+    p = add("check", "Check the database, every stored file by its hash, live logs, trash, the audit chain.")
+    _data_option(p)
+    p.add_argument("--head", type=Path, metavar="JSON", help="newest audit row as it was, kept elsewhere")
+    p = add("backup", "Write database, stored files and live logs into one file, while the service runs.")
+    _data_option(p)
+    p.add_argument("target", type=Path, metavar="DIR|FILE", help="a folder of backups, or the file to write")
+    p.add_argument("--key", type=Path, metavar="FILE", help="encrypt it (`sagittal keygen`)")
+    p.add_argument(
+        "--prune", action="store_true", help="then keep 7 days, 4 weeks and 12 months of that folder"
     )
+    p = add("restore", "Put a backup into an empty data folder, after checking all of it.")
+    _data_option(p)
+    p.add_argument("archive", type=Path, metavar="FILE")
+    p.add_argument("--key", type=Path, metavar="FILE", help="the private key of an encrypted backup")
+    p.add_argument("--erased", type=Path, metavar="JSON", help="another list of who must not come back")
+    p.add_argument("--test", action="store_true", help="only try it, in a folder that is removed again")
+    p = add("keygen", "Make a key for encrypted backups.")
+    p.add_argument("path", type=Path, metavar="FILE")
     p = add("trash", "List stored files that the database does not know; they stay 30 days.")
     _data_option(p)
     p.add_argument("--restore", action="store_true", help="put back those that the database refers to")

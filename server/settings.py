@@ -11,11 +11,13 @@ from __future__ import annotations
 import dataclasses
 import ipaddress
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 MB = 1_000_000
+_CLOCK = re.compile(r"([01]\d|2[0-3]):[0-5]\d")
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 PROXY_DOMAIN = "addresses or networks of proxies, such as 172.16.0.0/12, and not all of the internet"
 
@@ -47,6 +49,11 @@ class Settings:
     child_memory_bytes : address space of the computing child (RLIMIT_AS; libraries alone map 1 GB), 0 = none.
     sweep_grace_s : age from which a file that nothing refers to goes to the trash.
     idle_minutes, absolute_hours : life of a sign-in.
+    backup_dir : folder outside the data folder in which `sagittal serve` keeps backups, "" = it makes none.
+    backup_at : when, HH:MM in the machine's own time.
+    backup_key : file with the key that encrypts them (`sagittal keygen`), "" = they are not encrypted.
+    retention_years : patients without a visit for longer are listed on the page System, 0 = none are.
+    log_format : "text" for people or "json", one object a line with a line for each request.
     task_modules : modules whose import registers kinds of jobs, and what they draw.
     """
 
@@ -69,6 +76,11 @@ class Settings:
     sweep_grace_s: float = 3600.0
     idle_minutes: float = 15.0
     absolute_hours: float = 12.0
+    backup_dir: str = ""
+    backup_at: str = "02:30"
+    backup_key: str = ""
+    retention_years: int = 0
+    log_format: str = "text"
     task_modules: tuple[str, ...] = ("server.worker.tasks", "server.viewer.recorded_walk")
 
     def __post_init__(self) -> None:
@@ -83,6 +95,18 @@ class Settings:
             _require(getattr(self, name) >= 0, name, getattr(self, name), "0 or more")
         for proxy in self.trusted_proxies:
             _require(_is_some_network(proxy), "trusted_proxies", f"'{proxy}'", PROXY_DOMAIN)
+        years = self.retention_years
+        _require(0 <= years <= 200, "retention_years", years, "0 to 200 (0 = no list)")
+        _require(_CLOCK.fullmatch(self.backup_at) is not None, "backup_at", f"'{self.backup_at}'", "HH:MM")
+        _require(self.log_format in {"text", "json"}, "log_format", f"'{self.log_format}'", "text or json")
+        for name in ("backup_dir", "backup_key"):
+            path = getattr(self, name)
+            _require(not path or Path(path).is_absolute(), name, f"'{path}'", "a path from the root, /…")
+        if self.backup_dir and Path(self.backup_dir).resolve().is_relative_to(self.data_dir.resolve()):
+            raise SettingsError(
+                f"backup_dir is '{self.backup_dir}', inside the data folder: a backup would be lost with it. "
+                "Give a folder on another disk or computer."
+            )
         if self.host not in LOOPBACK and not self.behind_tls:
             raise SettingsError(
                 f"host is '{self.host}': patients' data would cross the network unencrypted. Put a TLS proxy "
@@ -138,6 +162,26 @@ class Settings:
     def cache(self) -> Path:
         """Folder of compiled kernels; may be deleted at any time."""
         return self.data_dir / "cache"
+
+    @property
+    def backups(self) -> Path:
+        """Folder of database copies made before upgrades, and of what a backup needs while it is made."""
+        return self.data_dir / "backups"
+
+    @property
+    def backup_state(self) -> Path:
+        """The file that says how the last backup and the last restore test went."""
+        return self.data_dir / "backup.json"
+
+    @property
+    def restoring(self) -> Path:
+        """Folder in which a restore keeps everything until all of it has been checked."""
+        return self.data_dir / "restoring"
+
+    @property
+    def second_factor_key(self) -> Path:
+        """The key that opens the secrets of second factors (server/auth/second_factor.py)."""
+        return self.data_dir / "second-factor.key"
 
     @property
     def lock(self) -> Path:

@@ -85,7 +85,7 @@ WORDS: Final = frozenset(
     push-off reconstruction repetitions rhythm right rollator sagittal shank shoes shorter silent slow
     slower smaller socks squat squats step steps steps/min stick still straighter stride strides tests thigh
     threshold training trainings transverse treadmill trunk turns unaffected unknown usable viewer walk
-    walking week wider yes
+    walking week wider works yes
         """,
     )
 )

@@ -12,8 +12,20 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db
+from server.services.errors import NotFound
+from server.storage.high_water import read_newest
 
 router = APIRouter(prefix="/audit", tags=["audit"])
+
+
+@router.get("/head", response_model=schemas.AuditHead)
+def read_head(db: Db, who: Annotated[Identity, require(Action.READ_AUDIT)]) -> schemas.AuditHead:
+    """The newest row's number and hash, to be kept outside of the server (`sagittal check --head FILE`)."""
+    with db.read() as c:
+        newest = read_newest(c)
+    if newest is None:
+        raise NotFound("audit row", "1")
+    return schemas.AuditHead(newest.seq, newest.hash)
 
 
 @router.get("", response_model=list[schemas.AuditRow])

@@ -51,8 +51,11 @@ def _complete(document: dict[str, Any]) -> dict[str, Any]:
     schemas["ProblemDetails"] = whole
     for unused in ("HTTPValidationError", "ValidationError"):
         schemas.pop(unused, None)
-    components["securitySchemes"] = {"session": {"type": "apiKey", "in": "cookie", "name": "sid"}}
-    document["security"] = [{"session": []}]
+    components["securitySchemes"] = {
+        "session": {"type": "apiKey", "in": "cookie", "name": "sid"},
+        "token": {"type": "http", "scheme": "bearer"},
+    }
+    document["security"] = [{"session": []}, {"token": []}]
     for path, item in document["paths"].items():
         for method, operation in item.items():
             responses = operation["responses"]

@@ -22,6 +22,10 @@ def attachment(content: bytes, name: str, media_type: str | None = None) -> Resp
     """Return a file to save; its name may be any Unicode (RFC 6266, RFC 8187)."""
     if media_type is None:
         media_type = TYPES.get(name[name.rfind(".") :], "application/octet-stream")
+    return Response(content, media_type=media_type, headers={"Content-Disposition": write_disposition(name)})
+
+
+def write_disposition(name: str) -> str:
+    """Say that an answer is a file to save, and how it is called."""
     plain = "".join(ch if ch.isascii() and ch.isprintable() and ch not in '"\\%' else "_" for ch in name)
-    disposition = f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quote(name, safe='')}"
-    return Response(content, media_type=media_type, headers={"Content-Disposition": disposition})
+    return f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quote(name, safe='')}"

@@ -30,7 +30,7 @@ def live() -> schemas.HealthAnswer:
     openapi_extra=PUBLIC,
 )
 def ready(request: Request, response: Response) -> schemas.HealthAnswer:
-    """Check that database and data folder can be written, the schema is ours, and the disk has room."""
+    """Check that database and folder can be written, the schema is ours, there is room, processes live."""
     readiness: Readiness = request.app.state.readiness
     checks = dict(readiness.checks())
     healthy = all(state == "ok" for state in checks.values())

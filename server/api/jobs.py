@@ -7,13 +7,13 @@ import contextlib
 from collections.abc import AsyncGenerator, AsyncIterator, Callable
 from typing import Annotated, cast
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request
 from pydantic import TypeAdapter
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
 from server import context
-from server.auth.access import require
+from server.auth.access import identify, require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail
@@ -63,7 +63,7 @@ def read_job(job_id: Id, db: Db, trail: OpenTrail, who: Reader) -> jobs.ListedJo
     },
 )
 async def watch_job(
-    job_id: Id, db: Db, feed: context.Feed, logins: context.OpenLogins, who: Reader
+    job_id: Id, request: Request, db: Db, feed: context.Feed, who: Reader
 ) -> StreamingResponse:
     """Push the job as server-sent events, each one a Job as JSON; the stream ends with the job."""
 
@@ -72,7 +72,7 @@ async def watch_job(
             jobs.get(c, job_id)
 
     await run_in_threadpool(check)
-    events = _events(feed, job_id, lambda: logins.is_open(who.login_id))
+    events = _events(feed, job_id, lambda: identify(request, counts=False) is not None)
     return StreamingResponse(events, media_type="text/event-stream", headers={"X-Accel-Buffering": "no"})
 
 

@@ -5,15 +5,17 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Query
+from fastapi.responses import StreamingResponse
 
 from server.api import schemas
 from server.api.documents import refusals
+from server.api.downloads import BINARY, write_disposition
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Config, Db, Id, LiveHub, OpenTrail, Reviewed
+from server.context import Blobs, Config, Db, Id, LiveHub, OpenTrail, Reviewed
 from server.http.json_body import StrictJsonRoute
-from server.services import erasure, patients, programmes, sessions
+from server.services import erasure, patient_export, patients, programmes, sessions
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/patients", tags=["patients"])
 
@@ -84,6 +86,27 @@ def delete_patient(
             visits = []
     hub.drop_from_thread(visits)
     erasure.erase_patient(db, reviewed, settings, who, patient_id, confirm=confirm)
+
+
+@router.get(
+    "/{patient_id}/export",
+    response_class=StreamingResponse,
+    responses={
+        200: {"description": "All of it as one zip", "content": {"application/zip": {"schema": BINARY}}}
+    },
+)
+def export(
+    patient_id: Id,
+    db: Db,
+    blobs: Blobs,
+    trail: OpenTrail,
+    who: Annotated[Identity, require(Action.EXPORT_PATIENT)],
+) -> StreamingResponse:
+    """Everything that is stored of a patient: rows as JSON, who opened what, and all files."""
+    pieces = patient_export.export_patient(db, blobs, patient_id)
+    trail.record_opened(who, "patient.exported", "patient", patient_id)
+    headers = {"Content-Disposition": write_disposition(f"patient-{patient_id[:8]}.zip")}
+    return StreamingResponse(pieces, media_type="application/zip", headers=headers)
 
 
 @router.get("/{patient_id}/sessions", response_model=list[sessions.Session])

@@ -10,6 +10,7 @@ from server.api import (
     analyses,
     audit_log,
     comparisons,
+    consents,
     devices,
     estimators,
     exports,
@@ -20,16 +21,19 @@ from server.api import (
     jobs,
     live,
     live_feed,
+    metrics,
     notes,
     patients,
     prescriptions,
     programmes,
     reports,
     reviews,
+    second_factors,
     sensitivities,
     sessions,
     sign_in,
     signed_reports,
+    tokens,
     trends,
     tunings,
     users,
@@ -41,7 +45,7 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.live import tablet
 
-BESIDE: tuple[APIRouter, ...] = (sign_in.address_router, health.router, live_feed.router)
+BESIDE: tuple[APIRouter, ...] = (sign_in.address_router, health.router, metrics.router, live_feed.router)
 """Routes outside /api/v1."""
 
 
@@ -50,8 +54,11 @@ def build_api(app: FastAPI) -> APIRouter:
     api = APIRouter(prefix="/api/v1")
     for part in (
         sign_in,
+        tokens,
+        second_factors,
         patients,
         notes,
+        consents,
         prescriptions,
         programmes,
         sessions,

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
 from core.frames import Protocol
+from server.auth.api_tokens import MOST_DAYS, Scope
 from server.auth.passwords import MAX_LENGTH, MIN_LENGTH
 from server.auth.roles import Role
 from server.jobs.queue import JobView
@@ -96,10 +97,11 @@ class ProblemDetails:
 
 
 class SignIn(Request):
-    """Name and password."""
+    """Name and password, and a code where the account has a second factor."""
 
     name: Annotated[str, StringConstraints(max_length=200)]
     password: Annotated[str, StringConstraints(max_length=1000)]
+    code: Annotated[str, StringConstraints(max_length=40)] | None = None
     next: str | None = Field(default=None, max_length=2000, description="page to go on to (forms)")
 
 
@@ -116,6 +118,35 @@ class PasswordChange(Request):
 
     current: Annotated[str, StringConstraints(max_length=1000)]
     password: Password
+
+
+class ApiTokenNew(Request):
+    """A token for a program: what for, for how many days, and one's password."""
+
+    name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=40)]
+    scopes: Annotated[list[Scope], Field(min_length=1, max_length=len(Scope))]
+    days: Annotated[int, Field(ge=1, le=MOST_DAYS)]
+    password: Annotated[str, StringConstraints(max_length=1000)]
+
+
+class PasswordProof(Request):
+    """One's password, for what a browser left open must not do."""
+
+    password: Annotated[str, StringConstraints(max_length=1000)]
+
+
+class CodeProof(Request):
+    """A code of the authenticator, or a recovery code."""
+
+    code: Annotated[str, StringConstraints(min_length=1, max_length=40)]
+
+
+class ConsentNew(Request):
+    """What a patient agreed to, when, and where that is written."""
+
+    purpose: Literal["recording", "research", "teaching", "sharing"]
+    evidence: Line
+    given_on: dt.date | None = None
 
 
 class LanguageChoice(Request):
@@ -358,6 +389,41 @@ class ParameterBehind:
 
 
 @dataclass(frozen=True)
+class ApiToken:
+    """A token for a program, without the token itself."""
+
+    id: str
+    name: str
+    scopes: list[str]
+    created_at: dt.datetime
+    expires_at: dt.datetime
+    used_at: dt.datetime | None
+
+
+@dataclass(frozen=True)
+class NewApiToken(ApiToken):
+    """A token that has just been made; it is shown this once."""
+
+    token: str
+
+
+@dataclass(frozen=True)
+class SecondFactorSetUp:
+    """What an authenticator needs, shown this once: the secret, its otpauth address, a picture of that."""
+
+    secret: str
+    address: str
+    picture: str
+
+
+@dataclass(frozen=True)
+class RecoveryCodes:
+    """Codes for when the telephone is lost, one a line; shown this once, each works once."""
+
+    codes: str
+
+
+@dataclass(frozen=True)
 class AuditRow:
     """Who opened or changed what, when; each row's hash covers the row before it."""
 
@@ -369,6 +435,14 @@ class AuditRow:
     resource: str
     resource_id: str | None
     detail: dict[str, Any]
+    hash: str
+
+
+@dataclass(frozen=True)
+class AuditHead:
+    """The newest row of the audit log: its number and its hash."""
+
+    seq: int
     hash: str
 
 

@@ -19,7 +19,7 @@ from server import audit
 from server.api import schemas
 from server.api.documents import PUBLIC, refusals
 from server.api.users import user_answer
-from server.auth import accounts, one_time
+from server.auth import accounts, one_time, second_factor
 from server.auth.access import require
 from server.auth.cookie import clear_token, read_token, set_token
 from server.auth.identity import Identity
@@ -27,7 +27,7 @@ from server.auth.passwords import hash_password
 from server.auth.roles import POLICY, Action, Role
 from server.auth.sessions import Logins
 from server.auth.tokens import token_hash
-from server.context import Db, Failures, OpenLogins, OpenTrail, address_of
+from server.context import Config, Db, Failures, OpenLogins, OpenTrail, address_of
 from server.http.json_body import StrictJsonRoute
 from server.http.problems import SENTENCES, Problem
 from server.storage.refusal import refusal_of
@@ -72,14 +72,21 @@ def sign_in(
     request: Request,
     body: Annotated[schemas.SignIn, Depends(_credentials)],
     db: Db,
+    settings: Config,
     logins: OpenLogins,
     trail: OpenTrail,
     failures: Failures,
 ) -> Any:
-    """Sign in with name and password; the answer sets the session cookie."""
-    row = accounts.check_password(db, failures, trail, body.name, body.password, address_of(request))
+    """Sign in with name and password, and a code where it is needed; the answer sets the session cookie."""
+    address = address_of(request)
+    row = accounts.check_password(db, failures, trail, body.name, body.password, address)
+    key = settings.second_factor_key
+    by_recovery = accounts.check_code(db, key, failures, trail, row.id, body.code, address)
     try:
         with db.write() as c:
+            if by_recovery:
+                left = {"left": second_factor.count_recovery(c, row.id)}
+                audit.record(c, None, "user.recovery_code_used", "user", row.id, left)
             token = _open(c, logins, row, request, "sign_in")
     except OperationalError as error:
         kept = logins.keep(row.id, read_token(request)) if refusal_of(error) else None

@@ -10,13 +10,14 @@ from sqlalchemy import Row
 from server import audit
 from server.api import schemas
 from server.api.documents import refusals
-from server.auth import accounts
+from server.auth import accounts, api_tokens, second_factor
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.passwords import hash_password
 from server.auth.roles import Action, Role
 from server.context import Db, Failures, Id, OpenLogins
 from server.http.json_body import StrictJsonRoute
+from server.http.problems import Problem
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/users", tags=["users"])
 Admin = Annotated[Identity, require(Action.MANAGE_USERS)]
@@ -43,7 +44,7 @@ def add_user(body: schemas.UserNew, db: Db, who: Admin) -> schemas.User:
 def change_user(
     user_id: Id, body: schemas.UserChange, db: Db, logins: OpenLogins, failures: Failures, who: Admin
 ) -> schemas.User:
-    """Change role, shown name, password, or close the account; sign-ins end with a new role."""
+    """Change role, shown name, password, or close the account; sign-ins end, by a new password tokens too."""
     values = body.model_dump(exclude_unset=True, mode="json")
     fields = sorted(values)
     if "password" in values:
@@ -53,10 +54,23 @@ def change_user(
         row = accounts.change(c, user_id, values)
         if "password_hash" in values or (row.role, row.active) != (before.role, before.active):
             logins.end_all(c, user_id, but=who.login_id)
+        if "password_hash" in values:
+            api_tokens.revoke_all(c, user_id)
         audit.record(c, who, "user.changed", "user", user_id, {"fields": fields, "role": row.role})
     if "password_hash" in values:
         failures.forgive(row.name)
     return user_answer(row)
+
+
+@router.delete("/{user_id}/second-factor", status_code=204, responses=refusals(404))
+def reset_second_factor(user_id: Id, db: Db, logins: OpenLogins, who: Admin) -> None:
+    """Remove somebody's second factor, whose telephone is lost; that person's sign-ins end."""
+    with db.write() as c:
+        accounts.get(c, user_id)
+        if not second_factor.remove(c, user_id):
+            raise Problem(404, "second_factor_off", "This account has no second factor.")
+        logins.end_all(c, user_id, but=who.login_id)
+        audit.record(c, who, "user.second_factor_reset", "user", user_id)
 
 
 def user_answer(row: Row[Any]) -> schemas.User:

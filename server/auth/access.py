@@ -7,6 +7,7 @@ from typing import Any
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
+from server.auth.api_tokens import find_bearer, read_bearer
 from server.auth.cookie import read_token
 from server.auth.identity import Identity
 from server.auth.roles import PUBLIC, Action
@@ -39,7 +40,10 @@ def require(action: Action) -> Any:
 
 
 def identify(connection: HTTPConnection, *, counts: bool = True) -> Identity | None:
-    """Return who is signed in on this connection, None when nobody is; `counts` = as activity."""
+    """Return who asks on this connection, None when nobody is known; `counts` = as activity."""
+    bearer = read_bearer(connection)
+    if bearer is not None:
+        return find_bearer(connection.app.state.db, bearer)
     token = read_token(connection)
     if token is None:
         return None

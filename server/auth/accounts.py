@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, Row, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
+from server.auth import second_factor
 from server.auth.passwords import verify_password
 from server.auth.roles import Role
 from server.auth.throttle import Throttle
@@ -81,13 +85,69 @@ def check_password(
         and a closed account.
     """
     name = name.strip().lower()
-    throttle.check(name, address)
-    with db.read() as c:
-        row = c.execute(select(user).where(user.c.name == name)).one_or_none()
-    stored = row.password_hash if row is not None and row.active else None
-    if not verify_password(password, stored) or row is None:
-        throttle.fail(name, address)
+    begun = throttle.begin(name, address)
+    try:
+        with db.read() as c:
+            row = c.execute(select(user).where(user.c.name == name)).one_or_none()
+        stored = row.password_hash if row is not None and row.active else None
+        is_right = verify_password(password, stored)
+    except BaseException:
+        throttle.withdraw(name, address, begun)
+        raise
+    if not is_right or row is None:
         trail.record_refused("sign_in.failed", "user", None if row is None else row.id, address)
         raise Problem(status, "wrong_password", "Name or password is wrong. Check both and try again.")
+    throttle.withdraw(name, address, begun)
     throttle.succeed(name, address)
     return row
+
+
+def check_code(
+    db: Database,
+    key_file: Path,
+    throttle: Throttle,
+    trail: AuditTrail,
+    user_id: str,
+    code: str | None,
+    address: str,
+) -> bool:
+    """After the password: require the code of an account with a second factor.
+
+    Returns
+    -------
+    Whether a recovery code was used.
+
+    Raises
+    ------
+    CodeNeeded, CodeWrong
+        401 without one or with a wrong one. Problem 429 after too many wrong ones.
+    """
+    with db.read() as c:
+        if not second_factor.is_on(c, user_id):
+            return False
+    if not (code or "").strip():
+        raise second_factor.CodeNeeded
+    with count_wrong_codes(throttle, user_id):
+        with db.write() as c:
+            before = second_factor.count_recovery(c, user_id)
+            is_right = second_factor.use(c, key_file, user_id, code or "")
+            after = second_factor.count_recovery(c, user_id)
+        if not is_right:
+            trail.record_refused("sign_in.failed", "user", user_id, address)
+            raise second_factor.CodeWrong(401)
+    return after < before
+
+
+@contextlib.contextmanager
+def count_wrong_codes(throttle: Throttle, user_id: str) -> Iterator[None]:
+    """Count a wrong code of an account, from wherever it comes; ten in a quarter of an hour."""
+    key = f"code of {user_id}"
+    begun = throttle.begin(key, key)
+    try:
+        yield
+    except second_factor.CodeWrong:
+        raise
+    except BaseException:
+        throttle.withdraw(key, key, begun)
+        raise
+    throttle.withdraw(key, key, begun)

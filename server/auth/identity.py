@@ -15,6 +15,7 @@ class Identity:
     ----------
     user_id, name, display_name, role : the account. language : of the pages, None = the browser's.
     login_id : which sign-in this is (two browsers of one person are two); the hash of its token.
+    allowed : the actions of the API token that asks, None = a person at a browser.
     """
 
     user_id: str
@@ -23,7 +24,13 @@ class Identity:
     role: Role
     login_id: str
     language: str | None = None
+    allowed: frozenset[Action] | None = None
+
+    @property
+    def token_id(self) -> str | None:
+        """The API token that asks, None = a person at a browser."""
+        return None if self.allowed is None else self.login_id.removeprefix("token:")
 
     def may(self, action: Action) -> bool:
         """Tell whether this person's role allows the action; pages ask it what to offer."""
-        return is_permitted(self.role, action)
+        return is_permitted(self.role, action) and (self.allowed is None or action in self.allowed)

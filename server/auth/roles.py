@@ -29,6 +29,8 @@ class Action(StrEnum):
     READ_PATIENT = "read_patient"
     WRITE_PATIENT = "write_patient"
     DELETE_PATIENT = "delete_patient"
+    EXPORT_PATIENT = "export_patient"
+    """Takes everything that is stored of a patient along."""
     READ_SESSION = "read_session"
     CREATE_SESSION = "create_session"
     WRITE_SESSION = "write_session"
@@ -53,6 +55,8 @@ class Action(StrEnum):
     """Looks at the clinic's sensors; says nothing of who wore them."""
     MANAGE_USERS = "manage_users"
     READ_AUDIT = "read_audit"
+    READ_SYSTEM = "read_system"
+    """Looks at how the installation is, and reads its metrics."""
 
 
 PUBLIC: frozenset[Action] = frozenset(
@@ -81,6 +85,7 @@ POLICY: dict[Action, frozenset[Role]] = {
     Action.READ_PATIENT: _ALL,
     Action.WRITE_PATIENT: _CLINICAL,
     Action.DELETE_PATIENT: _CLINICAL,
+    Action.EXPORT_PATIENT: _CLINICAL,
     Action.READ_SESSION: _ALL,
     Action.CREATE_SESSION: _UPLOADERS,
     Action.WRITE_SESSION: _CLINICAL,
@@ -95,6 +100,7 @@ POLICY: dict[Action, frozenset[Role]] = {
     Action.READ_DEVICE: _UPLOADERS,
     Action.MANAGE_USERS: _ADMIN,
     Action.READ_AUDIT: _ADMIN,
+    Action.READ_SYSTEM: _ADMIN,
 }
 
 

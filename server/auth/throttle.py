@@ -30,11 +30,33 @@ class Throttle:
         self._lock = threading.Lock()
         self._failures: defaultdict[Key, deque[float]] = defaultdict(deque)
 
+    def begin(self, account: str, address: str) -> float:
+        """Check, and count this attempt as a failure before the password is looked at; returns its time.
+
+        A burst of guesses cannot all pass before the first of them has failed.
+        """
+        with self._lock:
+            self._require(account, address)
+            return self._count(account, address)
+
+    def withdraw(self, account: str, address: str, at: float) -> None:
+        """Take back an attempt that `begin` counted: it was right, or nobody could look at it."""
+        with self._lock:
+            for key in _keys(account, address):
+                times = self._failures.get(key)
+                if times is not None and at in times:
+                    times.remove(at)
+                    if not times:
+                        del self._failures[key]
+
     def check(self, account: str, address: str) -> None:
         """Raise Problem 429 with Retry-After while one of the two has failed too often."""
-        now = self._clock()
         with self._lock:
-            wait = max(self._wait(key, limit, now) for key, limit in _keys(account, address).items())
+            self._require(account, address)
+
+    def _require(self, account: str, address: str) -> None:
+        now = self._clock()
+        wait = max(self._wait(key, limit, now) for key, limit in _keys(account, address).items())
         if wait > 0:
             seconds = int(wait) + 1
             minutes = -(-seconds // 60)
@@ -47,12 +69,16 @@ class Throttle:
 
     def fail(self, account: str, address: str) -> None:
         """Count one failure of this account from this address."""
-        now = self._clock()
         with self._lock:
-            if len(self._failures) > _MAX_KEYS:
-                self._forget(now)
-            for key in _keys(account, address):
-                self._failures[key].append(now)
+            self._count(account, address)
+
+    def _count(self, account: str, address: str) -> float:
+        now = self._clock()
+        if len(self._failures) > _MAX_KEYS:
+            self._forget(now)
+        for key in _keys(account, address):
+            self._failures[key].append(now)
+        return now
 
     def succeed(self, account: str, address: str) -> None:
         """Forget the failures of somebody who mistyped a few times and has now signed in."""

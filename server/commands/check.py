@@ -9,8 +9,11 @@ from pathlib import Path
 from server.settings import load_settings
 
 
-def check(data_dir: Path | None) -> int:
-    """Check database, stored files, live logs, trash and audit chain; 1 when something is wrong."""
+def check(data_dir: Path | None, head: Path | None = None) -> int:
+    """Check database, stored files, live logs, trash and audit chain; 1 when something is wrong.
+
+    `head`: a file of the audit log's newest row as it once was, kept elsewhere.
+    """
     from server.services import checks
     from server.storage.blobs import BlobStore
     from server.storage.db import Database
@@ -26,7 +29,7 @@ def check(data_dir: Path | None) -> int:
         sys.stderr.write(f"{error}\n")
         return 1
     with closing(Database(settings.database)) as db:
-        findings = checks.check(db, BlobStore(settings.blobs), settings)
+        findings = checks.check(db, BlobStore(settings.blobs), settings, kept_head=head)
     for finding in findings:
         sys.stdout.write(f"{finding.area}: {finding.message}\n")
     sys.stdout.write(f"{len(findings)} problems in {settings.data_dir}\n" if findings else "All is well.\n")

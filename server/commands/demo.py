@@ -30,7 +30,13 @@ def demo(port: int | None) -> int:
 
     with tempfile.TemporaryDirectory(prefix="sagittal-demo-") as folder:
         settings = load_settings(
-            {"data_dir": Path(folder), "host": "127.0.0.1", "port": port or 0, "workers": DEMO_WORKERS}
+            {
+                "data_dir": Path(folder),
+                "host": "127.0.0.1",
+                "port": port or 0,
+                "workers": DEMO_WORKERS,
+                "backup_dir": "",  # the clinic's own backups must not be pushed out by simulated ones
+            }
         )
         helpers: list[subprocess.Popen[bytes]] = []
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import signal
 import sys
@@ -34,6 +33,7 @@ def serve(data_dir: Path | None, host: str | None, port: int | None, workers: in
 def run(settings: Settings, announce: Callable[[str], None]) -> int:
     """Run web server and workers; `announce` gets the address once requests are answered."""
     from server.app import create_app
+    from server.log import start_log
     from server.processes.supervisor import Workers
     from server.services.custody import StrangersError, refuse_strangers
     from server.storage import fs
@@ -41,8 +41,11 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
     from server.web_server.build import build_server
     from server.web_server.connection import ConnectionLimits
     from server.web_server.listener import make_room, open_listener
+    from server.worker.backing_up import BackupKeeper
 
-    start_log()
+    start_log(settings)
+    # what SQLite and libraries make is for the server's user only, as what we make is
+    os.umask(0o077)
     fs.make_folder(settings.data_dir)
     try:
         lock = fs.Lock(settings.lock, f"process {os.getpid()}")
@@ -59,9 +62,11 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
         sys.stderr.write(f"{error}\n")
         lock.release()
         return 1
-    workers = Workers(settings)
+    workers, keeper = Workers(settings), BackupKeeper(settings)
+    app = create_app(settings)
+    app.state.workers = workers
     limits = ConnectionLimits(most=make_room(settings.max_connections))
-    server = build_server(create_app(settings), settings, limits)
+    server = build_server(app, settings, limits)
     host = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{host}:{listener.getsockname()[1]}"
     threading.Thread(target=_when_started, args=(server, lambda: announce(address)), daemon=True).start()
@@ -71,18 +76,14 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
         signal.signal(number, lambda *_: None)
     try:
         workers.start()
+        keeper.start()
         server.run(sockets=[listener])
     finally:
+        keeper.stop()
         workers.stop()
         listener.close()
         lock.release()
     return 0 if server.started else 1
-
-
-def start_log() -> None:
-    """Log to stderr: what we do, and of the migrations only what goes wrong."""
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    logging.getLogger("alembic").setLevel(logging.WARNING)
 
 
 def say(text: str) -> None:

@@ -13,9 +13,12 @@ from server.settings import load_settings
 
 
 def user(data_dir: Path | None, name: str, role: str) -> int:
-    """Ask for a password and store its hash; an existing user keeps the role and gets the new password."""
+    """Ask for a password and store its hash.
+
+    An existing user keeps the role, gets the new password, and loses second factor and tokens.
+    """
     from server import audit
-    from server.auth import accounts
+    from server.auth import accounts, api_tokens, second_factor
     from server.auth.passwords import hash_password
     from server.auth.roles import Role
     from server.http.problems import Problem
@@ -39,6 +42,8 @@ def user(data_dir: Path | None, name: str, role: str) -> int:
                 audit.record(c, None, "user.created", "user", known, {"role": role, "by": "console"})
             else:
                 accounts.change(c, known, {"password_hash": hashed})
+                second_factor.remove(c, known)
+                api_tokens.revoke_all(c, known)
                 audit.record(c, None, "user.password_changed", "user", known, {"by": "console"})
     except Problem as error:
         sys.stderr.write(f"{error.detail}\n")

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
-from server.commands.serve import start_log
+from server.log import start_log
 from server.settings import load_settings
 
 
@@ -14,9 +15,11 @@ def worker(data_dir: Path | None) -> int:
     from server.storage.migrate import MigrationError
     from server.worker.worker import run_worker
 
-    start_log()
+    settings = load_settings({"data_dir": data_dir})
+    start_log(settings)
+    os.umask(0o077)
     try:
-        run_worker(load_settings({"data_dir": data_dir}))
+        run_worker(settings)
     except MigrationError as error:
         sys.stderr.write(f"{error}\n")
         return 1

@@ -13,6 +13,10 @@ KEPT = "public, max-age=31536000, immutable"
 """Cache-Control of an answer whose address carries a hash of it."""
 
 
+HTTPS_ONLY = "max-age=31536000"
+"""A year, for this host alone: what stands beside it is not ours to decide."""
+
+
 def allow_camera(origins: str) -> str:
     """Return the policy of a page whose camera these origins may use: "()" none, "(self)" its own."""
     return f"camera={origins}, microphone=(), geolocation=()"
@@ -46,17 +50,25 @@ def add_security_headers(headers: MutableHeaders) -> None:
 
 
 class SecurityHeaders:
-    """ASGI middleware that adds each header unless the route has set its own."""
+    """ASGI middleware that adds each header unless the route has set its own.
 
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
+    Parameters
+    ----------
+    behind_tls : browsers are told to ask for nothing but https from now on.
+    """
+
+    def __init__(self, app: ASGIApp, *, behind_tls: bool = False) -> None:
+        self.app, self._behind_tls = app, behind_tls
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection with the headers added."""
 
         async def with_headers(message: Message) -> None:
             if message["type"] in {"http.response.start", "websocket.http.response.start"}:
-                add_security_headers(MutableHeaders(scope=message))
+                headers = MutableHeaders(scope=message)
+                add_security_headers(headers)
+                if self._behind_tls:
+                    headers["Strict-Transport-Security"] = HTTPS_ONLY
             await send(message)
 
         await self.app(scope, receive, with_headers)

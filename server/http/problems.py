@@ -22,6 +22,7 @@ from starlette.websockets import WebSocket, WebSocketState
 from core.errors import SagittalError
 from server.http.headers import add_security_headers
 from server.http.templates import render
+from server.log import request_id
 from server.storage.refusal import refusal_of
 
 log = logging.getLogger(__name__)
@@ -150,6 +151,9 @@ def install(app: FastAPI) -> None:
         response = problem_response(problem, connection)
         # Starlette answers 500 outside of all middleware
         add_security_headers(response.headers)
+        asked = request_id.get()
+        if asked is not None:
+            response.headers["X-Request-ID"] = asked
         return response
 
     async def handle_disk(connection: HTTPConnection, error: Exception) -> Response | None:

@@ -2,27 +2,42 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Final
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
+from server.auth import api_tokens, second_factor
 from server.auth.access import require
+from server.auth.api_tokens import Scope
 from server.auth.identity import Identity
 from server.auth.passwords import MIN_LENGTH
 from server.auth.roles import Action
 from server.context import Db
 from server.pages.shell import render_page
 from server.pages.words import ROLE_WORDS
+from server.storage.tables import now
+
+SCOPE_WORDS: Final = {
+    Scope.READ: "Read patients, visits and results",
+    Scope.UPLOAD: "Add visits and upload recordings",
+    Scope.WRITE: "Add and change patients and visits, analyse, review",
+    Scope.METRICS: "Read the metrics of the server",
+}
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 @router.get("/account")
 def show_account(request: Request, db: Db, who: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> Response:
-    """One's own password, and signing out."""
+    """One's own password, second factor and tokens, and signing out."""
+    with db.read() as c:
+        tokens = api_tokens.list_tokens(c, who.user_id)
+        has_factor, codes = second_factor.is_on(c, who.user_id), second_factor.count_recovery(c, who.user_id)
     return render_page(
         request, db, who, "account.html", "account",
-        user=who, role_text=ROLE_WORDS[who.role], min_password=MIN_LENGTH,
+        user=who, role_text=ROLE_WORDS[who.role], min_password=MIN_LENGTH, tokens=tokens, at=now(),
+        scopes=[(scope.value, word) for scope, word in SCOPE_WORDS.items()],
+        has_factor=has_factor, codes=codes,
     )  # fmt: skip

@@ -28,7 +28,17 @@ from server.pages.visit_state import judge_visit
 from server.report.change_words import change_words
 from server.report.takes_chart import find_scale, takes_svg
 from server.report.trends import VisitKind
-from server.services import edit_log, histories, live, notes, patients, prescriptions, sessions, visits
+from server.services import (
+    consents,
+    edit_log,
+    histories,
+    live,
+    notes,
+    patients,
+    prescriptions,
+    sessions,
+    visits,
+)
 from server.services.histories import AnalysedSession
 from server.services.programmes import PlannedVisit
 from server.services.reviewed import ReviewedAnalyses
@@ -38,6 +48,14 @@ from server.storage.tables import now
 from web.words import number
 
 """Protocols that say how a person walks."""
+
+PURPOSE_WORDS: Final = {
+    "recording": "Measuring and storing",
+    "research": "Use in research",
+    "teaching": "Use in teaching",
+    "sharing": "Passing on to another clinic",
+}
+"""Purpose of a consent → words."""
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -58,6 +76,7 @@ def show_patient(
         planned = {v.session_id: v for plan in plans for v in plan.visits if v.session_id is not None}
         rows = list_visits(c, reviewed, pid, done if results else [], planned)
         written_down = notes.of_patient(c, pid)
+        agreed = consents.of_patient(c, pid)
         written = prescriptions.of_patient(c, pid) if results else []
     record_opening(request, who, "patient", pid)
     trend = None
@@ -71,6 +90,7 @@ def show_patient(
         patient=view_patient(patient), visits=rows, today=now().date(),
         facts=list_facts(patient, None if walked is None else walked.condition.words),
         notes=list_notes(written_down, rows, who),
+        consents=[(one, PURPOSE_WORDS[one.purpose]) for one in agreed], purposes=list(PURPOSE_WORDS.items()),
         programme=view_programme(plans[0], now().date()) if plans else None,
         trend=trend, comparable=len(done) > 1 and results, feedback=make_card(written),
     )  # fmt: skip

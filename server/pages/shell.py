@@ -19,6 +19,7 @@ NAVIGATION = (
     ("devices", "sensor", "Sensors", "/sensors", Action.READ_DEVICE),
     ("users", "users", "Users", "/users", Action.MANAGE_USERS),
     ("audit", "audit", "Audit", "/audit", Action.READ_AUDIT),
+    ("system", "gear", "System", "/system", Action.READ_SYSTEM),
 )
 """Rail entries: page, icon, word, address, and what one must be allowed to do to see it."""
 

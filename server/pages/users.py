@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from server.auth import accounts
+from server.auth import accounts, second_factor
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.passwords import MIN_LENGTH
@@ -25,9 +25,11 @@ def show_users(request: Request, db: Db, who: Annotated[Identity, require(Action
     """Who may sign in, and as what."""
     with db.read() as c:
         rows = accounts.list_accounts(c)
+        with_factor = second_factor.list_users(c)
     roles = [(role.value, ROLE_WORDS[role]) for role in Role]
     options = [(role.value, role.value) for role in Role]
     return render_page(
         request, db, who, "users.html", "users",
         users=rows, roles=roles, role_options=options, min_password=MIN_LENGTH,
+        with_factor=with_factor,
     )  # fmt: skip

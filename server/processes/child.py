@@ -9,7 +9,6 @@ allow.
 
 from __future__ import annotations
 
-import logging
 import os
 import resource
 import signal
@@ -17,6 +16,7 @@ import socket
 import subprocess
 import sys
 
+from server.log import start_log
 from server.processes.channel import Channel
 from server.processes.environment import make_environment
 from server.processes.lifeline import call_when_parent_ends, die_with
@@ -62,8 +62,8 @@ def enter_child() -> tuple[Channel, Settings]:
     die_with(int(sys.argv[2]))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent ends us
     call_when_parent_ends(lambda: os._exit(1))
-    logging.basicConfig(level=logging.INFO)
     settings = load_settings()
+    start_log(settings)
     if settings.child_memory_bytes:
         resource.setrlimit(resource.RLIMIT_AS, (settings.child_memory_bytes,) * 2)
     return Channel(end), settings

@@ -21,3 +21,11 @@ def require_day(day: dt.date) -> dt.date:
     raise ServiceError(
         "bad_value", f"The day is {day.isoformat()}. Expected one from {FIRST} to {last}; check the year."
     )
+
+
+def move_years(day: dt.date, years: int) -> dt.date:
+    """The same day some years later or, below 0, earlier; 28 for 29 February where there is none."""
+    try:
+        return day.replace(year=day.year + years)
+    except ValueError:
+        return day.replace(year=day.year + years, day=28)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Collection
 from dataclasses import dataclass
+from pathlib import Path
 
 from sqlalchemy.exc import DatabaseError
 
@@ -14,6 +16,7 @@ from server.services.references import list_referenced
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.storage.high_water import explain_lost_rows
 from server.storage.trash import Trash, TrashedFile
 
 
@@ -31,24 +34,44 @@ class StorageDefect:
     message: str
 
 
-def check(db: Database, blobs: BlobStore, settings: Settings) -> list[StorageDefect]:
-    """Check database, stored files by their hash, live logs, trash and audit chain."""
+def check(
+    db: Database,
+    blobs: BlobStore,
+    settings: Settings,
+    *,
+    known_missing: Collection[tuple[str, str]] = (),
+    kept_head: Path | None = None,
+) -> list[StorageDefect]:
+    """Check database, stored files by their hash, live logs, trash and audit chain.
+
+    Parameters
+    ----------
+    known_missing : files (space, sha256) of which it is known already that they are not there.
+    kept_head : a file like `audit.mark` that was kept elsewhere: the log must still hold that row.
+    """
     try:
         found = [StorageDefect("database", text) for text in db.problems()]
         with db.read() as c:
             used = sorted(list_referenced(c))
             found += [StorageDefect("audit", text) for text in audit.find_problems(c)]
+            cut = None if kept_head is None else explain_lost_rows(c, kept_head)
             doubted = custody.find_doubt(c, settings)
     except DatabaseError as error:
         return [StorageDefect("database", f"cannot be read ({error.orig}); restore it from a backup")]
     if doubted is not None:
         text = f"{doubted} No stored file is taken away until the right one is back or `sagittal accept`."
         found.append(StorageDefect("audit", text))
+    if kept_head is not None and not kept_head.is_file():
+        cut = f"There is no file {kept_head}, so nobody knows whether the audit log is whole."
+    if cut is not None:
+        found.append(StorageDefect("audit", cut))
     trash = list(Trash(settings.trash).files())
     waiting = {(one.space, one.name) for one in trash}
     for space, sha256 in used:
+        if (space, sha256) in known_missing:
+            continue
         try:
-            blobs.read(space, sha256)
+            blobs.open(space, sha256).close()
         except SagittalError as error:
             text = f"patient {space}: {error.message}"
             if (space, sha256) in waiting:

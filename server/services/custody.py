@@ -34,6 +34,11 @@ def refuse_strangers(settings: Settings) -> None:
     Creates no database; one that cannot be read is left to `storage.migrate`, which says so.
     """
     if not settings.database.exists():
+        if settings.restoring.exists():
+            raise StrangersError(
+                f"A restore into {settings.data_dir} was interrupted. Run `sagittal restore` again; to begin "
+                f"an empty clinic instead, remove {settings.restoring} first."
+            )
         text = _strangers(settings, erased=set())
     else:
         with closing(Database(settings.database)) as db:

@@ -28,6 +28,7 @@ from server.settings import Settings
 from server.storage import fs
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.storage.person_tables import consent
 from server.storage.tables import (
     analysis,
     analysis_file,
@@ -61,6 +62,7 @@ from server.storage.trash import Trash
 log = logging.getLogger(__name__)
 
 ERASED = "patient.erased"
+SESSION_ERASED = "session.erased"
 _ID = re.compile(r"[0-9a-f]{32}")
 
 
@@ -91,6 +93,7 @@ def erase_patient(
         c.execute(delete(programme).where(programme.c.patient_id == patient_id))
         c.execute(delete(prescription).where(prescription.c.patient_id == patient_id))
         c.execute(delete(patient_note).where(patient_note.c.patient_id == patient_id))
+        c.execute(delete(consent).where(consent.c.patient_id == patient_id))
         c.execute(delete(patient).where(patient.c.id == patient_id))
         audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": found.sessions})
         _note(settings, spaces=[patient_id], takes=takes)
@@ -106,7 +109,7 @@ def erase_session(
         found = sessions.get(c, session_id)
         own = _files_of(c, session_id, found.patient_id)
         takes = _erase_session_rows(c, session_id)
-        audit.record(c, actor, "session.erased", "session", session_id, {"patient_id": found.patient_id})
+        audit.record(c, actor, SESSION_ERASED, "session", session_id, {"patient_id": found.patient_id})
         _note(settings, files=sorted(own), takes=takes)
     reviewed.forget()
     finish(db, reviewed.blobs, settings)

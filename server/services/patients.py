@@ -118,6 +118,14 @@ def list_patients(c: Connection, *, search: str = "", limit: int = 200, offset: 
     return [Patient(**row._asdict()) for row in c.execute(query.limit(limit).offset(offset))]
 
 
+def list_older(c: Connection, day: dt.date) -> list[Patient]:
+    """Patients whose newest visit, or who themselves without one, are older than a day; the oldest first."""
+    added = dt.datetime.combine(day, dt.time(), dt.UTC)
+    is_older = (day > _LAST_VISIT) | (_LAST_VISIT.is_(None) & (patient.c.created_at < added))
+    query = _listing().where(is_older).order_by(_LAST_VISIT.nulls_first(), patient.c.created_at, patient.c.id)
+    return [Patient(**row._asdict()) for row in c.execute(query)]
+
+
 _LAST_VISIT = (
     select(func.max(session.c.performed_on))
     .where(session.c.patient_id == patient.c.id)

@@ -258,6 +258,19 @@ def remove_folder(folder: Path) -> None:
     sync_folder(folder.parent)
 
 
+def remove_tree(folder: Path) -> None:
+    """Remove a folder with everything in it; gone already is fine."""
+    if not folder.is_dir():
+        return
+    for path in folder.iterdir():
+        if path.is_dir() and not path.is_symlink():
+            remove_tree(path)
+        else:
+            system.unlink(path)
+    system.rmdir(folder)
+    sync_folder(folder.parent)
+
+
 class LockedError(Exception):
     """Another process holds the lock; `holder` is the text it left there."""
 
@@ -283,8 +296,12 @@ class Lock:
             text = path.read_text("utf-8", "replace").strip()
             system.close(self._fd)
             raise LockedError(path, text) from None
-        os.ftruncate(self._fd, 0)
-        system.write(self._fd, holder.encode())
+        try:
+            os.ftruncate(self._fd, 0)
+            system.write(self._fd, holder.encode())
+        except BaseException:
+            system.close(self._fd)
+            raise
 
     def release(self) -> None:
         """Let the next one in; the file stays, so that two processes never lock two files of one name."""

@@ -29,6 +29,7 @@ class Readiness:
     Parameters
     ----------
     settings, db, blobs : the installation. clock : monotonic seconds.
+    parts : further checks by name, each says "ok" or what does not work.
     """
 
     EVERY_S: ClassVar[float] = 5.0
@@ -39,7 +40,9 @@ class Readiness:
         db: Database,
         blobs: BlobStore,
         clock: Callable[[], float] = time.monotonic,
+        parts: Mapping[str, Callable[[], str]] | None = None,
     ) -> None:
+        self._parts = dict(parts or {})
         self._settings, self._db, self._blobs, self._clock = settings, db, blobs, clock
         self._lock = threading.Lock()
         self._checked_at: float | None = None
@@ -71,4 +74,4 @@ class Readiness:
             checks["schema"] = str(error)
         if shutil.disk_usage(settings.data_dir).free < settings.min_free_bytes:
             checks["disk"] = f"Less than {settings.min_free_bytes} bytes are free; uploads are refused."
-        return checks
+        return checks | {name: look() for name, look in self._parts.items()}

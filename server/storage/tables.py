@@ -14,6 +14,7 @@ patient ─< session ─< recording ─< recording_file          user ─< login
         ├──< programme ─< planned_visit ─── session (at most one each)
         └──< prescription ─< live_take >── session, recording (the one it became)
                                  └──< live_event (append-only)
+user ─< api_token, second_factor; patient ─< consent (storage/person_tables.py)
 """
 
 from __future__ import annotations

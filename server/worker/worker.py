@@ -20,6 +20,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from core.errors import SagittalError
 from server.jobs.queue import Claim, JobQueue, LeaseState
 from server.jobs.table import TableQueue
+from server.log import start_log
 from server.processes.lifeline import call_when_parent_ends
 from server.services import erasure
 from server.services.sweep import sweep
@@ -275,6 +276,6 @@ def run_worker(settings: Settings, *, with_starter: bool = False) -> None:
 
 
 if __name__ == "__main__":
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    logging.getLogger("alembic").setLevel(logging.WARNING)
-    run_worker(load_settings(), with_starter=True)
+    own_settings = load_settings()
+    start_log(own_settings)
+    run_worker(own_settings, with_starter=True)

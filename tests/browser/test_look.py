@@ -50,6 +50,7 @@ PAGES: dict[str, Address] = {
     "sensors": lambda f: "/sensors",
     "users": lambda f: "/users",
     "audit": lambda f: "/audit",
+    "system": lambda f: "/system",
     "account": lambda f: "/account",
     "error": lambda f: "/patients/00000000000000000000000000000000",
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 
@@ -43,3 +44,23 @@ class FailingSystem(fs.System):
     def mkdir(self, path: Path) -> None:
         self._count()
         super().mkdir(path)
+
+
+class PowerError(Exception):
+    """The power is gone."""
+
+
+class Dying(FailingSystem):
+    """The power goes before the n-th call that changes something, and stays away."""
+
+    def __init__(self, after: int) -> None:
+        super().__init__(after, errno.EIO)
+
+    def _count(self) -> None:
+        self.calls += 1
+        if self.calls > self._fail_at:
+            raise PowerError
+
+    def unlink(self, path: Path) -> None:
+        self._count()
+        super().unlink(path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import errno
 import os
 import shutil
 import subprocess
@@ -31,31 +30,11 @@ from server.worker.task import load
 from server.worker.worker import Worker
 from tests.data import ROOT
 from tests.faults.clinic import Clinic
-from tests.faults.failing import FailingSystem
+from tests.faults.failing import Dying, PowerError
 from tests.faults.model_disk import ModelDisk
 from tests.service import line_with
 
 CONTENTS = {b"signals", b"walk two", b"walk three"}
-
-
-class PowerError(Exception):
-    """The power is gone."""
-
-
-class Dying(FailingSystem):
-    """The power goes before the n-th call that changes something, and stays away."""
-
-    def __init__(self, after: int) -> None:
-        super().__init__(after, errno.EIO)
-
-    def _count(self) -> None:
-        self.calls += 1
-        if self.calls > self._fail_at:
-            raise PowerError
-
-    def unlink(self, path: Path) -> None:
-        self._count()
-        super().unlink(path)
 
 
 def upload(clinic: Clinic, name: str, content: bytes) -> None:

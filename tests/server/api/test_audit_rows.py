@@ -40,6 +40,7 @@ OF_NO_PATIENT = {
     Action.READ_DEVICE,  # serial numbers and days, nobody who wore them
     Action.MANAGE_USERS,
     Action.READ_AUDIT,
+    Action.READ_SYSTEM,
     Action.PAIR,  # its row is "live.paired" (test_tablet.py)
     Action.STREAM,  # a tablet sends, and is told nothing but numbers of batches
 }
@@ -73,6 +74,8 @@ CHANGES: dict[str, dict[str, Any]] = {
     f"PATCH {PATIENT}": {"json": {"note": "uses a stick"}},
     f"POST {PATIENT}/notes": {"json": {"content": "Walks to the bakery."}},
     f"DELETE {API}/notes/{{note_id}}": {},
+    f"POST {PATIENT}/consents": {"json": {"purpose": "research", "evidence": "signed form"}},
+    f"POST {API}/consents/{{consent_id}}/withdraw": {},
     f"POST {PATIENT}/sessions": {"json": {"title": "Walk"}},
     f"POST {PATIENT}/programmes": {"json": {"starts_on": "2026-03-02"}},
     f"PATCH {API}/planned-visits/{{visit_id}}": {"json": {"planned_on": "2026-03-05"}},
@@ -241,6 +244,8 @@ async def test_every_route_that_changes_patient_data_leaves_an_audit_row(tmp_pat
                 made = answer.json() if answer.content else {}
                 if "visits" in made:
                     v.values |= {"programme_id": made["id"], "visit_id": made["visits"][0]["id"]}
+                if "evidence" in made:
+                    v.values |= {"consent_id": made["id"]}
                 if "content" in made:
                     v.values |= {"prescription_id": made["id"], "note_id": made["id"]}
                 if not [r for r in v.rows() if r.seq > before and r.user_name == "admin"]:

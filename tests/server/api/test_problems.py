@@ -94,6 +94,7 @@ async def test_an_unforeseen_error_tells_neither_client_nor_log_whose_data_it_wa
         answer = await client.get(f"{API}/broken/database")
         assert (answer.status_code, answer.json()["code"]) == (500, "internal_error")
         assert "default-src" in answer.headers["content-security-policy"]
+        assert answer.headers["x-request-id"]
         assert (await client.get(f"{API}/broken/known")).json()["code"] == "odd"
         teapot = await client.get(f"{API}/broken/x")
         assert (teapot.status_code, teapot.headers["x-kind"]) == (418, "x")

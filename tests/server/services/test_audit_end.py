@@ -11,7 +11,7 @@ from server.commands.check import check
 from server.services import patients
 from server.settings import Settings
 from server.storage.db import Database
-from server.storage.high_water import raise_mark
+from server.storage.high_water import raise_mark, set_mark
 from server.storage.migrate import upgrade
 
 ROWS = 6
@@ -42,6 +42,23 @@ def cut(settings: Settings, kept: int) -> Database:
 def test_a_whole_log_is_well(settings: Settings, capsys: pytest.CaptureFixture[str]) -> None:
     assert check(settings.data_dir) == 0
     assert capsys.readouterr().out == "All is well.\n"
+
+
+def test_a_head_kept_elsewhere_tells_what_no_file_of_the_folder_can(
+    settings: Settings, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    head = tmp_path / "elsewhere.json"
+    head.write_bytes(settings.mark.read_bytes())
+    assert check(settings.data_dir, head) == 0
+    with closing(cut(settings, 3)) as db:
+        with db.write() as c:
+            c.exec_driver_sql("UPDATE sqlite_sequence SET seq = 3 WHERE name = 'audit'")
+        set_mark(db, settings.mark)
+    capsys.readouterr()
+    assert check(settings.data_dir) == 0  # whoever may write all files has hidden it
+    assert check(settings.data_dir, head) == 1
+    assert "The audit log ends at row 3, but had reached row 6" in capsys.readouterr().out
+    assert check(settings.data_dir, tmp_path / "lost.json") == 1
 
 
 @pytest.mark.parametrize("kept", [0, 3, ROWS - 1])

@@ -25,7 +25,10 @@ function values(form) {
   for (const el of form.elements) {
     if (!el.name || el.disabled || "skip" in el.dataset) continue;
     if (el.type === "radio" && !el.checked) continue;
-    if (el.type === "checkbox") body[el.name] = el.checked;
+    if (el.type === "checkbox" && el.dataset.in) { // one of a list
+      body[el.dataset.in] ??= [];
+      if (el.checked) body[el.dataset.in].push(el.value);
+    } else if (el.type === "checkbox") body[el.name] = el.checked;
     else if (el.value === "" && el.name.includes(".")) continue;
     else if (el.value === "" && !el.required) body[el.name] = "keepEmpty" in el.dataset ? "" : null;
     else put(body, el.name.split("."), (TYPES[el.dataset.type] || String)(el.value));
@@ -61,6 +64,7 @@ async function send(form, then = form.dataset.then) {
   form.setAttribute("aria-busy", "true");
   try {
     const data = await request(method, path, method === "DELETE" ? undefined : values(form));
+    if (then?.startsWith("#")) return showOnce(form, then, data);
     letGo();
     if (then === "reload" || !then) location.reload();
     else location.assign(fill(then, data));
@@ -70,6 +74,24 @@ async function send(form, then = form.dataset.then) {
     if (!note) throw problem;
     showProblem(note, problem);
   }
+}
+
+// What the server tells only once stands in a dialog until it is closed; then the page is read anew.
+function showOnce(form, selector, data) {
+  const dialog = document.querySelector(selector);
+  for (const el of dialog.querySelectorAll("[data-answer]")) {
+    if (el instanceof HTMLImageElement) el.src = data[el.dataset.answer];
+    else el.textContent = data[el.dataset.answer];
+  }
+  const before = form.closest("dialog");
+  if (before) before.dataset.left = "";
+  before?.close();
+  dialog.addEventListener("close", () => {
+    if ("left" in dialog.dataset) return;
+    letGo();
+    location.reload();
+  });
+  dialog.showModal();
 }
 
 document.addEventListener("submit", (e) => {

@@ -79,10 +79,10 @@ soon.querySelector("[data-stay]").addEventListener("click", stay);
 out.addEventListener("cancel", (e) => e.preventDefault()); // Escape uncovers nothing
 form.addEventListener("submit", async (e) => {
   e.preventDefault();
-  const { name, password } = form.elements, note = form.querySelector(".form-error");
+  const { name, password, code } = form.elements, note = form.querySelector(".form-error");
   note.hidden = true;
   try {
-    await request("POST", "/api/v1/sign-in", { name: name.value, password: password.value });
+    await request("POST", "/api/v1/sign-in", { name: name.value, password: password.value, code: code.value || null });
     out.close();
     look();
   } catch (problem) {

@@ -44,11 +44,17 @@ export async function request(method, path, body) {
 /**
  * Shows a problem as title and sentence in a note with the parts of .form-error.
  * @param {HTMLElement} note
- * @param {{ title?: string, detail?: string }} problem
+ * Where a second factor is asked for, its field opens.
+ * @param {{ title?: string, detail?: string, code?: string }} problem
  */
 export function showProblem(note, problem) {
   note.hidden = false;
   note.querySelector("[data-title]").textContent = translate(problem.title) || speak`That did not work`;
   note.querySelector("[data-detail]").textContent = translate(problem.detail);
   note.scrollIntoView({ block: "nearest" });
+  if (problem.code !== "code_needed") return;
+  /** @type {HTMLDetailsElement | null} */
+  const details = note.closest("form").querySelector("details[data-code]");
+  if (details) details.open = true;
+  details?.querySelector("input").focus();
 }

@@ -1,0 +1,50 @@
+"""What a patient has agreed to."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter
+
+from server.api import schemas
+from server.api.documents import refusals
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db, Id, OpenTrail
+from server.http.json_body import StrictJsonRoute
+from server.services import consents, patients
+
+router = APIRouter(route_class=StrictJsonRoute, tags=["patients"])
+Writer = Annotated[Identity, require(Action.WRITE_PATIENT)]
+
+
+@router.get("/patients/{patient_id}/consents", response_model=list[consents.Consent])
+def list_consents(
+    patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_PATIENT)]
+) -> list[consents.Consent]:
+    """What a patient agreed to, what holds first."""
+    with db.read() as c:
+        patients.get(c, patient_id)
+        found = consents.of_patient(c, patient_id)
+    trail.record_opened(who, "consents.opened", "patient", patient_id)
+    return found
+
+
+@router.post(
+    "/patients/{patient_id}/consents",
+    status_code=201,
+    response_model=consents.Consent,
+    responses=refusals(409),
+)
+def give_consent(patient_id: Id, body: schemas.ConsentNew, db: Db, who: Writer) -> consents.Consent:
+    """Write down that a patient agreed."""
+    with db.write() as c:
+        return consents.give(c, who, patient_id, **body.values())
+
+
+@router.post("/consents/{consent_id}/withdraw", response_model=consents.Consent, responses=refusals(409))
+def withdraw_consent(consent_id: Id, db: Db, who: Writer) -> consents.Consent:
+    """Write down that a patient no longer agrees, from today; the row stays."""
+    with db.write() as c:
+        return consents.withdraw(c, who, consent_id)

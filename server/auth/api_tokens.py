@@ -1,0 +1,152 @@
+"""Tokens with which programs use the API in a person's name: a part of that person's rights, for a time.
+
+    Authorization: Bearer sgt_…
+
+The token is shown once, the database has its hash. It is taken from that header of /api/v1 and /metrics
+alone: never from an address, a cookie or a websocket. It ends when its time is over, when it is revoked, and
+while the account is closed; a role that may less takes from it too.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Collection, Mapping, Sequence
+from enum import StrEnum
+from typing import Any, Final
+
+from sqlalchemy import Connection, Row, delete, insert, select, update
+from sqlalchemy.exc import OperationalError
+from starlette.requests import HTTPConnection
+
+from server.auth.identity import Identity
+from server.auth.roles import Action, Role
+from server.auth.tokens import new_token, token_hash
+from server.http.problems import Problem
+from server.storage.db import Database
+from server.storage.person_tables import api_token
+from server.storage.refusal import refusal_of
+from server.storage.tables import new_id, now, user
+
+PREFIX: Final = "sgt_"
+"""By it a token is known where one has leaked."""
+MOST_DAYS: Final = 365
+MOST_TOKENS: Final = 50
+"""Of one person."""
+_TOUCH_EVERY: Final = dt.timedelta(minutes=10)
+_DOORS: Final = ("/api/v1/", "/metrics")
+
+
+class Scope(StrEnum):
+    """What a token may be made for."""
+
+    READ = "read"
+    UPLOAD = "upload"
+    WRITE = "write"
+    METRICS = "metrics"
+
+
+_READ = frozenset(
+    {
+        Action.READ_API,
+        Action.READ_PATIENT,
+        Action.READ_SESSION,
+        Action.READ_RESULT,
+        Action.READ_JOB,
+        Action.READ_DEVICE,
+    }
+)
+SCOPES: Final[Mapping[Scope, frozenset[Action]]] = {
+    Scope.READ: _READ,
+    Scope.UPLOAD: frozenset({Action.CREATE_SESSION, Action.UPLOAD}),
+    Scope.WRITE: frozenset(
+        {
+            Action.WRITE_PATIENT,
+            Action.CREATE_SESSION,
+            Action.WRITE_SESSION,
+            Action.UPLOAD,
+            Action.ANALYSE,
+            Action.REVIEW,
+            Action.CANCEL_JOB,
+        }
+    ),
+    Scope.METRICS: frozenset({Action.READ_SYSTEM}),
+}
+"""What each scope allows; no scope deletes a patient, reads the audit log or touches accounts."""
+
+
+def issue(
+    c: Connection, user_id: str, name: str, scopes: Collection[Scope], days: int
+) -> tuple[Row[Any], str]:
+    """Make a token; returns its row and, for this once, the token itself. Raises Problem 409 beyond 50."""
+    if len(list_tokens(c, user_id)) >= MOST_TOKENS:
+        raise Problem(
+            409,
+            "too_many_tokens",
+            f"An account has at most {MOST_TOKENS} tokens. Revoke one that is not used.",
+        )
+    token, at = PREFIX + new_token(), now()
+    values = {
+        "id": new_id(),
+        "user_id": user_id,
+        "name": name,
+        "token_sha256": token_hash(token),
+        "scopes": sorted(scopes),
+        "created_at": at,
+        "expires_at": at + dt.timedelta(days=days),
+    }
+    c.execute(insert(api_token).values(values))
+    return c.execute(select(api_token).where(api_token.c.id == values["id"])).one(), token
+
+
+def list_tokens(c: Connection, user_id: str) -> Sequence[Row[Any]]:
+    """A person's tokens, those that are over too, the newest first."""
+    mine = select(api_token).where(api_token.c.user_id == user_id)
+    return c.execute(mine.order_by(api_token.c.created_at.desc(), api_token.c.id)).all()
+
+
+def revoke(c: Connection, user_id: str, token_id: str) -> None:
+    """End one token of a person; raises Problem 404."""
+    gone = c.execute(delete(api_token).where(api_token.c.id == token_id, api_token.c.user_id == user_id))
+    if not gone.rowcount:
+        raise Problem(404, "token_not_found", "There is no such token; it may have been revoked already.")
+
+
+def revoke_all(c: Connection, user_id: str) -> None:
+    """End every token of a person."""
+    c.execute(delete(api_token).where(api_token.c.user_id == user_id))
+
+
+def read_bearer(connection: HTTPConnection) -> str | None:
+    """The token of this request, None when it has none or comes by a door that takes none."""
+    scheme, _, token = connection.headers.get("authorization", "").partition(" ")
+    if scheme.lower() != "bearer" or connection.scope["type"] != "http":
+        return None
+    return token.strip() if connection.url.path.startswith(_DOORS) else None
+
+
+def find_bearer(db: Database, token: str) -> Identity | None:
+    """Who asks with this token; None when it is unknown, over or revoked, or its account is closed."""
+    at = now()
+    query = (
+        select(user, api_token.c.scopes, api_token.c.used_at, api_token.c.id.label("token_id"))
+        .join(api_token, api_token.c.user_id == user.c.id)
+        .where(api_token.c.token_sha256 == token_hash(token), api_token.c.expires_at > at, user.c.active)
+    )
+    with db.read() as c:
+        row = c.execute(query).one_or_none()
+    if row is None:
+        return None
+    if row.used_at is None or row.used_at <= at - _TOUCH_EVERY:
+        _write_used(db, row.token_id, at)
+    allowed = frozenset[Action]().union(*(SCOPES[Scope(scope)] for scope in row.scopes))
+    login_id = f"token:{row.token_id}"
+    return Identity(row.id, row.name, row.display_name, Role(row.role), login_id, row.language, allowed)
+
+
+def _write_used(db: Database, token_id: str, at: dt.datetime) -> None:
+    try:
+        with db.write() as c:
+            c.execute(update(api_token).where(api_token.c.id == token_id).values(used_at=at))
+    except OperationalError as error:
+        if refusal_of(error) is None:
+            raise

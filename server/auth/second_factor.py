@@ -1,0 +1,154 @@
+"""A second factor beside the password: a code of six figures that changes every 30 s (TOTP, RFC 6238).
+
+The secret is stored encrypted; its key is a file beside the database, so that a copy of the database alone
+opens nothing. A code is taken once: the newest step that was taken is stored, and only later ones count.
+Recovery codes are stored as hashes and end when used.
+"""
+
+from __future__ import annotations
+
+import secrets
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import pyotp
+import pyrage
+import segno
+from sqlalchemy import Connection, delete, insert, select, update
+
+from server.auth.tokens import token_hash
+from server.http.problems import Problem
+from server.storage.archive import ClinicKey, make_key, read_key
+from server.storage.person_tables import second_factor
+from server.storage.tables import now
+
+STEP_S: Final = 30
+DRIFT: Final = 1
+"""Steps by which a telephone's clock may be off."""
+RECOVERY_CODES: Final = 10
+_ALPHABET: Final = "ABCDEFGHJKLMNPQRSTUVWXYZ23456789"
+_GROUPS, _GROUP = 4, 4
+"""A recovery code has 80 random bits: its plain hash cannot be searched."""
+
+
+class CodeNeeded(Problem):
+    """The password is right, and the account has a second factor."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            401,
+            "code_needed",
+            "This account has a second factor. Give the figures of your authenticator, or a recovery code.",
+        )
+
+
+class CodeWrong(Problem):
+    """The code is not the one of this moment, or was used already."""
+
+    def __init__(self, status: int) -> None:
+        super().__init__(
+            status,
+            "wrong_code",
+            "The code is wrong or was used already. Wait for the next one; check your telephone's clock.",
+        )
+
+
+@dataclass(frozen=True)
+class Enrolment:
+    """What an authenticator needs: the secret as text, as otpauth address, as picture (data address)."""
+
+    secret: str
+    address: str
+    picture: str
+
+
+def begin(c: Connection, key_file: Path, user_id: str, name: str) -> Enrolment:
+    """Make a secret, which counts from the first right code on; raises Problem 409 where one counts."""
+    if is_on(c, user_id):
+        raise Problem(409, "second_factor_on", "There is a second factor already. Remove it first.")
+    secret = pyotp.random_base32()
+    c.execute(delete(second_factor).where(second_factor.c.user_id == user_id))
+    sealed = pyrage.encrypt(secret.encode(), [_key(key_file).public])
+    c.execute(insert(second_factor).values(user_id=user_id, secret=sealed, recovery=[], last_step=0))
+    address = pyotp.TOTP(secret, interval=STEP_S).provisioning_uri(name=name, issuer_name="Sagittal")
+    return Enrolment(secret, address, segno.make(address, error="m").png_data_uri(scale=5, border=4))
+
+
+def confirm(c: Connection, key_file: Path, user_id: str, code: str, at_s: float | None = None) -> list[str]:
+    """Begin to ask for codes; returns the recovery codes, which are shown this once. Raises CodeWrong."""
+    if is_on(c, user_id) or not _take_code(c, key_file, user_id, code, at_s):
+        raise CodeWrong(403)
+    codes = ["-".join(_random_group() for _ in range(_GROUPS)) for _ in range(RECOVERY_CODES)]
+    c.execute(
+        update(second_factor)
+        .where(second_factor.c.user_id == user_id)
+        .values(confirmed_at=now(), recovery=[token_hash(code) for code in codes])
+    )
+    return codes
+
+
+def is_on(c: Connection, user_id: str) -> bool:
+    """Whether this account needs a code."""
+    query = select(second_factor.c.confirmed_at).where(second_factor.c.user_id == user_id)
+    return c.execute(query).scalar() is not None
+
+
+def list_users(c: Connection) -> set[str]:
+    """The accounts that need a code."""
+    query = select(second_factor.c.user_id).where(second_factor.c.confirmed_at.is_not(None))
+    return set(c.execute(query).scalars())
+
+
+def use(c: Connection, key_file: Path, user_id: str, code: str, at_s: float | None = None) -> bool:
+    """Take a code of this moment or a recovery code, once; False when it is neither (writes)."""
+    return _take_code(c, key_file, user_id, code, at_s) or _take_recovery(c, user_id, code)
+
+
+def count_recovery(c: Connection, user_id: str) -> int:
+    """How many recovery codes have not been used."""
+    query = select(second_factor.c.recovery).where(second_factor.c.user_id == user_id)
+    return len(c.execute(query).scalar() or ())
+
+
+def remove(c: Connection, user_id: str) -> bool:
+    """Ask for no code any more; False when none was asked for."""
+    return bool(c.execute(delete(second_factor).where(second_factor.c.user_id == user_id)).rowcount)
+
+
+def _take_code(c: Connection, key_file: Path, user_id: str, code: str, at_s: float | None) -> bool:
+    row = c.execute(select(second_factor).where(second_factor.c.user_id == user_id)).one_or_none()
+    figures = code.replace(" ", "")
+    if row is None or not (figures.isascii() and figures.isdigit()):
+        return False
+    private = _key(key_file).private
+    totp = pyotp.TOTP(pyrage.decrypt(row.secret, [private]).decode(), interval=STEP_S)
+    step = int(time.time() if at_s is None else at_s) // STEP_S
+    for one in range(step - DRIFT, step + DRIFT + 1):
+        if one > row.last_step and secrets.compare_digest(totp.generate_otp(one), figures):
+            mine = second_factor.c.user_id == user_id
+            c.execute(update(second_factor).where(mine).values(last_step=one))
+            return True
+    return False
+
+
+def _take_recovery(c: Connection, user_id: str, code: str) -> bool:
+    found = token_hash(code.strip().upper())
+    mine = second_factor.c.user_id == user_id
+    left = list(c.execute(select(second_factor.c.recovery).where(mine)).scalar() or ())
+    if found not in left:
+        return False
+    left.remove(found)
+    c.execute(update(second_factor).where(mine).values(recovery=left))
+    return True
+
+
+def _random_group() -> str:
+    return "".join(secrets.choice(_ALPHABET) for _ in range(_GROUP))
+
+
+def _key(path: Path) -> ClinicKey:
+    if not path.exists():
+        make_key(path)
+    return read_key(path)

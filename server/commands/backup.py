@@ -1,0 +1,40 @@
+"""`sagittal backup`: one file with everything, while the service runs."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import closing
+from pathlib import Path
+
+from server.settings import load_settings
+
+
+def backup(data_dir: Path | None, target: Path, key: Path | None, prune: bool) -> int:
+    """Make one backup; 1 when there is none, or when a stored file was already gone or damaged."""
+    from server.services import backups
+    from server.services.tombstones import TombstoneError
+    from server.storage.archive import BackupFileError, read_key
+    from server.storage.db import Database
+    from server.storage.migrate import MigrationError, require_current
+
+    settings = load_settings({"data_dir": data_dir})
+    if not settings.database.exists():
+        sys.stderr.write(f"There is no database in {settings.data_dir}; give the folder with --data.\n")
+        return 1
+    try:
+        require_current(settings.database)
+        clinic_key = None if key is None else read_key(key)
+        with closing(Database(settings.database)) as db:
+            made = backups.make_backup(db, settings, target.absolute(), clinic_key)
+        gone = backups.prune(made.path.parent) if prune else []
+    except (BackupFileError, TombstoneError, backups.BackupError, MigrationError) as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    head = "none" if made.head is None else f"{made.head.seq}:{made.head.hash}"
+    sys.stdout.write(f"{made.path}: {made.files} files, {made.size} bytes, audit head {head}\n")
+    for path in gone:
+        sys.stdout.write(f"removed {path}\n")
+    sys.stdout.flush()
+    for space, sha256 in made.missing:
+        sys.stderr.write(f"patient {space}: {sha256[:12]}… is gone or damaged; see `sagittal check`\n")
+    return 1 if made.missing else 0

@@ -1,0 +1,23 @@
+"""`sagittal keygen`: a key for encrypted backups."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+
+def keygen(path: Path) -> int:
+    """Write a new key pair; 1 when the file exists."""
+    from server.storage.archive import BackupFileError, make_key
+
+    try:
+        public = make_key(path.absolute())
+    except (BackupFileError, OSError) as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    sys.stdout.write(
+        f"{path} holds the clinic's key. Without it no encrypted backup can be read: keep a copy on paper, "
+        f"away from the backups.\nPublic key, which only encrypts: {public}\n"
+    )
+    sys.stdout.flush()
+    return 0

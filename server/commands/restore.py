@@ -1,0 +1,37 @@
+"""`sagittal restore`: put a backup into an empty data folder, or try whether it could be."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from server.settings import load_settings
+
+
+def restore(data_dir: Path | None, archive: Path, key: Path | None, erased: Path | None, test: bool) -> int:
+    """Restore a backup, everything verified first; 1 when nothing was put in place."""
+    from server.services import restoring
+    from server.services.tombstones import TombstoneError, read_tombstones
+    from server.storage.archive import BackupFileError, read_key
+
+    settings = load_settings({"data_dir": data_dir})
+    try:
+        clinic_key = None if key is None else read_key(key)
+        if test:
+            found = restoring.try_restore(archive.absolute(), settings, clinic_key)
+        else:
+            gone = None if erased is None else read_tombstones(erased)
+            found = restoring.restore(archive.absolute(), settings, clinic_key, gone)
+    except (BackupFileError, TombstoneError, restoring.RestoreError) as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    sys.stdout.write(
+        f"{'It could be restored' if test else f'Restored into {settings.data_dir}'}: the clinic of "
+        f"{found.created_at:%Y-%m-%d %H:%M}Z, {found.patients} patients, {found.sessions} visits, "
+        f"{found.files} files; every hash, the database and the audit chain are right. "
+        f"{found.erased_again} erased again.\n"
+    )
+    if found.missing:
+        sys.stdout.write(f"{found.missing} files were gone when the backup was made; see `sagittal check`.\n")
+    sys.stdout.flush()
+    return 0

@@ -1,0 +1,67 @@
+"""The log on standard error: lines for people, or one JSON object a line (SAGITTAL_LOG_FORMAT=json).
+
+Inside a request every line carries its id (`X-Request-ID` of the answer). Logs name rows by their ids, never
+a patient.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+import logging
+from contextvars import ContextVar
+from typing import Final
+
+from server.settings import Settings
+
+request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
+"""Id of the request that is being served, None outside of one."""
+
+_STANDARD: Final = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", "request_id"}
+
+
+def start_log(settings: Settings, handler: logging.Handler | None = None) -> None:
+    """Log to stderr in the format of the settings: what we do, and of the migrations only what goes wrong."""
+    handler = handler or logging.StreamHandler()
+    handler.addFilter(_add_request_id)
+    handler.setFormatter(JsonLines() if settings.log_format == "json" else _Lines())
+    logging.basicConfig(level=logging.INFO, handlers=[handler])
+    logging.getLogger("alembic").setLevel(logging.WARNING)
+
+
+class JsonLines(logging.Formatter):
+    """One object a line: time, level, logger, message, request_id, error, and what a call gave as `extra`."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The record as JSON."""
+        at = dt.datetime.fromtimestamp(record.created, dt.UTC)
+        line: dict[str, object] = {
+            "time": at.isoformat(timespec="milliseconds"),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": record.getMessage(),
+        }
+        asked = getattr(record, "request_id", None)
+        if asked is not None:
+            line["request_id"] = asked
+        if record.exc_info:
+            line["error"] = self.formatException(record.exc_info)
+        line |= {name: value for name, value in vars(record).items() if name not in _STANDARD}
+        return json.dumps(line, ensure_ascii=False, default=str)
+
+
+class _Lines(logging.Formatter):
+    """Lines for people; the request's id stands at the end."""
+
+    def __init__(self) -> None:
+        super().__init__("%(asctime)s %(levelname)s %(name)s: %(message)s")
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - the library's name
+        line = super().formatMessage(record)
+        asked = getattr(record, "request_id", None)
+        return line if asked is None else f"{line} [{asked}]"
+
+
+def _add_request_id(record: logging.LogRecord) -> bool:
+    record.request_id = request_id.get()
+    return True

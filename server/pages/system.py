@@ -1,0 +1,81 @@
+"""How the installation is: its parts, its backups, the end of the audit log."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+from sqlalchemy import Connection
+from starlette.responses import Response
+
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Config, Db
+from server.pages.shell import render_page
+from server.services import backup_schedule, patients
+from server.services.backup_schedule import BackupState, Outcome
+from server.services.calendar_days import move_years
+from server.services.patients import Patient
+from server.storage.high_water import read_newest
+from server.storage.tables import now
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+PART_WORDS: Final = {
+    "database": "Database",
+    "files": "Stored files",
+    "schema": "Schema of the database",
+    "disk": "Free disk space",
+    "workers": "Workers",
+    "estimators": "Estimators of live takes",
+}
+
+
+@router.get("/system")
+def show_system(
+    request: Request, db: Db, settings: Config, who: Annotated[Identity, require(Action.READ_SYSTEM)]
+) -> Response:
+    """How the parts are, how backups and restore tests went, how far the audit log has come."""
+    checks = request.app.state.readiness.checks()
+    with db.read() as c:
+        head = read_newest(c)
+        overdue = _list_overdue(c, settings.retention_years)
+    parts = [(PART_WORDS[name], None if said == "ok" else said) for name, said in checks.items()]
+    state = backup_schedule.read_state(settings)
+    upcoming = backup_schedule.next_time(settings, dt.datetime.now().astimezone())
+    return render_page(
+        request, db, who, "system.html", "system",
+        parts=parts, head=head, folder=settings.backup_dir, encrypted=bool(settings.backup_key),
+        backups=describe_backups(state, now()), upcoming=upcoming,
+        years=settings.retention_years, overdue=overdue,
+    )  # fmt: skip
+
+
+def _list_overdue(c: Connection, years: int) -> list[Patient]:
+    """Patients without a visit for so many years; 0 = nobody is asked for."""
+    if not years:
+        return []
+    return patients.list_older(c, move_years(now().date(), -years))
+
+
+def describe_backups(state: BackupState, at: dt.datetime) -> list[dict[str, Any]]:
+    """Rows of the table: last backup and last restore test, each with its state."""
+    return [
+        _describe("Last backup", state.backup, at, backup_schedule.LATE),
+        _describe("Last restore test", state.test, at, backup_schedule.TEST_EVERY + backup_schedule.LATE),
+    ]
+
+
+def _describe(what: str, found: Outcome | None, at: dt.datetime, late: dt.timedelta) -> dict[str, Any]:
+    if found is None:
+        return {"what": what, "kind": "warn", "word": "none yet", "found": None}
+    if found.ok is None:
+        kind, word = "warn", "not tested"
+    elif not found.ok:
+        kind, word = "bad", "failed"
+    else:
+        kind, word = ("warn", "late") if at - found.at > late else ("ok", "good")
+    return {"what": what, "kind": kind, "word": word, "found": found}

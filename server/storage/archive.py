@@ -1,0 +1,283 @@
+"""One file that holds many: a tar written and read as a stream, encrypted with age where a key is given.
+
+    with fs.IncomingFile(folder) as file:
+        with write_archive(file, key) as archive:
+            archive.add("a/b", source, size)
+        file.keep(target)
+    for name, size, content in read_archive(target, key): ...
+
+Encrypted files are of the format age-encryption.org/v1 (X25519, ChaCha20-Poly1305 in pieces of 64 KiB, each
+authenticated, and the end too), so `age --decrypt` opens them without this program. Memory does not grow with
+the archive.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import tarfile
+import threading
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, BinaryIO, Final, Protocol
+
+import pyrage
+
+from server.storage import fs
+
+PIECE: Final = 1 << 20
+_MAGIC: Final = b"age-encryption.org/"
+_SECRET: Final = "AGE-SECRET-KEY-1"  # noqa: S105 - how a private key of age begins
+
+
+class BackupFileError(Exception):
+    """The archive or its key cannot be used; the message says why and what to do."""
+
+
+class Sink(Protocol):
+    """What an archive is written into."""
+
+    def write(self, data: bytes) -> object:
+        """Take all of the bytes."""
+
+
+@dataclass(frozen=True)
+class ClinicKey:
+    """The clinic's key pair of age.
+
+    Parameters
+    ----------
+    public : to encrypt with. private : to decrypt with; None = it is kept elsewhere.
+    """
+
+    public: pyrage.x25519.Recipient
+    private: pyrage.x25519.Identity | None
+
+    @property
+    def opens(self) -> bool:
+        """Whether what it encrypts can be read with it."""
+        return self.private is not None
+
+
+def make_key(path: Path) -> str:
+    """Write a new key pair for its owner only and return the public one; raise BackupFileError over one."""
+    if path.exists():
+        raise BackupFileError(f"{path} exists; a key is never written over another one.")
+    private = pyrage.x25519.Identity.generate()
+    public = str(private.to_public())
+    fs.write_file(path, f"# public key: {public}\n{private}\n".encode())
+    return public
+
+
+def read_key(path: Path) -> ClinicKey:
+    """Read a key file: a private key of age, or a public one (age1…), which only encrypts; # begins a note.
+
+    Raises
+    ------
+    BackupFileError
+        there is no such file, or it holds no key.
+    """
+    try:
+        lines = [line.strip() for line in path.read_text("utf-8").splitlines()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise BackupFileError(f"The key {path} cannot be read ({error}).") from error
+    text = next((line for line in lines if line and not line.startswith("#")), "")
+    try:
+        if text.startswith(_SECRET):
+            private = pyrage.x25519.Identity.from_str(text)
+            return ClinicKey(private.to_public(), private)
+        return ClinicKey(pyrage.x25519.Recipient.from_str(text), None)
+    except (pyrage.IdentityError, pyrage.RecipientError) as error:
+        raise BackupFileError(
+            f"{path} holds no key. Expected a line AGE-SECRET-KEY-1… or age1…; `sagittal keygen FILE` makes "
+            "one."
+        ) from error
+
+
+class ArchiveWriter:
+    """An archive that is being written."""
+
+    def __init__(self, tar: tarfile.TarFile) -> None:
+        self._tar = tar
+
+    def add(self, name: str, source: BinaryIO, size: int) -> str:
+        """Append the first `size` bytes of a source, which has them, and return their sha256."""
+        member = tarfile.TarInfo(name)
+        member.size, member.mode = size, 0o600
+        reader = _HashingReader(source)
+        self._tar.addfile(member, reader)  # type: ignore[arg-type]
+        self._tar.members = []  # type: ignore[attr-defined]  # it would remember each for ever
+        return reader.sha256
+
+
+class ArchivedFile:
+    """The content of one file of an archive that is being read."""
+
+    def __init__(self, content: IO[bytes], archive: Path) -> None:
+        self._content, self._archive = content, archive
+
+    def read(self, size: int) -> bytes:
+        """The next bytes, none at the end; raises BackupFileError where the archive is cut."""
+        try:
+            return self._content.read(size)
+        except (tarfile.TarError, EOFError) as error:
+            raise _damaged(self._archive) from error
+
+
+@contextlib.contextmanager
+def write_archive(sink: Sink, key: ClinicKey | None = None) -> Iterator[ArchiveWriter]:
+    """Write an archive into a sink; whole only when the block ends without an error."""
+    if key is None:
+        with tarfile.open(fileobj=sink, mode="w|", format=tarfile.PAX_FORMAT) as tar:  # type: ignore[call-overload]
+            yield ArchiveWriter(tar)
+        return
+    public = key.public
+    read_end, write_end = os.pipe()
+    source, counting = os.fdopen(read_end, "rb"), _Counting(sink)
+    worker = _Background(lambda: pyrage.encrypt_io(source, counting, [public]), source)
+    try:
+        with (
+            os.fdopen(write_end, "wb", buffering=PIECE) as pipe,
+            tarfile.open(fileobj=pipe, mode="w|", format=tarfile.PAX_FORMAT) as tar,
+        ):
+            yield ArchiveWriter(tar)
+    except BaseException:
+        worker.end()
+        if counting.error is not None:  # why the pipe broke
+            raise counting.error from None
+        raise
+    worker.end()
+    if worker.error is not None:
+        raise counting.error or worker.error
+
+
+def read_archive(path: Path, key: ClinicKey | None) -> Generator[tuple[str, int, ArchivedFile], None, None]:
+    """Every file of an archive in its order: name, size in bytes, content to be read before the next one.
+
+    Raises
+    ------
+    BackupFileError
+        it is none, is damaged or cut, or needs another key. Seen at the latest at its end: nothing of it may
+        be used before.
+    """
+    with path.open("rb") as file:
+        encrypted = file.read(len(_MAGIC)) == _MAGIC
+        file.seek(0)
+        if not encrypted:
+            yield from _members(path, file)
+            return
+        if key is None or key.private is None:
+            raise BackupFileError(
+                f"{path.name} is encrypted; give the file with the private key (--key FILE)."
+            )
+        yield from _decrypted(path, file, key.private)
+
+
+def _decrypted(
+    path: Path, file: BinaryIO, private: pyrage.x25519.Identity
+) -> Generator[tuple[str, int, ArchivedFile], None, None]:
+    read_end, write_end = os.pipe()
+    sink = os.fdopen(write_end, "wb", buffering=PIECE)
+    worker = _Background(lambda: pyrage.decrypt_io(file, sink, [private]), sink)
+    pipe = os.fdopen(read_end, "rb", buffering=PIECE)
+    try:
+        yield from _members(path, pipe)
+        while pipe.read(PIECE):  # what pads the tar: the end is authenticated too
+            pass
+    except GeneratorExit:
+        pipe.close()
+        worker.end()
+        raise
+    except BackupFileError as error:
+        pipe.close()
+        worker.end()
+        raise _refused(path, worker.error) from error
+    pipe.close()
+    worker.end()
+    if worker.error is not None:
+        raise _refused(path, worker.error)
+
+
+def _refused(path: Path, error: BaseException | None) -> BackupFileError:
+    if isinstance(error, pyrage.DecryptError):
+        return BackupFileError(f"{path.name} was encrypted for another key ({error}). Give the clinic's own.")
+    return _damaged(path)
+
+
+def _damaged(path: Path) -> BackupFileError:
+    return BackupFileError(f"{path.name} is damaged or was cut; use another backup.")
+
+
+def _members(path: Path, file: BinaryIO) -> Generator[tuple[str, int, ArchivedFile], None, None]:
+    try:
+        with tarfile.open(fileobj=file, mode="r|") as tar:
+            while (member := tar.next()) is not None:
+                tar.members = []  # type: ignore[attr-defined]  # it would remember each for ever
+                content = tar.extractfile(member) if member.isreg() else None
+                if content is None:
+                    raise BackupFileError(
+                        f"{path.name} holds {member.name}, which is no file; it is not ours."
+                    )
+                yield member.name, member.size, ArchivedFile(content, path)
+    except (tarfile.TarError, EOFError) as error:
+        raise _damaged(path) from error
+
+
+class _HashingReader:
+    """Hashes what is read through it."""
+
+    def __init__(self, source: BinaryIO) -> None:
+        self._source, self._hash = source, hashlib.sha256()
+
+    def read(self, size: int) -> bytes:
+        data = self._source.read(size)
+        self._hash.update(data)
+        return data
+
+    @property
+    def sha256(self) -> str:
+        return self._hash.hexdigest()
+
+
+class _Counting:
+    """A sink that says how many bytes it took, which age asks for."""
+
+    def __init__(self, sink: Sink) -> None:
+        self._sink = sink
+        self.error: OSError | None = None  # age's own error does not say which
+
+    def write(self, data: bytes) -> int:
+        try:
+            self._sink.write(data)
+        except OSError as error:
+            self.error = error
+            raise
+        return len(data)
+
+    def flush(self) -> None:
+        """Nothing waits here."""
+
+
+class _Background:
+    """A thread that runs `work` and then closes its end of a pipe."""
+
+    def __init__(self, work: Callable[[], object], end: BinaryIO) -> None:
+        self.error: BaseException | None = None
+        self._work, self._end_of_pipe = work, end
+        self._thread = threading.Thread(target=self._run, name="age", daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        """Wait until it is done."""
+        self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            self._work()
+        except BaseException as error:  # noqa: BLE001 - told by whoever waits
+            self.error = error
+        finally:
+            with contextlib.suppress(OSError):  # the other end may be closed already
+                self._end_of_pipe.close()

@@ -1,0 +1,87 @@
+"""Backups beside the running server: a thread that looks at the clock, a process of its own that makes them.
+
+The process does nothing for the web and no job; its disk and processor are asked for last (nice).
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import logging
+import os
+import subprocess
+import threading
+from pathlib import Path
+from typing import Final
+
+from server.log import start_log
+from server.processes.child import end_process, start_module
+from server.processes.lifeline import call_when_parent_ends
+from server.services import backup_schedule
+from server.services.tombstones import TombstoneError, find_tombstones, keep_tombstones
+from server.settings import Settings, load_settings
+from server.storage.db import Database
+
+log = logging.getLogger("server.worker.backing_up")
+
+LOOK_S: Final = 20.0
+"""Pause between two looks at the clock and at who has been erased."""
+
+
+class BackupKeeper:
+    """The thread of `sagittal serve` that has backups made; does nothing where no folder is set."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="backups", daemon=True)
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Start the thread."""
+        if self._settings.backup_dir:
+            self._thread.start()
+
+    def stop(self) -> None:
+        """End; a backup that is being made is given up."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout=LOOK_S)
+
+    def _run(self) -> None:
+        db = Database(self._settings.database)
+        try:
+            while not self._stop.wait(LOOK_S):
+                self._look(db)
+        finally:
+            if self._process is not None:
+                end_process(self._process)
+            db.close()
+
+    def _look(self, db: Database) -> None:
+        if self._process is not None and self._process.poll() is not None:
+            end_process(self._process)
+            self._process = None
+        try:
+            with db.read() as c:
+                erased = find_tombstones(c)
+            if Path(self._settings.backup_dir).is_dir():
+                keep_tombstones(erased, Path(self._settings.backup_dir))
+        except (OSError, TombstoneError):
+            log.exception("who has been erased could not be written beside the backups; trying again")
+        if self._process is None and backup_schedule.is_due(self._settings, dt.datetime.now().astimezone()):
+            self._process = start_module("server.worker.backing_up", self._settings)
+
+
+def main() -> None:
+    """Make one backup, and test it when that is due."""
+    call_when_parent_ends(lambda: os._exit(1))
+    settings = load_settings()
+    start_log(settings)
+    os.nice(10)
+    state = backup_schedule.run(settings)
+    if state.backup is not None and state.backup.ok:
+        log.info("backup %s, %d bytes", state.backup.name, state.backup.size)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,203 @@
+"""Killed, or without power or room, in the midst of a backup or a restore: whole or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from sqlalchemy import insert
+
+from server.services import checks, recordings
+from server.services.backups import BackupError, list_backups, make_backup
+from server.services.custody import StrangersError, refuse_strangers
+from server.services.restoring import RestoreError, restore, try_restore
+from server.settings import Settings
+from server.storage import fs
+from server.storage.archive import make_key, read_key
+from server.storage.blobs import Blob, BlobStore
+from server.storage.db import Database
+from server.storage.tables import now, recording_file
+from tests.data import ROOT
+from tests.faults.clinic import Clinic
+from tests.faults.failing import Dying, FailingSystem, PowerError
+
+BESIDE = {"erased.json"}
+
+
+@pytest.fixture
+def clinic(tmp_path: Path) -> Clinic:
+    (tmp_path / "disk").mkdir()
+    return Clinic(tmp_path / "home", lease_s=1.5)
+
+
+def refer(clinic: Clinic, blob: Blob) -> None:
+    """A row of the recording that needs this file."""
+    with clinic.db.write() as c:
+        this = recordings.require_current(c, clinic.session.id)
+        c.execute(
+            insert(recording_file).values(
+                recording_id=this.id, name="big.bin", size=blob.size, sha256=blob.sha256, added_at=now()
+            )
+        )
+
+
+def is_whole(home: Settings) -> bool:
+    with closing(Database(home.database)) as db:
+        return not checks.check(db, BlobStore(home.blobs), home)
+
+
+def test_a_backup_that_dies_anywhere_leaves_no_file_that_looks_like_one(
+    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = clinic.folder.parent / "disk"
+    for deaths in range(200):
+        target = disk / f"{deaths}.tar"
+        monkeypatch.setattr(fs, "system", Dying(deaths))
+        died = False
+        try:
+            make_backup(clinic.db, clinic.settings, target, None)
+        except PowerError:
+            died = True
+        monkeypatch.setattr(fs, "system", fs.System())
+        if target.exists():
+            assert try_restore(target, clinic.settings, None).patients == 1
+        else:
+            assert died
+        if not died:
+            break
+    assert deaths > 15
+    assert not list(clinic.settings.backups.glob("*.tmp*"))
+    for path in disk.glob("*.tmp"):
+        os.utime(path, (0, 0))
+    make_backup(clinic.db, clinic.settings, disk / "last.tar", None)
+    assert not list(disk.glob("*.tmp"))
+
+
+def test_a_restore_that_dies_anywhere_is_made_again(clinic: Clinic, monkeypatch: pytest.MonkeyPatch) -> None:
+    clinic.settings.live.mkdir()
+    (clinic.settings.live / f"{'a' * 32}.log").write_bytes(b"SAGLIVE1\n")
+    made = make_backup(clinic.db, clinic.settings, clinic.folder.parent / "disk", None)
+    for deaths in range(400):
+        home = replace(clinic.settings, data_dir=clinic.folder.parent / f"again{deaths}")
+        monkeypatch.setattr(fs, "system", Dying(deaths))
+        died = False
+        try:
+            restore(made.path, home, None)
+        except PowerError:
+            died = True
+        monkeypatch.setattr(fs, "system", fs.System())
+        if not died:
+            break
+        if not home.database.exists():
+            if home.restoring.exists():
+                with pytest.raises(StrangersError, match="was interrupted"):
+                    refuse_strangers(home)
+            restore(made.path, home, None)
+        assert home.database.exists()
+        refuse_strangers(home)
+        if deaths % 10 == 0:
+            assert [f.path.read_bytes() for f in BlobStore(home.blobs).files()] == [b"signals"]
+    assert deaths > 40
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
+def test_a_disk_that_refuses_is_told_and_nothing_is_left(
+    clinic: Clinic, number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = clinic.folder.parent / "disk"
+    make_key(clinic.folder.parent / "key")
+    for key in (None, read_key(clinic.folder.parent / "key")):
+        for fail_at in range(6, 12):
+            monkeypatch.setattr(fs, "system", FailingSystem(fail_at, number))
+            with pytest.raises(BackupError, match=os.strerror(number)):
+                make_backup(clinic.db, clinic.settings, disk, key)
+            monkeypatch.setattr(fs, "system", fs.System())
+            assert {p.name for p in disk.iterdir()} <= BESIDE
+    made = make_backup(clinic.db, clinic.settings, disk, None)
+    home = replace(clinic.settings, data_dir=clinic.folder.parent / "again")
+    for fail_at in range(5, 40, 5):
+        monkeypatch.setattr(fs, "system", FailingSystem(fail_at, number))
+        with pytest.raises(RestoreError, match="nothing was put in place"):
+            restore(made.path, home, None)
+        monkeypatch.setattr(fs, "system", fs.System())
+        assert {p.name for p in home.data_dir.iterdir()} <= {"server.lock"}
+
+
+def run(*words: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "server.main", *words], cwd=ROOT, stdout=subprocess.DEVNULL
+    )
+
+
+def test_killed_in_the_midst(clinic: Clinic) -> None:
+    disk, seed = clinic.folder.parent / "disk", random.Random(19)  # noqa: S311
+    space = clinic.patient.id
+    with clinic.blobs.receive(space) as receiver:
+        for _ in range(30):
+            receiver.write(seed.randbytes(1 << 20))
+        big = receiver.keep()
+    refer(clinic, big)
+    data = ["--data", str(clinic.folder)]
+
+    def kill(process: subprocess.Popen[bytes], reached: Callable[[], bool]) -> None:
+        while not reached() and process.poll() is None:
+            time.sleep(0.002)
+        time.sleep(seed.uniform(0.0, 0.05))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+
+    for _ in range(3):
+        kill(run("backup", str(disk), *data), lambda: any(p.stat().st_size > 0 for p in disk.glob("*.tmp")))
+        for one in list_backups(disk):
+            assert try_restore(one.path, clinic.settings, None).patients == 1
+            one.path.unlink()
+    made = make_backup(clinic.db, clinic.settings, disk, None)
+    home = replace(clinic.settings, data_dir=clinic.folder.parent / "again")
+    for _ in range(3):
+        kill(
+            run("restore", str(made.path), "--data", str(home.data_dir)),
+            lambda: any(home.restoring.rglob("*.tmp")),
+        )
+        assert not home.database.exists() or is_whole(home)
+        if home.database.exists():
+            fs.remove_tree(home.data_dir)
+    assert run("restore", str(made.path), "--data", str(home.data_dir)).wait() == 0
+    assert is_whole(home)
+
+
+def test_memory_does_not_grow_with_what_is_backed_up(clinic: Clinic) -> None:
+    make_key(clinic.folder.parent / "key")
+    key = ["--key", str(clinic.folder.parent / "key")]
+
+    def peak(*words: str) -> int:
+        process = run(*words)
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = status
+        assert status == 0
+        return used.ru_maxrss
+
+    def both(name: str) -> list[int]:
+        target = clinic.folder.parent / "disk" / name
+        return [
+            peak("backup", str(target), "--data", str(clinic.folder), *key),
+            peak("restore", str(target), "--data", str(clinic.folder.parent / f"{name}-again"), *key),
+        ]
+
+    small = both("small.tar.age")
+    with clinic.blobs.receive(clinic.patient.id) as receiver:
+        for _ in range(120):
+            receiver.write(os.urandom(1 << 20))
+        big = receiver.keep()
+    refer(clinic, big)
+    for before, after in zip(small, both("big.tar.age"), strict=True):
+        assert after - before < 40_000  # kB; the file has 120 000

@@ -1,0 +1,119 @@
+"""A code beside the password: asked for, taken once, limited, and a way back for who loses the telephone."""
+
+from __future__ import annotations
+
+import io
+
+import httpx
+import pyotp
+import pytest
+from sqlalchemy import select
+
+from server.auth import second_factor
+from server.auth.throttle import Throttle
+from server.commands import user as user_command
+from server.storage.person_tables import second_factor as table
+from tests.server.clinic import PASSWORD, Clinic
+
+pytestmark = pytest.mark.anyio
+API = "/api/v1"
+
+
+class At:
+    """The server's clock."""
+
+    def __init__(self) -> None:
+        self.s = 1_700_000_000.0
+
+    def time(self) -> float:
+        return self.s
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> At:
+    made = At()
+    monkeypatch.setattr(second_factor, "time", made)
+    return made
+
+
+async def enrol(clinic: Clinic, client: httpx.AsyncClient, clock: At) -> tuple[pyotp.TOTP, list[str]]:
+    answer = (await client.post(f"{API}/account/second-factor", json={"password": PASSWORD})).json()
+    assert answer["picture"].startswith("data:image/png;base64,")
+    assert f"secret={answer['secret']}" in answer["address"]
+    totp = pyotp.TOTP(answer["secret"])
+    wrong = await client.post(f"{API}/account/second-factor/confirm", json={"code": "000000"})
+    assert (wrong.status_code, wrong.json()["code"]) == (403, "wrong_code")
+    right = await client.post(f"{API}/account/second-factor/confirm", json={"code": totp.at(clock.s)})
+    return totp, right.json()["codes"].split("\n")
+
+
+async def sign_in(clinic: Clinic, name: str, code: str | None = None) -> httpx.Response:
+    async with clinic.client() as client:
+        body = {"name": name, "password": PASSWORD, "code": code}
+        return await client.post(f"{API}/sign-in", json=body)
+
+
+async def test_signing_in_needs_a_code_that_works_once(clinic: Clinic, clock: At) -> None:
+    clinic.app.state.throttle = Throttle()
+    async with clinic.client("clinician") as client:
+        totp, codes = await enrol(clinic, client, clock)
+        assert len(set(codes)) == 10
+        assert "A code is asked for" in (await client.get("/account")).text
+        # no second one over it
+        again = await client.post(f"{API}/account/second-factor", json={"password": PASSWORD})
+        assert again.status_code == 409
+    with clinic.db.read() as c:
+        stored = c.execute(select(table)).one()
+    assert totp.secret.encode() not in stored.secret
+    assert not set(codes) & set(stored.recovery)
+    assert clinic.settings.second_factor_key.stat().st_mode & 0o077 == 0
+    assert (await sign_in(clinic, "clinician")).json()["code"] == "code_needed"
+    used = totp.at(clock.s)
+    assert (await sign_in(clinic, "clinician", used)).json()["code"] == "wrong_code"  # it proved the set-up
+    clock.s += 30
+    code = totp.at(clock.s)
+    assert (await sign_in(clinic, "clinician", f"{code[:3]} {code[3:]}")).status_code == 200
+    assert (await sign_in(clinic, "clinician", code)).status_code == 401
+    clock.s += 3600
+    assert (await sign_in(clinic, "clinician", totp.at(clock.s - 60))).status_code == 401
+    assert (await sign_in(clinic, "clinician", totp.at(clock.s + 30))).status_code == 200  # a fast telephone
+    assert (await sign_in(clinic, "clinician", totp.at(clock.s))).status_code == 401  # older than the last
+    assert (await sign_in(clinic, "clinician", codes[0].lower())).status_code == 200
+    assert (await sign_in(clinic, "clinician", codes[0])).status_code == 401
+    async with clinic.client("admin") as admin:
+        rows = (await admin.get(f"{API}/audit")).json()
+    actions = [row["action"] for row in rows]
+    assert "user.recovery_code_used" in actions
+    assert "sign_in.failed" in actions
+    # guessing: ten wrong ones, then not even the right one for a while
+    for _ in range(10):
+        last = await sign_in(clinic, "clinician", "123456")
+    clock.s += 60
+    assert last.status_code in {401, 429}
+    assert (await sign_in(clinic, "clinician", totp.at(clock.s))).status_code == 429
+    clinic.app.state.throttle = Throttle()
+    assert (await sign_in(clinic, "clinician", totp.at(clock.s))).status_code == 200
+
+
+async def test_it_is_removed_by_oneself_an_administrator_or_the_console(
+    clinic: Clinic, clock: At, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clinic.app.state.throttle = Throttle()
+    async with clinic.client("assistant") as client, clinic.client("admin") as admin:
+        _, codes = await enrol(clinic, client, clock)
+        remove = f"{API}/account/second-factor/remove"
+        assert (await client.post(remove, json={"code": "nonsense"})).status_code == 403
+        assert (await client.post(remove, json={"code": codes[3]})).status_code == 204
+        assert (await sign_in(clinic, "assistant")).status_code == 200
+        await enrol(clinic, client, clock)
+        path = f"{API}/users/{clinic.users['assistant']}/second-factor"
+        assert "Remove second factor" in (await admin.get("/users")).text
+        assert (await admin.delete(path)).status_code == 204
+        assert (await admin.delete(path)).status_code == 404
+        assert (await client.get(f"{API}/account")).status_code == 401  # sign-ins have ended
+    async with clinic.client("assistant") as client:
+        await enrol(clinic, client, clock)
+    assert (await sign_in(clinic, "assistant")).status_code == 401
+    monkeypatch.setattr("sys.stdin", io.StringIO(f"{PASSWORD}\n"))
+    assert user_command.user(clinic.settings.data_dir, "assistant", "assistant") == 0
+    assert (await sign_in(clinic, "assistant")).status_code == 200

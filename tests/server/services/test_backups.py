@@ -1,0 +1,288 @@
+"""A backup made while the service runs, and what becomes of it in an empty folder."""
+
+from __future__ import annotations
+
+import datetime as dt
+import io
+import json
+import tarfile
+import threading
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from sqlalchemy import insert, select
+
+from server import audit
+from server.main import main
+from server.services import backups, checks, erasure, patients, recordings, sessions
+from server.services.backups import MANIFEST, BackupError, MadeBackup, choose_kept, list_backups, make_backup
+from server.services.restoring import RestoredClinic, RestoreError, restore, try_restore
+from server.services.reviewed import ReviewedAnalyses
+from server.services.sweep import sweep
+from server.services.tombstones import Tombstones
+from server.settings import Settings, SettingsError
+from server.storage import fs
+from server.storage.archive import BackupFileError, ClinicKey, make_key, read_archive, read_key
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from server.storage.tables import audit as audit_table
+from server.storage.tables import login_session, now, user
+from tests.faults.clinic import Clinic
+
+CUT = "is damaged or was cut"
+
+
+@pytest.fixture
+def clinic(tmp_path: Path) -> Clinic:
+    """One patient with a file, a live log, somebody signed in."""
+    made = Clinic(tmp_path / "home", lease_s=5.0)
+    (tmp_path / "disk").mkdir()
+    made.settings.live.mkdir()
+    (made.settings.live / f"{'a' * 32}.log").write_bytes(b"SAGLIVE1\n" + bytes(3000))
+    at = now()
+    with made.db.write() as c:
+        c.execute(
+            insert(user).values(
+                id="u" * 32, name="ada", display_name="Ada", role="admin", active=True, created_at=at
+            )
+        )
+        c.execute(
+            insert(login_session).values(
+                token_sha256="t" * 64, user_id="u" * 32, created_at=at, last_seen_at=at, expires_at=at
+            )
+        )
+    return made
+
+
+@pytest.fixture(params=["plain", "encrypted"])
+def key(request: pytest.FixtureRequest, tmp_path: Path) -> ClinicKey | None:
+    if request.param == "plain":
+        return None
+    make_key(tmp_path / "clinic.key")
+    return read_key(tmp_path / "clinic.key")
+
+
+def upload(clinic: Clinic, session_id: str, name: str, content: bytes) -> None:
+    with recordings.receive(clinic.db, clinic.blobs, clinic.settings, None, session_id, name) as incoming:
+        incoming.write(content)
+        incoming.keep()
+
+
+def make(clinic: Clinic, key: ClinicKey | None = None) -> MadeBackup:
+    return make_backup(clinic.db, clinic.settings, clinic.folder.parent / "disk", key)
+
+
+def put_back(clinic: Clinic, made: MadeBackup, key: ClinicKey | None = None) -> tuple[RestoredClinic, Clinic]:
+    """Restore beside the clinic, and open what came back."""
+    home = replace(clinic.settings, data_dir=clinic.folder.parent / "again")
+    found = restore(made.path, home, key)
+    again = object.__new__(Clinic)
+    again.settings, again.folder = home, home.data_dir
+    again.db, again.blobs = Database(home.database), BlobStore(home.blobs)
+    return found, again
+
+
+def defects(clinic: Clinic) -> list[str]:
+    found = checks.check(clinic.db, clinic.blobs, clinic.settings)
+    return [f"{f.area}: {f.message}" for f in found if f.area != "live"]
+
+
+def contents(clinic: Clinic) -> set[bytes]:
+    return {f.path.read_bytes() for f in clinic.blobs.files()}
+
+
+def test_a_backup_under_load_comes_back_whole(clinic: Clinic, key: ClinicKey | None) -> None:
+    stop = threading.Event()
+
+    def work() -> None:
+        number = 0
+        while not stop.wait(0.001):
+            number += 1
+            upload(clinic, clinic.session.id, "a.txt", b"walk %d" % number)
+
+    make_key(clinic.settings.second_factor_key)
+    writer = threading.Thread(target=work)
+    writer.start()
+    try:
+        made = make(clinic, key)
+    finally:
+        stop.set()
+        writer.join()
+    assert made.missing == []
+    assert [p.name for p in clinic.settings.backups.iterdir()] == ["lock"]
+    assert made.path.stat().st_mode & 0o077 == 0
+    assert (b"walk" in made.path.read_bytes()) == (key is None)
+    found, again = put_back(clinic, made, key)
+    assert (found.patients, found.sessions, found.erased_again, found.missing) == (1, 1, 0, 0)
+    assert sorted(p.name for p in again.folder.iterdir()) == [
+        "audit.mark", "blobs", "live", "sagittal.db", "second-factor.key", "server.lock",
+    ]  # fmt: skip
+    second = again.settings.second_factor_key
+    assert second.read_bytes() == clinic.settings.second_factor_key.read_bytes()
+    assert defects(again) == []
+    log = f"{'a' * 32}.log"
+    assert (again.settings.live / log).read_bytes() == (clinic.settings.live / log).read_bytes()
+    with again.db.read() as c:
+        assert c.execute(select(login_session)).all() == []
+        last = c.execute(select(audit_table).order_by(audit_table.c.seq.desc())).first()
+        assert made.head is not None
+        kept = c.execute(select(audit_table.c.hash).where(audit_table.c.seq == made.head.seq)).scalar()
+        assert audit.find_problems(c) == []
+    assert last is not None
+    assert (last.action, kept) == ("backup.restored", made.head.hash)
+    # an older state takes nothing away that it does not know
+    assert sweep(again.db, again.blobs, replace(again.settings, sweep_grace_s=0.0)) == 0
+    again.blobs.put(clinic.patient.id, b"of a newer state")
+    assert sweep(again.db, again.blobs, replace(again.settings, sweep_grace_s=0.0)) == 1
+    assert list(again.settings.trash.glob("*/*/*"))
+
+
+def test_who_was_erased_since_stays_erased(clinic: Clinic) -> None:
+    with clinic.db.write() as c:
+        other = patients.create(c, None, code="P-2")
+        visits = [sessions.create(c, None, other.id).id for _ in range(2)]
+    upload(clinic, visits[0], "x.txt", b"of the visit that goes")
+    upload(clinic, visits[1], "y.txt", b"of the visit that stays")
+    made = make(clinic)
+    reviewed = ReviewedAnalyses(clinic.blobs)
+    erasure.erase_patient(clinic.db, reviewed, clinic.settings, None, clinic.patient.id, confirm="P-1")
+    erasure.erase_session(clinic.db, reviewed, clinic.settings, None, visits[0])
+    later = make_backup(clinic.db, clinic.settings, clinic.folder.parent / "disk" / "later.tar", None)
+    found, again = put_back(clinic, made)
+    assert (found.patients, found.sessions, found.erased_again) == (1, 1, 2)
+    assert contents(again) == {b"of the visit that stays"}
+    assert b"signals" not in again.settings.database.read_bytes()
+    assert defects(again) == []
+    assert try_restore(later.path, clinic.settings, None).erased_again == 0
+    # without the list beside it an older backup cannot know; another list may be given
+    made.path.with_name("erased.json").unlink()
+    home = replace(clinic.settings, data_dir=clinic.folder.parent / "third")
+    gone = Tombstones(frozenset({clinic.patient.id}))
+    assert restore(made.path, home, None, gone).erased_again == 1
+
+
+def test_a_file_that_is_swept_meanwhile_is_taken_from_the_trash_and_a_lost_one_is_named(
+    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    upload(clinic, clinic.session.id, "b.txt", b"walk two")
+    add_live = backups._add_blobs
+
+    def later(archive: object, settings: Settings, used: object, content: object) -> None:
+        for stored in list(clinic.blobs.files()):
+            if stored.path.read_bytes() == b"signals":
+                stored.path.unlink()
+            else:
+                fs.move_file(stored.path, settings.trash / "20260101T000000Z" / stored.space / stored.name)
+        add_live(archive, settings, used, content)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(backups, "_add_blobs", later)
+    made = make(clinic)
+    assert len(made.missing) == 1
+    found, again = put_back(clinic, made)
+    assert found.missing == 1
+    assert contents(again) == {b"walk two"}
+    assert len(defects(again)) == 1
+
+
+def test_what_is_damaged_or_cut_is_refused_and_nothing_is_put_in_place(
+    clinic: Clinic, key: ClinicKey | None, tmp_path: Path
+) -> None:
+    made = make(clinic, key)
+    whole = made.path.read_bytes()
+    home = replace(clinic.settings, data_dir=tmp_path / "again")
+    places = [len(whole) * i // 7 for i in range(1, 7)] if key else [whole.index(b"signals"), 700]
+    spoiled = [whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :] for place in places]
+    spoiled += [whole[: len(whole) * i // 5] for i in range(5)]
+    spoiled += [whole[: whole.rindex(b'{"format"') - 512]] if key is None else [whole[:-1]]
+    for content in spoiled:
+        bad = tmp_path / "bad.tar"
+        bad.write_bytes(content)
+        with pytest.raises((RestoreError, BackupFileError)):
+            restore(bad, home, key)
+        assert [p.name for p in home.data_dir.iterdir()] == ["server.lock"]
+    restore(made.path, home, key)
+    with pytest.raises(RestoreError, match="is not empty"):
+        restore(made.path, home, key)
+
+
+def test_a_key_opens_only_its_own_and_a_public_one_only_encrypts(clinic: Clinic, tmp_path: Path) -> None:
+    public = make_key(tmp_path / "clinic.key")
+    make_key(tmp_path / "other.key")
+    (tmp_path / "public.key").write_text(f"# of the clinic\n{public}\n")
+    (tmp_path / "none.key").write_text("hunter2\n")
+    assert (tmp_path / "clinic.key").stat().st_mode & 0o077 == 0
+    with pytest.raises(BackupFileError, match="never written over"):
+        make_key(tmp_path / "clinic.key")
+    with pytest.raises(BackupFileError, match="holds no key"):
+        read_key(tmp_path / "none.key")
+    made = make(clinic, read_key(tmp_path / "public.key"))
+    for name, words in (("other", "another key"), ("public", "private key"), (None, "private key")):
+        with pytest.raises(BackupFileError, match=words):
+            try_restore(made.path, clinic.settings, read_key(tmp_path / f"{name}.key") if name else None)
+    assert try_restore(made.path, clinic.settings, read_key(tmp_path / "clinic.key")).patients == 1
+
+
+def test_what_a_backup_of_another_make_may_not_do(clinic: Clinic, tmp_path: Path) -> None:
+    made = make(clinic)
+    for change in ("newer", "outside", "link"):
+        bad = tmp_path / f"{change}.tar"
+        with tarfile.open(bad, "w") as tar:
+            for name, size, content in read_archive(made.path, None):
+                data = content.read(size)
+                if name == MANIFEST and change == "newer":
+                    data = json.dumps(json.loads(data) | {"format": 2}).encode()
+                member = tarfile.TarInfo("../blobs/x" if change == "outside" else name)
+                member.size = len(data)
+                if change == "link":
+                    member.type, member.linkname, member.size = tarfile.SYMTYPE, "/etc/passwd", 0
+                tar.addfile(member, io.BytesIO(data))
+        words = {"newer": "reads 1", "outside": "no backup does", "link": "which is no file"}[change]
+        with pytest.raises((RestoreError, BackupFileError), match=words):
+            try_restore(bad, clinic.settings, None)
+
+
+def test_a_backup_is_kept_apart_and_never_written_over(clinic: Clinic, tmp_path: Path) -> None:
+    with pytest.raises(BackupError, match="lost with it"):
+        make_backup(clinic.db, clinic.settings, clinic.folder / "x.tar", None)
+    with pytest.raises(BackupError, match="no folder"):
+        make_backup(clinic.db, clinic.settings, tmp_path / "gone" / "x.tar", None)
+    (tmp_path / "x.tar").touch()
+    with pytest.raises(BackupError, match="never written over"):
+        make_backup(clinic.db, clinic.settings, tmp_path / "x.tar", None)
+    with pytest.raises(SettingsError, match="another disk"):
+        Settings(data_dir=tmp_path, backup_dir=str(tmp_path / "backups"))
+
+
+def test_days_weeks_and_months_are_kept() -> None:
+    today = dt.datetime(2026, 6, 30, 2, 30, tzinfo=dt.UTC)
+    times = [today - dt.timedelta(hours=12 * i) for i in range(800)]
+    kept = sorted(choose_kept(times), reverse=True)
+    assert [t.date() for t in kept[:7]] == [(today - dt.timedelta(days=i)).date() for i in range(7)]
+    assert len(kept) <= 7 + 4 + 12
+    assert min(kept).date() == dt.date(2025, 7, 31)
+    # tomorrow's rule keeps what today's kept, as long as each is the newest of its time
+    assert choose_kept(kept) == set(kept)
+
+
+def test_commands_make_prune_try_and_restore(
+    clinic: Clinic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    disk, key = tmp_path / "disk", str(tmp_path / "clinic.key")
+    old = [disk / f"sagittal-20200101T0{i}0000Z.tar" for i in (1, 2)]
+    for path in (*old, disk / "holiday.jpg"):
+        path.touch()
+    assert main(["keygen", key]) == 0
+    data = ["--data", str(clinic.folder)]
+    assert main(["backup", str(disk), "--key", key, "--prune", *data]) == 0
+    assert not old[0].exists()
+    assert (disk / "holiday.jpg").exists()
+    made = list_backups(disk)[0]
+    assert main(["restore", str(made.path), "--test", "--key", key, *data]) == 0
+    assert "It could be restored" in capsys.readouterr().out
+    assert main(["restore", str(made.path), "--key", key, *data]) == 1
+    assert "is not empty" in capsys.readouterr().err
+    assert main(["restore", str(made.path), "--key", key, "--data", str(tmp_path / "new")]) == 0
+    with closing(Database(tmp_path / "new" / "sagittal.db")) as db, db.read() as c:
+        assert c.execute(select(user.c.name)).scalars().all() == ["ada"]
