@@ -15,6 +15,7 @@ _WHOLE: Final[dict[str, str]] = {
 _LEG: Final[dict[str, str]] = {
     "thigh": "thigh", "femur": "thigh", "upperleg": "thigh", "upleg": "thigh",
     "shank": "shank", "tibia": "shank", "lowerleg": "shank", "lowleg": "shank", "calf": "shank",
+    "ankle": "shank",
     "foot": "foot", "calcn": "foot", "shoe": "foot", "toes": "foot",
 }  # fmt: skip
 _SIDE: Final[dict[str, str]] = {"left": "l", "l": "l", "right": "r", "r": "r"}

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from core.formats import cwa, xsens
+from core.formats import apdm, apdm_h5, cwa, device_motion, dot, mvnx, shimmer, xsens
 from core.formats.draft import Draft
 from core.formats.source_spec import SourceSpec
 
@@ -30,7 +30,13 @@ VENDOR_FORMATS: Final[list[VendorFormat]] = [
     VendorFormat(
         "Xsens MT Manager text", xsens.looks_like, lambda data, name, spec: (xsens.read(data, name, spec),)
     ),
+    VendorFormat(mvnx.LABEL, mvnx.looks_like, mvnx.read),
+    VendorFormat(dot.LABEL, dot.looks_like, dot.read),
+    VendorFormat(apdm.LABEL, apdm.looks_like, apdm.read),
+    VendorFormat(apdm_h5.LABEL, apdm_h5.looks_like, apdm_h5.read),
+    VendorFormat(shimmer.LABEL, shimmer.looks_like, shimmer.read),
     VendorFormat(cwa.LABEL, cwa.looks_like, cwa.read),
+    VendorFormat(device_motion.LABEL, device_motion.looks_like, device_motion.read),
 ]
 """All of them, in the order in which they are tried (docs/contributing.md, "Add a reader")."""
 
@@ -43,4 +49,6 @@ def find_vendor(data: bytes) -> VendorFormat | None:
 def list_formats() -> str:
     """Everything that is read, as a sentence about an unreadable upload lists it."""
     labels = (vendor.label for vendor in VENDOR_FORMATS)
-    return ", ".join((*labels, "CSV or TSV with a manifest", "Sagittal Parquet", "Sagittal live log"))
+    return ", ".join(
+        (*labels, "BIDS motion", "CSV or TSV with a manifest", "Sagittal Parquet", "Sagittal live log")
+    )
