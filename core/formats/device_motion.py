@@ -13,13 +13,14 @@ from typing import Any, Final
 
 import numpy as np
 
+from core import rotation
 from core.errors import FormatError, Notice
 from core.formats import text
 from core.formats.aliases import segment_in
 from core.formats.draft import Draft, make_draft
 from core.formats.source import stem_of
 from core.formats.source_spec import GYR_UNITS, SourceSpec
-from core.frames import Floats
+from core.frames import GRAVITY, Floats
 
 LABEL: Final = "DeviceMotion JSON"
 _MARK: Final = b'"accelerationIncludingGravity"'
@@ -28,10 +29,13 @@ _ORDERS: Final = {
     "alpha, beta, gamma about z, x, y": (1, 2, 0),
 }
 """How the rates are read as x, y, z: as the W3C says now, and as it said before."""
-_CLEARLY: Final = 0.8
-"""A reading whose error is below so much of the other's is the right one [our choice]."""
-_SMOOTHED_S: Final = 0.25
-"""Over so long steps and shocks average out and gravity stays [our choice]."""
+_WINDOW_S: Final = 0.5
+"""Over so long gravity is followed by the rates [our choice]."""
+_STILL: Final = 0.8
+"""m/s² that the acceleration may be off gravity where it is taken for gravity [our choice]."""
+_FITS: Final = np.radians(10.0)
+_OTHERS: Final = np.radians(20.0)
+"""The right reading is closer than the first, every other one farther off than the second [our choice]."""
 _MILLI: Final = 1e-3
 
 
@@ -116,26 +120,31 @@ def _numbers(values: Sequence[float | None]) -> Floats:
 
 
 def _find_order(t_s: Floats, acc: Floats, rates: Floats) -> tuple[str, bool]:
-    """The reading of the rates that turns gravity as measured, and whether it is clearly the better one."""
+    """The reading of the rates that turns gravity as measured, and whether the others clearly do not."""
+    first = next(iter(_ORDERS))
     good = np.isfinite(t_s) & np.isfinite(acc).all(axis=1) & np.isfinite(rates).all(axis=1)
     t, g, w = t_s[good], acc[good], rates[good]
-    first = next(iter(_ORDERS))
-    span = float(t[-1] - t[0]) if len(t) > 1 else 0.0
-    if len(t) < 20 or span < 4 * _SMOOTHED_S or (np.diff(t) <= 0).any():
+    if len(t) < 4 or (np.diff(t) <= 0).any():
         return first, False
-    width = min(len(t) // 4, max(1, round(_SMOOTHED_S * len(t) / span)))
-    kernel = np.ones(width) / width
-
-    def smooth(x: Floats) -> Floats:
-        return np.stack([np.convolve(x[:, i], kernel, "valid") for i in range(3)], axis=1)
-
-    dt = np.gradient(t)[:, None]
-    change = smooth(np.gradient(g, axis=0) / dt)
-    errors = {
-        name: float(np.sum((change + smooth(np.cross(w[:, order], g))) ** 2))
-        for name, order in _ORDERS.items()
-    }
-    best = min(errors, key=lambda name: errors[name])
-    other = max(errors.values())
-    sure = errors[best] < _CLEARLY * other
+    step_s = float(np.median(np.diff(t)))
+    steps = max(2, round(_WINDOW_S / step_s))
+    starts = np.arange(0, len(t) - steps, max(1, steps // 4))
+    off = np.abs(np.linalg.norm(g, axis=1) - GRAVITY)
+    whole = np.abs(t[starts + steps] - t[starts] - steps * step_s) < step_s
+    starts = starts[(off[starts] < _STILL) & (off[starts + steps] < _STILL) & whole]
+    if not len(starts):
+        return first, False
+    errors = {}
+    for name, order in _ORDERS.items():
+        turned = rotation.exp(np.zeros((len(starts), 3)))
+        for k in range(steps):
+            rate = (w[starts + k] + w[starts + k + 1])[:, order] / 2
+            turned = rotation.multiply(turned, rotation.exp(rate * step_s))
+        expected = rotation.rotate(rotation.conjugate(turned), g[starts])
+        crossed = np.linalg.norm(np.cross(expected, g[starts + steps]), axis=1)
+        angle = np.arctan2(crossed, np.sum(expected * g[starts + steps], axis=1))
+        # the windows that turn most tell the readings apart
+        errors[name] = float(np.quantile(angle, 0.9))
+    best, other = sorted(errors, key=lambda name: errors[name])
+    sure = errors[best] < _FITS and errors[other] > _OTHERS
     return (best if sure else first), sure
