@@ -67,6 +67,11 @@ def _parser() -> argparse.ArgumentParser:
         help="pose estimator; auto = the best for the sensors worn (docs/estimators.md lists them)",
     )
     p.add_argument("--config", type=Path, help='JSON: parameters by stage, {"poses": {"least_valid": 0.7}}')
+    p = add("study", "Analyse every recording of a folder: one table of strides and one of takes.")
+    p.add_argument("folder", type=Path, metavar="DIR", help="recordings in any layout, BIDS too")
+    p.add_argument("--out", type=Path, required=True, help="folder for the tables; run again, it goes on")
+    p.add_argument("--config", type=Path, help="JSON: parameters by stage, for every take")
+    p.add_argument("--jobs", type=int, metavar="N", help="takes at a time (default: one per processor)")
     p = add("stairs", "Measure a person's own limits of stairs in daily life (docs/science/activity.md).")
     p.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of one take")
     p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")

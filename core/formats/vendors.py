@@ -19,22 +19,27 @@ class VendorFormat:
     ----------
     label : name for people. looks_like : tells a file by its bytes, never by its name; text comes as UTF-8.
     read : bytes, name of the file, what a manifest says of it → its sensors in SI units; raises FormatError.
+    one_sensor : a file holds one sensor of a take, the others are in files beside it.
     """
 
     label: str
     looks_like: Callable[[bytes], bool]
     read: Callable[[bytes, str, SourceSpec | None], Sequence[Draft]]
+    one_sensor: bool = False
 
 
 VENDOR_FORMATS: Final[list[VendorFormat]] = [
     VendorFormat(
-        "Xsens MT Manager text", xsens.looks_like, lambda data, name, spec: (xsens.read(data, name, spec),)
+        "Xsens MT Manager text",
+        xsens.looks_like,
+        lambda data, name, spec: (xsens.read(data, name, spec),),
+        True,
     ),
     VendorFormat(mvnx.LABEL, mvnx.looks_like, mvnx.read),
-    VendorFormat(dot.LABEL, dot.looks_like, dot.read),
+    VendorFormat(dot.LABEL, dot.looks_like, dot.read, one_sensor=True),
     VendorFormat(apdm.LABEL, apdm.looks_like, apdm.read),
     VendorFormat(apdm_h5.LABEL, apdm_h5.looks_like, apdm_h5.read),
-    VendorFormat(shimmer.LABEL, shimmer.looks_like, shimmer.read),
+    VendorFormat(shimmer.LABEL, shimmer.looks_like, shimmer.read, one_sensor=True),
     VendorFormat(cwa.LABEL, cwa.looks_like, cwa.read),
     VendorFormat(device_motion.LABEL, device_motion.looks_like, device_motion.read),
 ]
