@@ -80,7 +80,7 @@ def _lay_out(data: bytes, source: str, spec: SourceSpec) -> _Layout:
     separator = chosen or b","
     if separator == b" ":
         header, rows = [_squeezed(h) for h in header], [_squeezed(r) for r in rows]
-    names = _names(header, rows[0], separator, spec)
+    names = name_columns(header, rows[0], separator, spec)
     return _Layout(separator, names, _wanted(spec, names, source), text.has_decimal_comma(rows[0], separator))
 
 
@@ -204,7 +204,7 @@ def _check(spec: SourceSpec, source: str) -> None:
         raise ManifestError("manifest_bad_value", f"{where}: quat columns need quat_order, 'wxyz' or 'xyzw'.")
 
 
-def _names(header: list[bytes], row: bytes, separator: bytes, spec: SourceSpec) -> list[str]:
+def name_columns(header: list[bytes], row: bytes, separator: bytes, spec: SourceSpec) -> list[str]:
     """Column names; several header rows are joined by "/", a table without a header counts 1, 2, 3 …"""
     cells = row.count(separator) + 1
     parts = [text.split(line, separator) for line in header]
