@@ -135,11 +135,14 @@ def _read_monitors(tree: _Tree, source: str, spec: SourceSpec | None) -> tuple[D
                 sensor=monitor,
             )
         config = f"{at}/Configuration"
-        more = {
-            "gyr": tree.array(f"{at}/Gyroscope", 3),
-            "mag": tree.array(f"{at}/Magnetometer", 3),
-            "quat": tree.array(f"Processed/{monitor}/Orientation", 4),
-        }
+        gyr, mag, quat = (
+            x if x is not None and len(x) == len(acc) else None
+            for x in (
+                tree.array(f"{at}/Gyroscope", 3),
+                tree.array(f"{at}/Magnetometer", 3),
+                tree.array(f"Processed/{monitor}/Orientation", 4),
+            )
+        )
         drafts.append(
             make_draft(
                 monitor,
@@ -149,7 +152,9 @@ def _read_monitors(tree: _Tree, source: str, spec: SourceSpec | None) -> tuple[D
                 acc=acc,
                 rate_hz=spec.rate_hz if spec and spec.rate_hz else _rate(tree.said(config, "Sample Rate")),
                 segment=segment_named(tree.said(config, "Label 0")),
-                **{kind: x if x is not None and len(x) == len(acc) else None for kind, x in more.items()},
+                gyr=gyr,
+                mag=mag,
+                quat=quat,
             )
         )
     return tuple(drafts)

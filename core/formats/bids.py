@@ -130,7 +130,7 @@ def _rate(sidecar: bytes | None, rows: Sequence[Mapping[str, str]], name: str) -
     with suppress(ValueError, RecursionError):
         said = json.loads(sidecar or b"{}")
     keys = ("SamplingFrequencyEffective", "SamplingFrequency")
-    candidates = [said.get(key) for key in keys] if isinstance(said, dict) else []
+    candidates: list[Any] = [said.get(key) for key in keys] if isinstance(said, dict) else []
     candidates += [row.get("sampling_frequency") for row in rows[:1]]
     for value in candidates:
         try:

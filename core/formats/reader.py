@@ -11,7 +11,7 @@ from core.correction import SensorCorrection
 from core.errors import ArchiveError, FormatError, InputError, ManifestError, Notice
 from core.formats import _sniff, bids, cwa, live_reader, mapping_xml, parquet, table, text
 from core.formats.aliases import segment_named
-from core.formats.archive import ArchiveLimits, expand
+from core.formats.archive import EPISODE_MANIFEST, ArchiveLimits, expand
 from core.formats.draft import Draft, finish
 from core.formats.manifest import Manifest, parse_manifest
 from core.formats.source import SourceFile, digest_file, sha256
@@ -83,6 +83,11 @@ def read_recording(
 def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload: _Upload) -> Manifest | None:
     """The manifest has to be known before tables can be read."""
     for member in members:
+        if member.name == EPISODE_MANIFEST:
+            told = parse_manifest(member.read())
+            given = told if given is None else given.complete_from(told)
+            upload.sidecars.add(member.name)
+            continue
         last = member.name.rsplit("/", 1)[-1].lower()
         if last.endswith(".json") and member.size < 1_000_000:
             data = text.to_utf8(member.read())

@@ -8,6 +8,7 @@ from fastapi import APIRouter, FastAPI
 
 from server.api import (
     analyses,
+    archives,
     audit_log,
     comparisons,
     devices,
@@ -64,6 +65,7 @@ def build_api(app: FastAPI) -> APIRouter:
         films,
         filters,
         reports,
+        archives,
         reviews,
         trends,
         comparisons,

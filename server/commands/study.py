@@ -219,7 +219,7 @@ def _write(stem: Path, rows: Sequence[Mapping[str, object]]) -> None:
     _write_csv(stem.with_suffix(".csv"), rows, names)
     columns = {}
     for name in names:
-        values = [row.get(name) for row in rows]
+        values: list[Any] = [row.get(name) for row in rows]
         if any(isinstance(v, str) for v in values):
             values = [None if v is None else str(v) for v in values]
         columns[name] = pa.array(values)

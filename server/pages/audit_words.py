@@ -47,6 +47,7 @@ DEEDS: Final[Mapping[str, str]] = {
     "analysis.file_opened": "downloaded a file of an analysis",
     "analysis.requested": "asked for an analysis",
     "report.opened": "read the report",
+    "archive.opened": "downloaded the archive of a visit",
     "numbers.opened": "looked at the values",
     "parameter.opened": "looked at the strides behind a value",
     "signals.opened": "looked at the signals",

@@ -6,17 +6,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from core.formats import SourceFile, manifest_of, read_recording
 from core.formats.table_guess import PIECE, TableLook, look_into_table, make_entry, read_sample
-from core.frames import GRAVITY, Floats
+from core.frames import GRAVITY
 from tests.core.formats.making import signals
 from tests.data import data_folder
 
 ACC, GYR = signals(3000, still=300)
 
 
-def written(header: str, *columns: Floats, separator: str = ",") -> bytes:
+def written(header: str, *columns: NDArray[Any], separator: str = ",") -> bytes:
     rows = np.hstack([c if c.ndim == 2 else c[:, None] for c in columns])
     return (header + "\n".join(separator.join(f"{v:.5f}" for v in row) for row in rows) + "\n").encode()
 

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from core import rotation
 from core.errors import FormatError, InputError, SagittalError
 from core.formats import SourceFile, _sniff, read_recording, text
 from core.formats.vendors import VENDOR_FORMATS, find_vendor
@@ -57,9 +58,7 @@ def test_a_file_is_told_by_its_content_and_read_in_si_units(label: str) -> None:
         assert stream.gyr == pytest.approx(made.GYR, abs=1e-3)
         if stream.quat is not None:
             # the vendor's orientation turns what is measured upright
-            np.testing.assert_allclose(
-                made.rotation.rotate(stream.quat, stream.acc)[:, 2], GRAVITY, atol=1e-3
-            )
+            np.testing.assert_allclose(rotation.rotate(stream.quat, stream.acc)[:, 2], GRAVITY, atol=1e-3)
     assert not [n for n in recording.notices if n.severity != "info"]
 
 
@@ -208,8 +207,7 @@ def damage(data: bytes, changes: list[tuple[float, bool, int, bytes]]) -> bytes:
 
 
 FUZZED: dict[str, Callable[[], dict[str, bytes]]] = {
-    label: (lambda name=name, make=make: {name: make()})  # type: ignore[misc]
-    for label, (name, make) in VENDOR_SAMPLES.items()
+    label: (lambda name=name, make=make: {name: make()}) for label, (name, make) in VENDOR_SAMPLES.items()
 } | {"BIDS motion": made.bids_parts}
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final
 
 import numpy as np
@@ -67,7 +67,10 @@ def apdm_studio() -> bytes:
         "",
     ]
     axes = ["X", "Y", "Z"] * 3 + ["", "S", "X", "Y", "Z"]
-    owner = lambda number, label: [number, "", "", label, *[""] * 10]  # noqa: E731
+
+    def owner(number: str, label: str) -> list[str]:
+        return [number, "", "", label, *[""] * 10]
+
     head = [
         ",".join(["Format=7", *owner("5718", "Lumbar"), *owner("5811", "Left Ankle")]),
         ",".join(["Time", *per, *per]),
@@ -121,7 +124,10 @@ def apdm_h5(*, version: int = 5, link: bool = False) -> bytes:
 
 def mvnx(*, head: str = "", skip: tuple[int, ...] = ()) -> bytes:
     """Version 4, two sensors, the three poses before the frames."""
-    text = lambda x: " ".join(f"{v:.6f}" for v in x)  # noqa: E731
+
+    def text(x: Iterable[float]) -> str:
+        return " ".join(f"{v:.6f}" for v in x)
+
     free = rotation.rotate(Q, ACC) - np.array([0.0, 0.0, GRAVITY])
     poses = "".join(
         f'<frame time="0" tc="" ms="0" type="{kind}"><orientation>1 0 0 0</orientation></frame>\n'
