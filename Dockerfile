@@ -8,7 +8,7 @@ COPY sagittal sagittal
 COPY server server
 COPY web web
 COPY migrations migrations
-RUN python -m venv /opt/sagittal && /opt/sagittal/bin/pip install --no-cache-dir .
+RUN python -m venv /opt/sagittal && /opt/sagittal/bin/pip install --no-cache-dir '.[apdm]'
 
 FROM python:3.13-slim
 RUN useradd --uid 10001 --create-home --shell /usr/sbin/nologin sagittal \

@@ -53,14 +53,20 @@ def find_parts(name: str) -> tuple[str, str]:
     return f"{stem}{_CHANNELS}", f"{stem}{_SIDECAR}"
 
 
-def describe_table(name: str, channels: bytes, sidecar: bytes | None) -> BidsTable:
-    """How the table `name` is read.
+def describe_table(name: str, head: bytes, channels: bytes, sidecar: bytes | None) -> BidsTable:
+    """How the table `name`, which begins with `head`, is read.
 
     Raises
     ------
     FormatError `missing_acc` (positions or angles alone), `unknown_unit`, `rate_missing`, `bad_table`.
     """
     rows = _rows(channels, name)
+    cells = text.first_row(memoryview(head)).count(b"\t") + 1
+    if cells != len(rows):
+        raise FormatError(
+            "bad_table",
+            f"{name} has {cells} columns, but its channels.tsv names {len(rows)}; export both again.",
+        )
     points: dict[str, dict[str, dict[str, str]]] = {}
     units: dict[str, str] = {}
     time: tuple[str, str] | None = None

@@ -115,7 +115,10 @@ def _describe(
         return spec
     upload.sidecars |= {m.name for m in (channels, sidecar) if m is not None}
     try:
-        table = bids.describe_table(member.name, data, text.to_utf8(sidecar.read()) if sidecar else None)
+        with member.open() as opened:
+            head = text.to_utf8(opened.read(1 << 16))
+        said = text.to_utf8(sidecar.read()) if sidecar else None
+        table = bids.describe_table(member.name, head, data, said)
     except FormatError as e:
         upload.problems.append((member.name, e))
         upload.sidecars.add(member.name)

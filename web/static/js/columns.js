@@ -12,6 +12,8 @@ const NAMES = {
   mag: (axis) => speak`Magnetic field ${axis}`, quat: (axis) => speak`Quaternion ${axis}`,
 };
 const SHOWN = 3;
+const SAME = { "m/s^2": "m/s2", "m/s²": "m/s2", "°/s": "deg/s", "µs": "us" }; // units that a manifest may write in two ways
+const SHOWN_KEYS = ["rate_hz", "time_column", "time_unit", "counter", "acc_unit", "gyr_unit", "quat_order"]; // all else of an entry is kept
 const DEG = 180 / Math.PI;
 
 const roles = () => [
@@ -22,7 +24,7 @@ const roles = () => [
 /** @param {string[][]} options @param {string} value @param {Record<string, any>} attributes */
 function select(options, value, attributes) {
   const made = /** @type {HTMLSelectElement} */ (h("select", { class: "select sm", ...attributes }, ...options.map(([v, t]) => h("option", { value: v }, t))));
-  made.value = value ?? "";
+  made.value = SAME[value] ?? value ?? "";
   return made;
 }
 
@@ -80,14 +82,14 @@ class Shape {
 
   // The entry of the manifest, without the file.
   source() {
-    const { skip_rows, header_rows, separator, index_column } = this.found.source;
-    const source = { skip_rows, header_rows, separator, index_column, columns: {} };
+    const source = { ...this.found.source, columns: {} };
+    for (const key of SHOWN_KEYS) delete source[key];
     const rate = parseFloat(this.rate.value.replace(",", "."));
     if (Number.isFinite(rate)) source.rate_hz = rate;
     for (const { name, what, whose } of this.rows) {
       const [kind, axis] = what.value.split(" ");
       if (kind === "time") Object.assign(source, { time_column: name, time_unit: this.time.value });
-      else if (kind === "counter") source.counter = { column: name };
+      else if (kind === "counter") source.counter = { column: name, wrap: this.found.source.counter?.wrap };
       else if (axis) ((source.columns[whose.value.trim() || THE_FILE] ??= {})[kind] ??= [])[AXES[kind].indexOf(axis)] = name;
     }
     const kinds = Object.values(source.columns);
