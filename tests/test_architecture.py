@@ -16,7 +16,7 @@ import pytest
 from tests.data import ROOT
 
 ALLOWED_IN_CORE = {"numpy", "scipy", "numba", "core"}
-ALLOWED_IN_FORMATS = ALLOWED_IN_CORE | {"pyarrow", "defusedxml"}
+ALLOWED_IN_FORMATS = ALLOWED_IN_CORE | {"pyarrow", "defusedxml", "h5py"}
 DATED = ("core/sample_blocks.py", "core/activity/result.py", "core/activity/totals.py", "core/formats/cwa.py")
 """They hold dates that a device's file has written; none asks what time it is."""
 EFFECTS = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from itertools import pairwise
-from typing import Literal
+from typing import Final, Literal
 
 from core.formats import live_reader, mapping_xml, parquet, text
 from core.formats.manifest import is_manifest
@@ -14,20 +14,30 @@ Kind = Literal["vendor", "parquet", "live", "manifest", "mapping", "table", "kno
 """vendor = of `VENDOR_FORMATS`; known = a sensor format we recognise but do not read; other = neither signals
 nor manifest."""
 
-_MAGIC = {
-    b"\x89HDF": "HDF5 (APDM, MATLAB 7.3)",
+_MAGIC: Final = {
+    b"\x89HDF": "HDF5 that is not APDM's (MATLAB 7.3, …)",
     b"MATLAB": "MATLAB",
     b"XTF\x00": "Xsens MTB",
     b"\xfa\xff": "Xsens MTB",
 }
-_TEXT = {
-    b"<mvnx": "Xsens MVNX",
-    b"DeviceTag:": "Xsens/Movella DOT",
+_TEXT: Final = {
     b"DataType=Quaternion": "OpenSim STO",
     b"inDegrees=": "OpenSim MOT",
-    b"Format=7": "APDM Motion Studio",
-    b"Shimmer_": "Shimmer Consensys",
 }
+_ADVICE: Final = {
+    "OpenSim STO": "orientations alone are no measurement. Upload the sensors' files; "
+    "compare orientations on the tab Algorithms of an analysed session.",
+    "OpenSim MOT": "joint angles alone are no measurement. Upload the sensors' files.",
+    "Xsens MTB": "export it from MT Manager as text, with acceleration and rate of turn.",
+}
+_TABLE: Final = (
+    "it is not read directly; export it as a table and name its columns in a manifest (docs/formats.md)."
+)
+
+
+def advise(what: str) -> str:
+    """What to do with a known format that is not read."""
+    return _ADVICE.get(what, _TABLE)
 
 
 def sniff(data: bytes) -> tuple[Kind, str]:

@@ -10,11 +10,12 @@ from core.frames import SEGMENTS, Segment
 _WHOLE: Final[dict[str, str]] = {
     "pelvis": "pelvis", "sacrum": "pelvis", "hip": "pelvis", "hips": "pelvis", "lumbar": "pelvis",
     "lowerback": "pelvis", "chest": "chest", "sternum": "chest", "torso": "chest", "trunk": "chest",
-    "t8": "chest", "thorax": "chest",
+    "t8": "chest", "thorax": "chest", "lb": "pelvis", "lf": "foot_l", "rf": "foot_r",
 }  # fmt: skip
 _LEG: Final[dict[str, str]] = {
     "thigh": "thigh", "femur": "thigh", "upperleg": "thigh", "upleg": "thigh",
     "shank": "shank", "tibia": "shank", "lowerleg": "shank", "lowleg": "shank", "calf": "shank",
+    "ankle": "shank",
     "foot": "foot", "calcn": "foot", "shoe": "foot", "toes": "foot",
 }  # fmt: skip
 _SIDE: Final[dict[str, str]] = {"left": "l", "l": "l", "right": "r", "r": "r"}
@@ -33,6 +34,12 @@ def segment_named(name: str) -> Segment | None:
             if part != flat and part in _LEG:
                 return cast("Segment", f"{_LEG[part]}_{letter}")
     return None
+
+
+def side_in(text: str) -> str | None:
+    """Side, "l" or "r", that a name speaks of; None if none or both."""
+    found = {_SIDE[word] for word in re.split(r"[\s_\-./]+", text.lower()) if word in _SIDE}
+    return found.pop() if len(found) == 1 else None
 
 
 def segment_in(text: str) -> Segment | None:

@@ -15,6 +15,7 @@ import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import PurePosixPath
+from typing import Final
 
 from core.errors import ArchiveError
 from core.formats.source import SourceFile
@@ -33,6 +34,13 @@ _DAMAGE = (
     OverflowError,
 )
 """What zipfile and zlib raise on damaged bytes (NotImplementedError is a RuntimeError)."""
+EPISODE_MARK: Final = "sagittal-episode.json"
+"""At the root of a zip: an archive of a visit; the recording lies in a folder, the rest came out of it."""
+EPISODE_RECORDING: Final = "recording/"
+EPISODE_MANIFEST: Final = "sagittal-manifest.json"
+"""What the analysis was told beside the recording's own files; it goes before a manifest among these."""
+EPISODE_CONFIG: Final = "config.json"
+_MOST_CONFIG: Final = 1_000_000
 _RATIO_FLOOR = 1 << 20
 """Below 1 MB no ratio is alarming: a file of a few blank lines packs 200 to 1."""
 
@@ -119,11 +127,49 @@ def _members(name: str, data: bytes, limits: ArchiveLimits) -> list[SourceFile]:
         )
     for info in infos:
         _check_entry(name, info, limits)
-    return [
+    found = [
         SourceFile(info.filename, info.file_size, _MemberReader(name, archive, info))
         for info in infos
         if not info.is_dir() and "__MACOSX" not in PurePosixPath(info.filename).parts
     ]
+    if EPISODE_MARK not in {f.name for f in found}:
+        return found
+    return [
+        SourceFile(f.name.removeprefix(EPISODE_RECORDING), f.size, f.read, f.opener)
+        for f in found
+        if f.name.startswith(EPISODE_RECORDING) or f.name == EPISODE_MANIFEST
+    ]
+
+
+def read_episode_config(files: Iterable[SourceFile]) -> bytes | None:
+    """The settings with which the archive of a visit was analysed, as JSON; None where there is no archive.
+
+    Raises
+    ------
+    ArchiveError as `expand`.
+    """
+    for file in files:
+        if not _looks_packed(file):
+            continue
+        with file.open() as opened:
+            if not is_zip(opened.read(4)):
+                continue
+            opened.seek(0)
+            try:
+                archive = zipfile.ZipFile(opened)
+                if EPISODE_MARK not in archive.namelist():
+                    continue
+                info = archive.getinfo(EPISODE_CONFIG)
+            except (*_DAMAGE, KeyError) as e:
+                raise ArchiveError(
+                    "zip_bad", f"{file.name} is damaged and cannot be opened ({e}); zip it again."
+                ) from e
+            if info.file_size > _MOST_CONFIG:
+                raise ArchiveError(
+                    "zip_bomb", f"{file.name}: its {EPISODE_CONFIG} is larger than settings are."
+                )
+            return _MemberReader(file.name, archive, info)()
+    return None
 
 
 def _check_entry(name: str, info: zipfile.ZipInfo, limits: ArchiveLimits) -> None:

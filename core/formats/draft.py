@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import FormatError, Notice
-from core.frames import Floats
+from core.frames import Floats, Segment
 from core.recording import ImuStream
 
 WRAP_16: Final = 1 << 16
@@ -35,8 +35,9 @@ class Draft:
     ----------
     clock : what `ticks` (n,) are: "counter" packet counter as written, "device" seconds, "index" row number.
     acc, gyr, mag : (n, 3), quat : (n, 4); SI units, NaN where missing; None without such columns.
-    rate_hz : None = the file does not say. wrap : count at which a counter starts again, None = 16 bit, or 32
-        when it shows more.
+    rate_hz : None = the file does not say. wrap : tick at which the clock starts again; None = a device clock
+        never does, a counter at 16 bit, or 32 when it shows more.
+    segment : where it is worn, as the file says it; None = it does not.
     """
 
     device_id: str
@@ -49,7 +50,49 @@ class Draft:
     quat: Floats | None
     rate_hz: float | None
     notices: tuple[Notice, ...] = ()
-    wrap: int | None = None
+    wrap: float | None = None
+    segment: Segment | None = None
+
+
+def make_draft(
+    device: str,
+    source: str,
+    clock: str,
+    ticks: Floats,
+    *,
+    acc: Floats,
+    gyr: Floats | None = None,
+    mag: Floats | None = None,
+    quat: Floats | None = None,
+    rate_hz: float | None = None,
+    notices: Sequence[Notice] = (),
+    wrap: float | None = None,
+    segment: Segment | None = None,
+) -> Draft:
+    """A sensor as its file gives it; a signal without a single number is none, and a gyroscope is missed.
+
+    Raises
+    ------
+    FormatError `missing_acc`.
+    """
+    if not np.isfinite(acc).all(axis=1).any():
+        raise FormatError(
+            "missing_acc",
+            f"{source}: the acceleration of {device} holds no numbers; export it again with acceleration.",
+            sensor=device,
+        )
+    told = [replace(n, sensor=device) for n in notices]
+    gyr, mag, quat = (x if x is not None and np.isfinite(x).any() else None for x in (gyr, mag, quat))
+    if gyr is None:
+        told.append(
+            Notice(
+                "missing_gyro",
+                f"{source}: sensor {device} has no gyroscope signal, so no walk can be computed from it. "
+                "Record or export it with the gyroscope on.",
+                device,
+            )
+        )
+    return Draft(device, source, clock, ticks, acc, gyr, mag, quat, rate_hz, tuple(told), wrap, segment)
 
 
 def finish(drafts: Sequence[Draft]) -> dict[str, ImuStream]:
@@ -66,6 +109,8 @@ def finish(drafts: Sequence[Draft]) -> dict[str, ImuStream]:
         group = [_in_order(d) for d in drafts if d.clock == clock]
         if clock == "counter":
             group = _shared_counter(group)
+        elif any(d.wrap for d in group):
+            group = _near(group, float(group[0].ticks[0]))
         origin = min(float(d.ticks[0]) for d in group)
         for d in group:
             scale = 1.0 if clock == "device" else 1.0 / _rate(d)
@@ -134,7 +179,9 @@ def _in_order(d: Draft) -> Draft:
     """Unwrap the counter and drop rows that repeat or run backwards."""
     good = np.isfinite(d.ticks)
     lost = int(np.count_nonzero(~good))
-    ticks = _unwrapped(d.ticks[good], _wrap(d, d.ticks[good])) if d.clock == "counter" else d.ticks[good]
+    ticks = d.ticks[good]
+    if d.clock == "counter" or d.wrap is not None:
+        ticks = _unwrapped(ticks, _wrap(d, ticks))
     if not len(ticks):
         raise FormatError("empty", f"{d.source} has no row with a valid counter or time.", sensor=d.device_id)
     highest = np.maximum.accumulate(ticks)
@@ -179,16 +226,16 @@ def _in_order(d: Draft) -> Draft:
     )
 
 
-def _wrap(d: Draft, ticks: Floats) -> int:
+def _wrap(d: Draft, ticks: Floats) -> float:
     """Range of the counter: as declared, else 16 bit as in Xsens exports, unless it shows a larger value."""
     if d.wrap is not None:
         return d.wrap
     return WRAP_16 if not len(ticks) or ticks.max() < WRAP_16 else WRAP_32
 
 
-def _unwrapped(ticks: Floats, wrap: int) -> Floats:
+def _unwrapped(ticks: Floats, wrap: float) -> Floats:
     """Counter without wraps: steps are taken modulo its range, to the nearer side."""
-    step = np.mod(np.diff(ticks) + wrap // 2, wrap) - wrap // 2
+    step = np.mod(np.diff(ticks) + wrap / 2, wrap) - wrap / 2
     return np.concatenate((ticks[:1], ticks[:1] + np.cumsum(step)))
 
 
@@ -212,9 +259,18 @@ def _shared_counter(group: Sequence[Draft]) -> list[Draft]:
             )
             out.append(replace(d, notices=(*d.notices, note)))
             continue
-        turns = np.round((start - float(d.ticks[0])) / wrap)
-        out.append(replace(d, ticks=d.ticks + turns * wrap))
+        out.append(_turned(d, start, wrap))
     return out
+
+
+def _near(group: Sequence[Draft], start: float) -> list[Draft]:
+    """Device clocks that wrap, so that all start within half a turn of each other."""
+    return [_turned(d, start, d.wrap) if d.wrap else d for d in group]
+
+
+def _turned(d: Draft, start: float, wrap: float) -> Draft:
+    """The same with whole turns of its clock added, nearest to `start`."""
+    return replace(d, ticks=d.ticks + np.round((start - float(d.ticks[0])) / wrap) * wrap)
 
 
 def digest(d: Draft) -> str:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 from core.correction import SensorCorrection
 from core.errors import ArchiveError, FormatError, InputError, ManifestError, Notice
-from core.formats import _sniff, cwa, live_reader, mapping_xml, parquet, table, text
+from core.formats import _sniff, bids, cwa, live_reader, mapping_xml, parquet, table, text
 from core.formats.aliases import segment_named
-from core.formats.archive import ArchiveLimits, expand
+from core.formats.archive import EPISODE_MANIFEST, ArchiveLimits, expand
 from core.formats.draft import Draft, finish
 from core.formats.manifest import Manifest, parse_manifest
 from core.formats.source import SourceFile, digest_file, sha256
+from core.formats.source_spec import SourceSpec
 from core.formats.vendors import find_vendor, list_formats
 from core.frames import Segment
 from core.recording import ImuStream, Recording
@@ -37,6 +39,8 @@ class _Upload:
     problems: list[tuple[str, InputError]] = field(default_factory=list)
     notices: list[Notice] = field(default_factory=list)
     sha256: dict[str, str] = field(default_factory=dict)
+    sidecars: set[str] = field(default_factory=set)
+    """Files that say how another one is read."""
 
 
 def read_recording(
@@ -65,8 +69,9 @@ def read_recording(
         raise FormatError("empty", "There are no files; choose the recording's files, folder or zip.")
     upload = _Upload()
     manifest = _find_manifest(members, manifest, upload)
-    for member in members:
-        _take(member, manifest, upload)
+    sources = [(member, _describe(member, members, manifest, upload)) for member in members]
+    for member, spec in sources:
+        _take(member, spec, upload)
     if not upload.drafts and not upload.stored and not upload.long:
         raise _nothing_readable(upload)
     recording = (
@@ -78,6 +83,11 @@ def read_recording(
 def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload: _Upload) -> Manifest | None:
     """The manifest has to be known before tables can be read."""
     for member in members:
+        if member.name == EPISODE_MANIFEST:
+            told = parse_manifest(member.read())
+            given = told if given is None else given.complete_from(told)
+            upload.sidecars.add(member.name)
+            continue
         last = member.name.rsplit("/", 1)[-1].lower()
         if last.endswith(".json") and member.size < 1_000_000:
             data = text.to_utf8(member.read())
@@ -92,15 +102,39 @@ def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload
     return found if given is None else given.complete_from(found)
 
 
-def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> None:
+def _describe(
+    member: SourceFile, members: Sequence[SourceFile], manifest: Manifest | None, upload: _Upload
+) -> SourceSpec | None:
+    """How a file is to be read: as the manifest says, else as the files beside it do."""
+    spec = manifest.source_of(member.name) if manifest else None
+    if (spec and spec.columns) or not bids.is_table(member.name):
+        return spec
+    beside = {m.name: m for m in members}
+    channels, sidecar = (beside.get(name) for name in bids.find_parts(member.name))
+    if channels is None or not bids.looks_like(data := text.to_utf8(channels.read())):
+        return spec
+    upload.sidecars |= {m.name for m in (channels, sidecar) if m is not None}
+    try:
+        with member.open() as opened:
+            head = text.to_utf8(opened.read(1 << 16))
+        said = text.to_utf8(sidecar.read()) if sidecar else None
+        table = bids.describe_table(member.name, head, data, said)
+    except FormatError as e:
+        upload.problems.append((member.name, e))
+        upload.sidecars.add(member.name)
+        return None
+    upload.mapping |= table.worn
+    return table.spec
+
+
+def _take(member: SourceFile, spec: SourceSpec | None, upload: _Upload) -> None:
     """Read one file; a file that cannot be read is remembered, it does not stop the others."""
-    if _take_long(member, manifest, upload):
+    if _take_long(member, spec, upload):
         return
     raw = member.read()
     data = raw if parquet.looks_like(raw) or live_reader.looks_like(raw) else text.to_utf8(raw)
-    spec = manifest.source_of(member.name) if manifest else None
     kind, what = _sniff.sniff(data)
-    if any(member.name == name for name, _ in upload.manifests):
+    if member.name in upload.sidecars or any(member.name == name for name, _ in upload.manifests):
         upload.sha256[member.name] = sha256(raw)
         return
     try:
@@ -120,11 +154,7 @@ def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> Non
         elif kind == "table":
             raise FormatError("manifest_needed", _needs_manifest(member.name, data))
         elif kind == "known":
-            raise FormatError(
-                "unsupported_format",
-                f"{member.name} is {what}, which is not read directly; export it as a table and name its "
-                "columns in a manifest (docs/formats.md).",
-            )
+            raise FormatError("unsupported_format", f"{member.name} is {what}; {_sniff.advise(what)}")
         else:
             message = f"{member.name} is {what} and was not used."
             upload.notices.append(Notice("ignored_file", message, severity="info"))
@@ -136,14 +166,13 @@ def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> Non
         upload.problems.append((member.name, e))
 
 
-def _take_long(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> bool:
+def _take_long(member: SourceFile, spec: SourceSpec | None, upload: _Upload) -> bool:
     """Whether a file is too long to hold and was opened to be read block by block; a CWA file always is.
 
     A short CWA file is read as well, so that every protocol can use it.
     """
     with member.open() as opened:
         head = opened.read(1 << 16)
-    spec = manifest.source_of(member.name) if manifest else None
     long = False
     try:
         if cwa.looks_like(head):
@@ -224,6 +253,8 @@ def _declared(recording: Recording, manifest: Manifest | None, upload: _Upload) 
     elif upload.mapping:
         segments, missing = _assign(upload.mapping, recording, "mapping file")
         notices += missing
+    else:
+        segments |= _worn(upload.drafts)
     taken = {s for s in segments.values() if s is not None}
     for device in dict.fromkeys((*recording.streams, *recording.long)):
         own = segment_named(device) if manifest and manifest.sources and not manifest.sensors else None
@@ -248,6 +279,13 @@ def _declared(recording: Recording, manifest: Manifest | None, upload: _Upload) 
         sha256={**recording.sha256, **upload.sha256},
         notices=(*notices, *corrected),
     )
+
+
+def _worn(drafts: Sequence[Draft]) -> dict[str, Segment | None]:
+    """Where the files say that their sensors are; a place of two sensors is nobody's."""
+    said = {d.device_id: d.segment for d in drafts if d.segment is not None}
+    count = Counter(said.values())
+    return {device: segment for device, segment in said.items() if count[segment] == 1}
 
 
 def correct_streams(

@@ -68,6 +68,11 @@ def read_named_file(path: Path) -> bytes:
         raise InputError("file_not_found", f"{path} cannot be read: {error.strerror or error}.") from error
 
 
+def stem_of(name: str) -> str:
+    """Last part of a file's name without its ending."""
+    return name.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
+
+
 def digest_file(file: SourceFile) -> str:
     """Hexadecimal sha256 of a file, read piece by piece."""
     digest = hashlib.sha256()

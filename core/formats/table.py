@@ -13,7 +13,7 @@ import numpy as np
 
 from core.errors import FormatError, ManifestError, Notice
 from core.formats import text
-from core.formats.draft import Draft
+from core.formats.draft import Draft, make_draft
 from core.formats.source import SourceFile
 from core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, Counter, SourceSpec
 from core.frames import Floats
@@ -80,7 +80,7 @@ def _lay_out(data: bytes, source: str, spec: SourceSpec) -> _Layout:
     separator = chosen or b","
     if separator == b" ":
         header, rows = [_squeezed(h) for h in header], [_squeezed(r) for r in rows]
-    names = _names(header, rows[0], separator, spec)
+    names = name_columns(header, rows[0], separator, spec)
     return _Layout(separator, names, _wanted(spec, names, source), text.has_decimal_comma(rows[0], separator))
 
 
@@ -162,8 +162,8 @@ def _read_blocks(
             if body.strip():
                 part = memoryview(_squeezed(body) if layout.separator == b" " else body)
                 table = layout.read(part, file.name)
-                acc = _stack(table, channels.acc) * acc_unit
-                gyr = None if channels.gyr is None else _stack(table, channels.gyr) * gyr_unit
+                acc = table.stack(channels.acc) * acc_unit
+                gyr = None if channels.gyr is None else table.stack(channels.gyr) * gyr_unit
                 if spec.time_column is None:
                     t_s = (rows + np.arange(len(acc))) / rate
                 else:
@@ -204,7 +204,7 @@ def _check(spec: SourceSpec, source: str) -> None:
         raise ManifestError("manifest_bad_value", f"{where}: quat columns need quat_order, 'wxyz' or 'xyzw'.")
 
 
-def _names(header: list[bytes], row: bytes, separator: bytes, spec: SourceSpec) -> list[str]:
+def name_columns(header: list[bytes], row: bytes, separator: bytes, spec: SourceSpec) -> list[str]:
     """Column names; several header rows are joined by "/", a table without a header counts 1, 2, 3 …"""
     cells = row.count(separator) + 1
     parts = [text.split(line, separator) for line in header]
@@ -286,23 +286,9 @@ def _sensor(
     ticks: Floats,
     clock: str,
 ) -> Draft:
-    notices = [Notice(n.code, n.message, device, n.t_s, n.severity) for n in table.notices]
-    acc = _stack(table, channels.acc) * ACC_UNITS[spec.acc_unit or "m/s2"]
-    gyr = None if channels.gyr is None else _stack(table, channels.gyr) * GYR_UNITS[spec.gyr_unit or "rad/s"]
-    if not np.isfinite(acc).any():
-        raise FormatError(
-            "missing_acc", f"{source}: the acc columns of {device} hold no numbers.", sensor=device
-        )
-    if gyr is None or not np.isfinite(gyr).any():
-        gyr = None
-        notices.append(
-            Notice(
-                "missing_gyro",
-                f"{source}: sensor {device} has no gyroscope signal, so nothing can be computed from it. "
-                "Name its gyr columns in the manifest or record with the gyroscope on.",
-                device,
-            )
-        )
+    notices = list(table.notices)
+    acc = table.stack(channels.acc) * ACC_UNITS[spec.acc_unit or "m/s2"]
+    gyr = None if channels.gyr is None else table.stack(channels.gyr) * GYR_UNITS[spec.gyr_unit or "rad/s"]
     if not spec.gravity_included:
         notices.append(
             Notice(
@@ -313,13 +299,12 @@ def _sensor(
                 severity="error",
             )
         )
-    quat = None if channels.quat is None else _stack(table, channels.quat)
+    quat = None if channels.quat is None else table.stack(channels.quat)
     if quat is not None and spec.quat_order == "xyzw":
         quat = quat[:, [3, 0, 1, 2]]
-    mag = None if channels.mag is None else _stack(table, channels.mag)
+    mag = None if channels.mag is None else table.stack(channels.mag)
     wrap = spec.counter.wrap if spec.counter else None
-    return Draft(device, source, clock, ticks, acc, gyr, mag, quat, spec.rate_hz, tuple(notices), wrap)
-
-
-def _stack(table: text.Columns, names: tuple[str, ...]) -> Floats:
-    return np.stack([table.values[n] for n in names], axis=-1)
+    return make_draft(
+        device, source, clock, ticks, acc=acc, gyr=gyr, mag=mag, quat=quat, rate_hz=spec.rate_hz,
+        notices=notices, wrap=wrap,
+    )  # fmt: skip

@@ -15,7 +15,7 @@ from core.errors import FormatError, Notice
 from core.frames import Floats
 
 SEPARATORS: Final = (b"\t", b";", b",", b"|", b" ")
-MISSING: Final = ["", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "-", "None"]
+MISSING: Final = ["", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "null", "NULL", "-", "None"]
 LARGEST: Final = 1e30
 """Larger numbers are damage; they would not fit float32."""
 _LONGEST_LINE: Final = 1_000_000
@@ -28,6 +28,10 @@ class Columns:
 
     values: dict[str, Floats]
     notices: tuple[Notice, ...]
+
+    def stack(self, names: Sequence[str]) -> Floats:
+        """Columns side by side, (n, len(names))."""
+        return np.stack([self.values[name] for name in names], axis=-1)
 
 
 def to_utf8(data: bytes) -> bytes:
@@ -78,6 +82,20 @@ def split(line: bytes, separator: bytes) -> list[str]:
     return [c.strip().strip('"').strip() for c in text.split(separator.decode())]
 
 
+def first_row(body: memoryview) -> bytes:
+    """First line of rows without a header, as far as it is shorter than 64 kB."""
+    return bytes(body[:_HEAD]).split(b"\n", 1)[0].rstrip(b"\r")
+
+
+def fit_names(names: Sequence[str], body: memoryview, separator: bytes) -> list[str]:
+    """Names of a row's cells where rows end with separators that the header line does not have, or it has."""
+    cells = first_row(body).count(separator) + 1
+    named = list(names)
+    while len(named) > cells and not named[-1].strip():
+        named.pop()
+    return make_names_unique([*named, *[""] * (cells - len(named))])
+
+
 def has_decimal_comma(line: bytes, separator: bytes) -> bool:
     """Tell "0,074;9,922" from "0.074;9.922"."""
     return separator != b"," and b"." not in line and re.search(rb"\d,\d", line) is not None
@@ -105,6 +123,7 @@ def read_columns(
     """
     if not bytes(body[:_HEAD]).strip():
         raise FormatError("empty", f"{source} has a header but no samples; record or export it again.")
+    body = _as_utf8(body)
     broken: list[int] = []
 
     def skip(row: pc.InvalidRow) -> Literal["skip"]:
@@ -158,6 +177,17 @@ def read_columns(
             )
         )
     return Columns(values, tuple(notices))
+
+
+def _as_utf8(body: memoryview) -> memoryview:
+    """The same where it is UTF-8; a text with NUL in its head may be anything behind it."""
+    data = bytes(body)
+    try:
+        if not data.isascii():
+            data.decode()
+    except UnicodeDecodeError:
+        return memoryview(data.decode("utf-8", "replace").encode())
+    return body
 
 
 def _as_floats(column: pa.ChunkedArray[Any]) -> Floats:

@@ -16,6 +16,7 @@ from core import rotation
 from core.errors import FormatError, Notice
 from core.formats import text
 from core.formats.draft import Draft
+from core.formats.source import stem_of
 from core.formats.source_spec import ACC_UNITS, GYR_UNITS, SourceSpec
 from core.frames import Floats
 
@@ -103,10 +104,8 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> Draft:
     comma = text.has_decimal_comma(lines[0], layout.separator)
     table = text.read_columns(body, source, layout.separator, names, wanted, decimal_comma=comma)
     notices = [*table.notices, *cut_notice(source, cut)]
-    acc = _stack(table, _ACC) * _factor(ACC_UNITS, spec.acc_unit if spec else None)
-    gyr = (
-        _stack(table, _GYR) * _factor(GYR_UNITS, spec.gyr_unit if spec else None) if _GYR in groups else None
-    )
+    acc = table.stack(_ACC) * _factor(ACC_UNITS, spec.acc_unit if spec else None)
+    gyr = table.stack(_GYR) * _factor(GYR_UNITS, spec.gyr_unit if spec else None) if _GYR in groups else None
     if gyr is None or not np.isfinite(gyr).any():
         gyr = None
         notices.append(
@@ -119,7 +118,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> Draft:
         )
     if not np.isfinite(acc).any():
         raise _no_acc(source, device, names)
-    mag = _stack(table, _MAG) if _MAG in groups else None
+    mag = table.stack(_MAG) if _MAG in groups else None
     if mag is not None and not np.isfinite(mag).any():
         mag = None
     draft = Draft(
@@ -221,7 +220,7 @@ def _device_id(layout: _Layout, source: str) -> str:
     for line in layout.comments:
         if m := _DEVICE.search(line):
             return m.group(1).decode().upper()
-    stem = source.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
+    stem = stem_of(source)
     found = _ID_IN_NAME.findall(stem)
     return str(found[-1]).upper() if found else stem
 
@@ -245,22 +244,18 @@ def _factor(units: dict[str, float], unit: str | None) -> float:
     return 1.0 if unit is None else units[unit]
 
 
-def _stack(table: text.Columns, names: tuple[str, ...]) -> Floats:
-    return np.stack([table.values[n] for n in names], axis=-1)
-
-
 def _orientation(table: text.Columns, groups: list[tuple[str, ...]]) -> Floats | None:
     """The vendor's orientation, sensor → ENU, in whatever form it was exported."""
     if _QUAT in groups:
-        return _stack(table, _QUAT)
+        return table.stack(_QUAT)
     if _MAT in groups:
-        columns = _stack(table, _MAT)
+        columns = table.stack(_MAT)
         ok = np.isfinite(columns).all(axis=1)
         out = np.full((len(columns), 4), np.nan)
         out[ok] = rotation.from_matrix(columns[ok].reshape(-1, 3, 3).swapaxes(1, 2))
         return out
     if _EULER in groups:
-        roll, pitch, yaw = np.radians(_stack(table, _EULER)).T
+        roll, pitch, yaw = np.radians(table.stack(_EULER)).T
         tilt = rotation.multiply(rotation.about(1, pitch), rotation.about(0, roll))
         return rotation.multiply(rotation.about(2, yaw), tilt)
     return None

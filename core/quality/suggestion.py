@@ -14,7 +14,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.formats.aliases import segment_in, segment_named
+from core.formats.aliases import segment_in, segment_named, side_in
 from core.frames import Floats, Segment
 from core.quality.sides import find_left_leg, smooth
 from core.recording import ImuStream, Recording
@@ -68,7 +68,7 @@ def suggest(recording: Recording) -> dict[str, Suggestion]:
         if label is not None and label not in taken and list(named.values()).count(label) == 1:
             out[device] = Suggestion(label, "label", _part(label))
     if all(s.basis is None for s in out.values()):
-        out |= _by_movement(list(recording.streams.values()))
+        out |= _pair_of_feet(list(recording.streams)) or _by_movement(list(recording.streams.values()))
     return out
 
 
@@ -83,6 +83,14 @@ def _part(segment: Segment | None) -> str | None:
 
 def _label(s: ImuStream) -> Segment | None:
     return segment_in(s.device_id) or segment_in(s.source)
+
+
+def _pair_of_feet(devices: list[str]) -> dict[str, Suggestion]:
+    """Two sensors whose names say a side and nothing else: strides need them on the feet."""
+    sides = {device: side_in(device) for device in devices}
+    if len(sides) != 2 or set(sides.values()) != {"l", "r"}:
+        return {}
+    return {d: Suggestion(segment_named(f"foot_{side}"), "label", "foot") for d, side in sides.items()}
 
 
 def _by_movement(streams: list[ImuStream]) -> dict[str, Suggestion]:

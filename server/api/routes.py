@@ -8,6 +8,7 @@ from fastapi import APIRouter, FastAPI
 
 from server.api import (
     analyses,
+    archives,
     audit_log,
     comparisons,
     consents,
@@ -34,6 +35,7 @@ from server.api import (
     sign_in,
     signed_reports,
     tokens,
+    tables,
     trends,
     tunings,
     users,
@@ -63,6 +65,7 @@ def build_api(app: FastAPI) -> APIRouter:
         programmes,
         sessions,
         files,
+        tables,
         videos,
         analyses,
         sensitivities,
@@ -73,6 +76,7 @@ def build_api(app: FastAPI) -> APIRouter:
         filters,
         reports,
         signed_reports,
+        archives,
         reviews,
         trends,
         comparisons,

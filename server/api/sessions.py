@@ -12,10 +12,10 @@ from server.api.schemas import make_answer
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Config, Db, Id, LiveHub, OpenTrail, Queue, Reviewed
+from server.context import Blobs, Config, Db, Id, LiveHub, OpenTrail, Queue, Reviewed
 from server.http.json_body import StrictJsonRoute
 from server.jobs.queue import JobView
-from server.services import erasure, recordings, sessions
+from server.services import erasure, recordings, sessions, tables
 from server.services.errors import NotFound
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}", tags=["sessions"])
@@ -82,8 +82,12 @@ def set_manifest(
 
 @router.post("/inspections", status_code=202, response_model=JobView, responses=refusals(409))
 def inspect(
-    session_id: Id, db: Db, queue: Queue, who: Annotated[Identity, require(Action.UPLOAD)]
+    session_id: Id, db: Db, queue: Queue, blobs: Blobs, who: Annotated[Identity, require(Action.UPLOAD)]
 ) -> JobView:
-    """Ask a worker what is in the files; the same files are looked at once."""
+    """Ask a worker what is in the files; tables of a known shape are read as those before them."""
+    with db.read() as c:
+        known = tables.find_known(c, blobs, session_id)
     with db.write() as c:
+        for shape in known:
+            tables.map_tables(c, who, session_id, shape.files, shape.source)
         return recordings.inspect(c, queue, who, session_id)

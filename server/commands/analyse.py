@@ -46,7 +46,7 @@ def analyse(
             if not has_compiled_filters():
                 bar.stage("compiling, once", 0.0)
             compile_filters_once(OFFLINE)
-            files = analysing.run(sources, declared, _overrides(config, estimator), bar.stage)
+            files = analysing.run(sources, declared, read_overrides(config, estimator), bar.stage)
     except SagittalError as error:
         sys.stderr.write(f"Nothing analysable ({error.code}): {error.message}\n")
         return 1
@@ -61,7 +61,7 @@ def analyse(
     return 0 if any(p["mean"] is not None for p in result["parameters"]) else 1
 
 
-def _overrides(path: Path | None, estimator: str) -> dict[str, Any]:
+def read_overrides(path: Path | None, estimator: str) -> dict[str, Any]:
     """What the file says, the estimator of the command line put into it.
 
     Raises

@@ -113,6 +113,7 @@ def view_upload(c: Connection, this: StoredRecording | None, s: Session, p: Pati
         "files": files,
         "inspect_job": view_job(look) if look is not None and waiting else None,
         "problem": problem,
+        "ask_columns": bool(files) and not waiting and _asks_columns(manifest, found),
         "found": None
         if this is None or this.inspection is None or waiting
         else view_inspection(this, find_remembered(c, s), _recall(c, this, s)),
@@ -123,6 +124,12 @@ def view_upload(c: Connection, this: StoredRecording | None, s: Session, p: Pati
         "lengths_said": bool((manifest.get("subject") or {}).get("measures")),
         "protocols": [(value, title) for value, title, _ in (*PROTOCOLS, *TEST_PROTOCOLS)],
     }
+
+
+def _asks_columns(manifest: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
+    """Whether a table may want to be described, or was: then its columns are shown."""
+    left = any(n["code"] == "file_not_read" for n in found.get("notices", ()))
+    return not found or left or any(s.get("columns") for s in manifest.get("sources") or ())
 
 
 def _said(tree: Mapping[str, Any]) -> dict[str, object]:

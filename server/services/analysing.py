@@ -49,7 +49,8 @@ def analyse_files(
     Parameters
     ----------
     manifest : JSON text, None = nothing declared.
-    config : overrides of PipelineConfig by stage, {"fusion": {"k_acc": 1.0}}; None = the defaults.
+    config : overrides of PipelineConfig by stage, {"fusion": {"k_acc": 1.0}}; without any those of an archive
+        of a visit among the files, else the defaults.
 
     Raises
     ------
@@ -66,9 +67,23 @@ def analyse_files(
         progress(stage, share)
 
     tell("reading", 0.0)
+    chosen = override_config(PipelineConfig(), config or _archived_config(files))
     take = read_recording(files, parse_manifest(manifest) if manifest is not None else None)
-    chosen = override_config(PipelineConfig(), config or {})
     return analyse(take, chosen, tell, CODE_VERSION)
+
+
+def _archived_config(files: Sequence[SourceFile]) -> Mapping[str, Any]:
+    """Settings that came with an archive of a visit; none without one."""
+    from core.errors import ArchiveError
+    from core.formats.archive import read_episode_config
+    from core.formats.json_tree import read_json
+
+    said = read_episode_config(files)
+    try:
+        found = {} if said is None else read_json(said)
+    except ValueError as error:
+        raise ArchiveError("zip_bad", f"The archive's settings are not valid JSON: {error}.") from error
+    return found if isinstance(found, dict) else {}
 
 
 def inspect(files: Sequence[SourceFile], manifest: Mapping[str, Any] | None, progress: Progress) -> bytes:

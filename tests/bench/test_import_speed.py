@@ -10,8 +10,11 @@ import pytest
 from pyarrow import csv
 
 from core.formats import SourceFile, read_recording, write_recording
+from core.formats.text import to_utf8
+from core.formats.vendors import find_vendor
 from tests.bench.pairs import in_pairs
 from tests.core.formats.making import mt_text
+from tests.core.formats.vendor_files import VENDOR_SAMPLES, N
 
 MINUTES = 10
 RATE = 100
@@ -51,6 +54,29 @@ def test_ten_minutes_of_seven_sensors_cost_at_most_twice_what_parsing_them_does(
         f"{size / theirs:.0f} MB/s: {ratio:.2f} times its CPU\n"
     )
     assert ratio <= 2.0
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize(
+    "label", ["Movella DOT CSV", "APDM CSV", "APDM CSV, Mobility Lab", "Shimmer Consensys CSV"]
+)
+def test_other_text_formats_cost_at_most_three_times_what_parsing_them_does(label: str) -> None:
+    name, make = VENDOR_SAMPLES[label]
+    once = make()
+    start = len(once) - len(b"".join(once.splitlines(keepends=True)[-N:]))
+    head, rows = once[:start], once[start:] * 60
+    vendor = find_vendor(once)
+    assert vendor is not None
+    separator = "\t" if b"\t" in rows[:200] else ","
+    options = csv.ReadOptions(use_threads=False, autogenerate_column_names=True)
+
+    def parse() -> None:
+        csv.read_csv(io.BytesIO(rows), options, csv.ParseOptions(delimiter=separator))
+
+    data = head + rows
+    ours, _, ratio = in_pairs(lambda: vendor.read(to_utf8(data), name, None), parse)
+    sys.stdout.write(f"\n{label}: {len(data) / 1e6 / ours:.0f} MB/s of CPU, {ratio:.2f} times pyarrow's\n")
+    assert ratio <= 3.0
 
 
 @pytest.mark.bench

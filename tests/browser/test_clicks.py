@@ -117,3 +117,42 @@ def test_a_live_recording_with_known_sensors_starts_by_ten_clicks(
 
 def _walk_paths() -> list[Path]:
     return sorted(data_folder("neura_walk", "rawimu").glob("*.txt"))
+
+
+TABLES = [
+    ("ipol_walks", "12-3_l[bf].txt", None),
+    ("gaitmap_foot", "imu_sample.csv", "204.8"),
+]
+
+
+@pytest.mark.parametrize(("folder", "pattern", "rate"), TABLES, ids=[t[0] for t in TABLES])
+def test_an_unknown_table_is_eight_clicks_from_its_analysis(
+    opened: Opener, running: RunningServer, folder: str, pattern: str, rate: str | None
+) -> None:
+    files = sorted(data_folder(folder).glob(pattern))
+    if folder == "ipol_walks":
+        files += sorted(data_folder(folder).glob("12-3_rf.txt"))
+    with running.client() as client:
+        patient = filling.add(client, "/patients", code=f"CLICK-{uuid4().hex[:6]}", height_m=1.75)["id"]
+        session = filling.add_session(client, patient, "Walk, 10 m overground")
+    page, hand = opened(f"/sessions/{session}/upload"), Hand()
+    hand.pick_files(page.get_by_role("button", name="Choose files"), files)
+    columns = page.locator("column-map")
+    expect(columns).to_be_visible(timeout=60_000)
+    if rate is not None:
+        hand.click(columns.locator("[data-rate]"))
+        page.keyboard.type(rate)
+    expect(columns.locator("[data-check=ok]").first).to_contain_text("Hz", timeout=20_000)
+    assert columns.locator("[data-check]:not([data-check=ok])").count() == 0
+    hand.click(columns.get_by_role("button", name="Read the files so"))
+    expect(page.locator("sensor-map")).to_be_visible(timeout=180_000)
+    expect(page.locator("[data-sum]")).not_to_be_empty()
+    answer = page.locator("[data-sides=keep]")
+    if answer.is_visible():
+        hand.click(answer)
+    hand.click(page.locator("[data-analyse]"))
+    page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), wait_until="commit")
+    assert hand.clicks <= 8
+    with running.client() as client:
+        manifest = client.get(f"/api/v1/sessions/{session}/recording").json()["manifest"]
+    assert {s["file"] for s in manifest["sources"]} == {f.name for f in files}

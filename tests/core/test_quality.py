@@ -359,3 +359,12 @@ def test_infinite_samples_are_no_plateau() -> None:
 )
 def test_the_path_of_one_foot_is_no_disagreement_of_sensors(bad: list[str], alone: bool) -> None:
     assert concern_paths_alone(bad) is alone
+
+
+def test_two_sensors_that_name_their_side_alone_are_taken_for_the_feet() -> None:
+    pair = Recording({d: stream(d, ACC, GYR) for d in ("left_sensor", "right_sensor")}, segments={})
+    assert suggest_segments(pair) == {"left_sensor": "foot_l", "right_sensor": "foot_r"}
+    for devices in (("left_a", "left_b"), ("left_a", "right_b", "c"), ("a", "b")):
+        assert set(
+            suggest_segments(Recording({d: stream(d, ACC, GYR) for d in devices}, segments={})).values()
+        ) == {None}

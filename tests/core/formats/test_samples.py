@@ -36,21 +36,19 @@ READABLE = [
     ("mtw_csv_sample/mtwawinda/example_calibration_xsens/example_calibration_xsens_00b45c23.csv", "00B45C23", 1253, "gmq", set()),  # noqa: E501
     ("neura_walk/rawimu/S02-Trial-Walk-1-000_00B40B91.txt", "00B40B91", 2503, "gmq", set()),
     (WALK + "00B421E6.txt", "00B421E6", 2432, "q", {"missing_gyro"}),
+    ("formats/xsens_dot/SYNTHETIC_R_shank_20261120_101500_000.csv", "R_shank", 117, "gq", set()),
 ]  # fmt: skip
 REFUSED = [
     (MT + "MT_012005D6-000_sit_to_stand-000_00B421ED.txt", "missing_acc"),
-    ("formats/mvnx/SYNTHETIC_lowerbody.mvnx", "unsupported_format"),
-    ("formats/apdm/apdm_format7.csv", "unsupported_format"),
-    ("formats/apdm/SYNTHETIC_v5.h5", "unsupported_format"),
     ("formats/opensense/imuOrientations.sto", "unsupported_format"),
     (
         "xsens_dot_samples/Original_XsensDot_Data_Realtime/RTibia_20210820_202113_825.csv",
-        "unsupported_format",
+        "gravity_removed",
     ),
     ("mobgap_lowback/data/lab/HA/001/data.mat", "unsupported_format"),
     ("formats/mobilised/HA001_TimeMeasure1_Test5_Trial1.csv", "manifest_needed"),
     ("gaitmap_foot/imu_sample.csv", "manifest_needed"),
-    ("formats/phone/SYNTHETIC_devicemotion.json", "unknown_format"),
+    ("formats/xsens_dot/SYNTHETIC_recording_export_euler.csv", "gravity_removed"),
     ("gaitmap_foot/LICENSE_upstream.txt", "unknown_format"),
 ]
 
@@ -89,6 +87,61 @@ def test_our_own_file_gives_back_what_was_read(
     assert again.rate_hz == first.rate_hz
     np.testing.assert_array_equal(again.acc.astype(np.float32), first.acc.astype(np.float32))
     np.testing.assert_allclose(again.t_s, first.t_s, atol=5e-7)
+
+
+# file, rate, samples, sensors with their segment
+SEVERAL = [
+    (
+        "formats/apdm/apdm_format7.csv",
+        128.0,
+        3,
+        {
+            "5718": "pelvis",
+            "5778": "shank_r",
+            "5811": "shank_l",
+            "6570": "foot_l",
+            "6575": "chest",
+            "6833": "foot_r",
+        },
+    ),
+    (
+        "formats/apdm/imuData01_full.csv.gz",
+        128.0,
+        1024,
+        dict.fromkeys(("Static", "Upper", "Middle", "Lower")),
+    ),
+    ("formats/apdm/SYNTHETIC_v5.h5", 128.0, 256, {"1234": "pelvis", "1235": "foot_r", "1236": "foot_l"}),
+    (
+        "formats/mvnx/SYNTHETIC_lowerbody.mvnx",
+        60.0,
+        10,
+        {
+            "Pelvis": "pelvis",
+            "RightUpperLeg": "thigh_r",
+            "RightLowerLeg": "shank_r",
+            "RightFoot": "foot_r",
+            "LeftUpperLeg": "thigh_l",
+            "LeftLowerLeg": "shank_l",
+            "LeftFoot": "foot_l",
+        },
+    ),
+    ("formats/phone/SYNTHETIC_devicemotion.json", 59.88, 5, {"SYNTHETIC_devicemotion": None}),
+]
+
+
+@pytest.mark.parametrize(("path", "rate", "n", "worn"), SEVERAL, ids=[r[0][-40:] for r in SEVERAL])
+def test_a_file_of_several_sensors_gives_them_with_rate_and_place(
+    path: str, rate: float, n: int, worn: dict[str, str | None]
+) -> None:
+    if path.endswith(".h5"):
+        pytest.importorskip("h5py")
+    recording = read(path)
+    assert {d: recording.segments.get(d) for d in recording.streams} == worn
+    for stream in recording.streams.values():
+        assert len(stream.t_s) == n
+        assert stream.rate_hz == pytest.approx(rate, rel=1e-4)
+        assert stream.gyr is not None
+        assert 8.5 < np.nanmedian(np.linalg.norm(stream.acc, axis=1)) < 10.5
 
 
 @pytest.mark.parametrize(("path", "code"), REFUSED, ids=[r[0][-40:] for r in REFUSED])

@@ -53,6 +53,7 @@ WITHOUT_A_ROW = {
     "WEBSOCKET /views/{view_id}": "the same",
     "GET /api/v1/jobs/{job_id}/events": "tells how far a job is, and of nobody",
     "POST /api/v1/jobs/{job_id}/cancel": "of a job that is over nothing is cancelled",
+    "POST /api/v1/sessions/{session_id}/tables/checks": "of a table whose list has left the row",
     "POST /api/v1/sessions/{session_id}/live/commands": "needs a tablet; kept as live events with the person",
 }
 
@@ -88,6 +89,9 @@ CHANGES: dict[str, dict[str, Any]] = {
     f"PUT {SESSION}/files/{{name:path}}": {"content": b"x"},
     f"POST {SESSION}/files": {"files": {"files": ("judge.npz", b"x")}},
     f"DELETE {SESSION}/files/{{name:path}}": {},
+    f"PUT {SESSION}/tables": {
+        "json": {"files": ["judge.npz"], "source": {"columns": {"A1": {"acc": ["x", "y", "z"]}}}}
+    },
     f"PUT {SESSION}/manifest": {"json": {"sensors": {"A1": "pelvis"}}},
     f"POST {SESSION}/inspections": {},
     f"POST {SESSION}/analyses": {"json": {}},

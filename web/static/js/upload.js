@@ -53,7 +53,7 @@ class UploadArea extends HTMLElement {
       this.add(entries.length ? entries : plain);
     });
     window.addEventListener("beforeunload", (e) => { if (this.active) e.preventDefault(); });
-    this.querySelector("[data-anyway]").addEventListener("click", () => this.inspect());
+    this.querySelector("[data-anyway]").addEventListener("click", () => this.inspect(true));
     document.querySelector("[data-inspect]")?.addEventListener("click", () => this.inspect());
     for (const b of document.querySelectorAll("[data-remove]")) b.addEventListener("click", () => this.remove(b));
   }
@@ -81,7 +81,7 @@ class UploadArea extends HTMLElement {
     total.hidden = !(left || this.sent || this.failed);
     this.querySelector("[data-anyway]").hidden = left > 0 || !this.failed || !this.sent;
     total.textContent = left ? speak`${this.sent} of ${this.sent + left + this.failed} files uploaded` : this.failed ? speak`${this.sent} files uploaded, ${this.failed} not` : speak`${this.sent} files uploaded`;
-    if (!left && this.sent && !this.failed) this.inspect();
+    if (!left && this.sent && !this.failed) this.inspect(true);
   }
 
   send(item) {
@@ -122,9 +122,11 @@ class UploadArea extends HTMLElement {
     button.onclick = () => { this.failed -= 1; this.waiting.push(item); this.pump(); };
   }
 
-  async inspect() {
+  // A worker reads the files; after an upload a table of a shape nobody knows is asked for first (columns.js).
+  async inspect(asksFirst = false) {
     try {
-      await request("POST", `${this.base}/inspections`);
+      const tables = asksFirst ? await request("GET", `${this.base}/tables`) : [];
+      if (!tables.some((table) => table.basis === "guessed")) await request("POST", `${this.base}/inspections`);
       location.reload();
     } catch (problem) {
       showProblem(this.note, problem);

@@ -1,0 +1,150 @@
+"""BIDS motion (BIDS 1.10, "Motion"): a table without a header and the files beside it that name its columns.
+
+`…_channels.tsv` says for every column what it measures, of which tracked point and in which unit;
+`…_motion.json` the rate. Both become an entry of `sources` for `…_motion.tsv`, which is then
+read as any described table.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Final
+
+from core.errors import FormatError
+from core.formats import text
+from core.formats.aliases import segment_named
+from core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, SourceSpec
+from core.frames import Segment
+
+_CHANNELS: Final = "_channels.tsv"
+_MOTION: Final = "_motion.tsv"
+_SIDECAR: Final = "_motion.json"
+_TYPES: Final = {"ACCEL": "acc", "GYRO": "gyr", "MAGN": "mag"}
+_AXES: Final = ("x", "y", "z")
+_NAMES: Final = {"seconds": "s", "rad/sec": "rad/s", "°/sec": "deg/s", "deg/sec": "deg/s"}
+_MOST_COLUMNS: Final = 4096
+
+
+@dataclass(frozen=True)
+class BidsTable:
+    """How one table is read, and which tracked point is worn where as its name or placement says."""
+
+    spec: SourceSpec
+    worn: Mapping[str, Segment | None]
+
+
+def looks_like(data: bytes) -> bool:
+    """Tell a list of channels by its header."""
+    names = text.split(text.head_lines(data[:4096], 1)[0], b"\t") if data.strip() else []
+    return {"name", "component", "type", "tracked_point", "units"} <= set(names)
+
+
+def is_table(name: str) -> bool:
+    """Tell the table by its name, the only thing that BIDS gives it."""
+    return name.lower().endswith(_MOTION)
+
+
+def find_parts(name: str) -> tuple[str, str]:
+    """Names of the channels and of the sidecar that belong to a table."""
+    stem = name[: -len(_MOTION)]
+    return f"{stem}{_CHANNELS}", f"{stem}{_SIDECAR}"
+
+
+def describe_table(name: str, head: bytes, channels: bytes, sidecar: bytes | None) -> BidsTable:
+    """How the table `name`, which begins with `head`, is read.
+
+    Raises
+    ------
+    FormatError `missing_acc` (positions or angles alone), `unknown_unit`, `rate_missing`, `bad_table`.
+    """
+    rows = _rows(channels, name)
+    cells = text.first_row(memoryview(head)).count(b"\t") + 1
+    if cells != len(rows):
+        raise FormatError(
+            "bad_table",
+            f"{name} has {cells} columns, but its channels.tsv names {len(rows)}; export both again.",
+        )
+    points: dict[str, dict[str, dict[str, str]]] = {}
+    units: dict[str, str] = {}
+    time: tuple[str, str] | None = None
+    for i, row in enumerate(rows):
+        column = str(i + 1)
+        kind = _TYPES.get(row["type"].upper())
+        if row["type"].upper() == "LATENCY":
+            time = (column, row["units"])
+        if kind is None or row["component"].lower() not in _AXES:
+            continue
+        points.setdefault(row["tracked_point"], {}).setdefault(kind, {})[row["component"].lower()] = column
+        if units.setdefault(kind, row["units"]) != row["units"] and kind != "mag":
+            raise FormatError(
+                "unknown_unit", f"{name}: its channels of type {row['type']} have several units."
+            )
+    found = {
+        point: {
+            kind: tuple(axes[a] for a in _AXES) for kind, axes in kinds.items() if set(axes) == set(_AXES)
+        }
+        for point, kinds in points.items()
+    }
+    columns = {point: Channels(**kinds) for point, kinds in found.items() if "acc" in kinds}
+    if not columns:
+        types = ", ".join(sorted({row["type"] for row in rows})) or "none"
+        raise FormatError(
+            "missing_acc", f"{name} holds no acceleration (types: {types}); Sagittal reads inertial sensors."
+        )
+    placed = {row["tracked_point"]: row.get("placement", "") for row in rows}
+    return BidsTable(
+        SourceSpec(
+            file=name,
+            header_rows=0,
+            separator="\t",
+            rate_hz=_rate(sidecar, rows, name),
+            time_column=time[0] if time else None,
+            time_unit=_unit(time[1], TIME_UNITS, name) if time else "s",
+            acc_unit=_unit(units["acc"], ACC_UNITS, name),
+            gyr_unit=_unit(units["gyr"], GYR_UNITS, name) if "gyr" in units else None,
+            columns=columns,
+        ),
+        {p: s for p in columns if (s := segment_named(p) or segment_named(placed[p])) is not None},
+    )
+
+
+def _rows(channels: bytes, name: str) -> list[dict[str, str]]:
+    lines = [line for line in text.head_lines(channels, _MOST_COLUMNS + 2) if line.strip()]
+    header = text.split(lines[0], b"\t")
+    rows = [dict(zip(header, text.split(line, b"\t"), strict=False)) for line in lines[1:]]
+    needed = ("type", "component", "tracked_point", "units")
+    if len(rows) > _MOST_COLUMNS or any(key not in row for row in rows for key in needed):
+        raise FormatError("bad_table", f"{name}: its channels.tsv has rows without {', '.join(needed)}.")
+    return rows
+
+
+def _unit(said: str, known: Mapping[str, float], name: str) -> str:
+    unit = _NAMES.get(said, said)
+    if unit not in known:
+        raise FormatError(
+            "unknown_unit", f"{name}: its channels are in '{said}', expected one of {', '.join(known)}."
+        )
+    return unit
+
+
+def _rate(sidecar: bytes | None, rows: Sequence[Mapping[str, str]], name: str) -> float:
+    """What the sidecar says it came to, else what was set, else what the channels say."""
+    said: Any = {}
+    with suppress(ValueError, RecursionError):
+        said = json.loads(sidecar or b"{}")
+    keys = ("SamplingFrequencyEffective", "SamplingFrequency")
+    candidates: list[Any] = [said.get(key) for key in keys] if isinstance(said, dict) else []
+    candidates += [row.get("sampling_frequency") for row in rows[:1]]
+    for value in candidates:
+        try:
+            rate = float(value)
+        except (TypeError, ValueError):
+            continue
+        if 1.0 <= rate <= 100_000.0:
+            return rate
+    raise FormatError(
+        "rate_missing", f"{name}: neither motion.json nor channels.tsv names a sampling frequency."
+    )

@@ -1,0 +1,205 @@
+"""Xsens MVNX: XML of MVN and Xsens Analyze, version 4 (docs/formats.md, "MVNX").
+
+It holds no raw inertial signals. Orientation R (sensor → a frame whose z is up) and free acceleration a (in
+that frame, m/s²) give the acceleration back, Rᵀ(a + g e_z); the angular rate is what turns one orientation
+into the next: the mean over the intervals before and behind a frame, so fast turns are a little flattened.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from typing import Final
+from xml.etree.ElementTree import Element, ParseError
+
+import numpy as np
+from defusedxml import DefusedXmlException
+from defusedxml.ElementTree import iterparse
+
+from core import rotation
+from core.errors import FormatError, Notice
+from core.formats import text
+from core.formats.aliases import segment_named
+from core.formats.draft import Draft, make_draft
+from core.formats.source_spec import SourceSpec
+from core.frames import GRAVITY, Floats
+
+LABEL: Final = "Xsens MVNX"
+_MOST_SENSORS: Final = 64
+_MOST_FRAMES: Final = 10_000_000
+_WIDTHS: Final = {"sensorOrientation": 4, "sensorFreeAcceleration": 3, "sensorMagneticField": 3}
+"""Elements of a frame that are read → numbers per sensor."""
+_TODO: Final = "Export it from MVN again with sensor data switched on."
+
+
+def looks_like(data: bytes) -> bool:
+    """Tell MVNX by its root element."""
+    return data.lstrip()[:1] == b"<" and b"<mvnx" in data[:4096]
+
+
+def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draft, ...]:
+    """Read every sensor of a file.
+
+    Raises
+    ------
+    FormatError `bad_xml` (not well formed, or with a DTD, which is refused), `missing_acc`, `empty`.
+    """
+    reader = _Reader(source)
+    try:
+        for element in _elements(data):
+            reader.take(element)
+    except (ParseError, DefusedXmlException, ValueError) as e:
+        raise FormatError(
+            "bad_xml", f"{source} is not readable XML ({type(e).__name__}); export it again."
+        ) from e
+    return reader.finish(spec)
+
+
+def _elements(data: bytes) -> Iterator[Element]:
+    """Elements as they end; a frame is emptied behind its reader, so that memory does not grow with it."""
+    parents: list[Element] = []
+    for event, element in iterparse(io.BytesIO(data), events=("start", "end"), forbid_dtd=True):
+        if event == "start":
+            parents.append(element)
+            continue
+        parents.pop()
+        yield element
+        if _name(element) == "frame":
+            element.clear()
+            if parents:
+                parents[-1].remove(element)
+
+
+def _name(element: Element) -> str:
+    return element.tag.rsplit("}", 1)[-1]
+
+
+class _Reader:
+    """Collects labels, the rate and the frames of a file."""
+
+    def __init__(self, source: str) -> None:
+        self._source = source
+        self._labels: list[str] = []
+        self._rate: float | None = None
+        self._rows: list[str] = []
+        self._broken = 0
+
+    def take(self, element: Element) -> None:
+        """Look at an element that has ended."""
+        name = _name(element)
+        if name == "sensor" and (label := element.get("label")):
+            self._labels.append(label)
+            if len(self._labels) > _MOST_SENSORS:
+                raise FormatError("bad_table", f"{self._source} names more than {_MOST_SENSORS} sensors.")
+        elif name == "subject":
+            self._rate = _number(element.get("frameRate"))
+        elif name == "frame" and element.get("type", "normal") == "normal":
+            self._take_frame(element)
+
+    def _take_frame(self, frame: Element) -> None:
+        index = _number(frame.get("index"))
+        said = {
+            name: child.text.split() for child in frame if (name := _name(child)) in _WIDTHS and child.text
+        }
+        said.setdefault("sensorMagneticField", ["NaN"] * (3 * len(self._labels)))
+        cells = [cell for name in _WIDTHS for cell in said.get(name, ())]
+        if index is None or len(cells) != len(self._labels) * sum(_WIDTHS.values()):
+            self._broken += 1
+            return
+        if len(self._rows) > _MOST_FRAMES:
+            raise FormatError(
+                "bad_table", f"{self._source} has more than {_MOST_FRAMES} frames; export it in parts."
+            )
+        self._rows.append(f"{index:.0f} {' '.join(cells)}")
+
+    def finish(self, spec: SourceSpec | None) -> tuple[Draft, ...]:
+        """The sensors in SI units."""
+        rate = spec.rate_hz if spec and spec.rate_hz else self._rate
+        if not self._labels or not self._rows:
+            raise FormatError(
+                "missing_acc" if self._broken else "empty",
+                f"{self._source} holds no frames with orientation and free acceleration of sensors. {_TODO}",
+            )
+        if rate is None or not 1.0 <= rate <= 10_000.0:
+            raise FormatError(
+                "rate_missing", f"{self._source} names no frame rate; name rate_hz in a manifest."
+            )
+        notices = [self._derived()]
+        if self._broken:
+            notices.append(
+                Notice(
+                    "truncated_line",
+                    f"{self._source}: {self._broken} frames lack the sensors' signals and were left out.",
+                )
+            )
+        table = self._read_rows()
+        index = table.values["index"]
+        drafts = []
+        for k, label in enumerate(self._labels):
+            q, free, mag = (table.stack(_columns(name, k)) for name in _WIDTHS)
+            q = _unit(q)
+            drafts.append(
+                make_draft(
+                    label,
+                    self._source,
+                    "counter",
+                    index,
+                    acc=rotation.rotate(rotation.conjugate(q), free + np.array([0.0, 0.0, GRAVITY])),
+                    gyr=_rates(q, index, rate),
+                    mag=mag,
+                    quat=q,
+                    rate_hz=rate,
+                    # what is wrong with the file is said once
+                    notices=[*notices, *table.notices] if k == 0 else (),
+                    segment=segment_named(label),
+                )
+            )
+        return tuple(drafts)
+
+    def _read_rows(self) -> text.Columns:
+        """The numbers of all frames."""
+        names = [c for name in _WIDTHS for k in range(len(self._labels)) for c in _columns(name, k)]
+        body = memoryview("\n".join(self._rows).encode())
+        return text.read_columns(
+            body, self._source, b" ", ["index", *names], ["index", *names], decimal_comma=False
+        )
+
+    def _derived(self) -> Notice:
+        return Notice(
+            "signals_derived",
+            f"{self._source} holds no raw signals; acceleration and angular rate were made from its "
+            "orientations and free acceleration.",
+            severity="info",
+        )
+
+
+def _columns(name: str, sensor: int) -> list[str]:
+    return [f"{name} {sensor} {part}" for part in range(_WIDTHS[name])]
+
+
+def _unit(q: Floats) -> Floats:
+    """Unit quaternions, NaN where none is given."""
+    norm = np.linalg.norm(q, axis=-1, keepdims=True)
+    good = (norm > 0.9) & (norm < 1.1)
+    return np.where(good, q / np.where(good, norm, 1.0), np.nan)
+
+
+def _rates(q: Floats, index: Floats, rate_hz: float) -> Floats:
+    """Angular rate (n, 3) rad/s in the sensor's axes, by the steps before and after each frame."""
+    rates = np.full((len(q), 3), np.nan)
+    if len(q) < 2:
+        return rates
+    step_s = np.diff(index) / rate_hz
+    turn = rotation.log(rotation.multiply(rotation.conjugate(q[:-1]), q[1:]))
+    between = turn / np.where(step_s > 0, step_s, np.nan)[:, None]
+    rates[1:-1] = (between[:-1] + between[1:]) / 2
+    rates[0], rates[-1] = between[0], between[-1]
+    return rates
+
+
+def _number(said: str | None) -> float | None:
+    try:
+        value = float(said or "")
+    except ValueError:
+        return None
+    return value if np.isfinite(value) and abs(value) < 1e12 else None

@@ -1,0 +1,123 @@
+"""Which files of a folder are one take: a study's folder has many, laid out in any way.
+
+A file that holds all sensors (a zip, a stored recording, APDM, MVNX, CWA, a phone) is a take. Files of BIDS
+motion are one by subject, session, task and run, whatever their tracking system. Other files of a folder are
+grouped by their names without the last part, where that leaves several in each group ("11-1_lf.txt",
+"11-1_rf.txt"); else the folder is one take. An OpenSense mapping goes with each take of its folder, and so
+does the manifest of the folder or of the nearest one above.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from core.formats import _sniff, bids, live_reader, mapping_xml, parquet, text
+from core.formats.archive import is_gzip, is_zip
+from core.formats.vendors import find_vendor
+
+MANIFEST: Final = "manifest.json"
+_HEAD: Final = 1 << 16
+_LAST_PART: Final = re.compile(r"[_\-\s][^_\-\s]*$")
+_ENDINGS: Final = re.compile(r"(\.(txt|csv|tsv|gz))+$", re.IGNORECASE)
+_ENTITY: Final = re.compile(r"(sub|ses|task|run|acq)-([^_]+)")
+
+
+@dataclass(frozen=True)
+class FoundTake:
+    """Files of one take.
+
+    Parameters
+    ----------
+    name : unique within the folder, with forward slashes. paths : signals and what describes them.
+    labels : what BIDS names say: sub, ses, task, run, acq.
+    """
+
+    name: str
+    paths: tuple[Path, ...]
+    labels: Mapping[str, str]
+
+
+def find_takes(root: Path) -> list[FoundTake]:
+    """Takes of a folder and the folders in it, by name; files that hold no signals are left out."""
+    folders: dict[Path, list[Path]] = {}
+    for path in sorted(p for p in root.rglob("*") if p.is_file()):
+        if not any(part.startswith(".") for part in path.relative_to(root).parts):
+            folders.setdefault(path.parent, []).append(path)
+    takes: list[FoundTake] = []
+    for folder, paths in folders.items():
+        takes += _of_folder(root, folder, paths)
+    return sorted(takes, key=lambda take: take.name)
+
+
+def _of_folder(root: Path, folder: Path, paths: Sequence[Path]) -> list[FoundTake]:
+    groups: dict[str, list[Path]] = {}
+    loose: list[Path] = []
+    for path in paths:
+        kind = _kind_of(path)
+        if bids.is_table(path.name):
+            groups.setdefault(
+                re.sub(r"_tracksys-[^_]+", "", path.name).removesuffix("_motion.tsv"), []
+            ).append(path)
+        elif kind == "take":
+            groups.setdefault(path.name, []).append(path)
+        elif kind == "sensor":
+            loose.append(path)
+    for name, own in _by_name(loose).items():
+        groups.setdefault(name, []).extend(own)
+    beside = [p for p in paths if _kind_of(p) == "mapping"]
+    takes = []
+    for name, own in groups.items():
+        sidecars = [part for p in own if bids.is_table(p.name) for part in bids.find_parts(p.name)]
+        parts = [*own, *beside, *(p for p in paths if p.name in sidecars)]
+        manifest = _manifest_of(root, folder)
+        if manifest is not None and not any(is_zip(_head(p)) for p in own):
+            parts.append(manifest)
+        at = folder.relative_to(root).as_posix()
+        full = "/".join(part for part in ("" if at == "." else at, name) if part)
+        takes.append(FoundTake(full or root.name, tuple(parts), dict(_ENTITY.findall(name))))
+    return takes
+
+
+def _by_name(paths: Sequence[Path]) -> dict[str, list[Path]]:
+    """Files of single sensors by what their names share; all of them, named "", where that tells nothing."""
+    groups: dict[str, list[Path]] = {}
+    for path in paths:
+        groups.setdefault(_LAST_PART.sub("", _ENDINGS.sub("", path.name)), []).append(path)
+    if len(groups) > 1 and all(len(g) > 1 for g in groups.values()):
+        return groups
+    return {"": list(paths)} if paths else {}
+
+
+def _manifest_of(root: Path, folder: Path) -> Path | None:
+    """The manifest of a folder, or of the nearest one above within the study."""
+    for at in (folder, *folder.parents):
+        if (found := at / MANIFEST).is_file():
+            return found
+        if at == root:
+            break
+    return None
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as opened:
+        return opened.read(_HEAD)
+
+
+def _kind_of(path: Path) -> str:
+    """Tell "take" (all sensors in one file), "sensor" (one of several), "mapping", or "" for all else."""
+    head = _head(path)
+    if is_zip(head) or head.startswith(parquet.MAGIC) or live_reader.looks_like(head):
+        return "take"
+    if is_gzip(head):
+        return "sensor"
+    data = text.to_utf8(head)
+    vendor = find_vendor(data)
+    if vendor is not None:
+        return "sensor" if vendor.one_sensor else "take"
+    if mapping_xml.looks_like(data):
+        return "mapping"
+    return "sensor" if _sniff.sniff(data)[0] == "table" and not bids.looks_like(data) else ""

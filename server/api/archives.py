@@ -1,0 +1,67 @@
+"""The archive of a visit, to be kept or read by another Sagittal."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from typing import IO, Annotated
+
+from fastapi import APIRouter
+from starlette.responses import StreamingResponse
+
+from server.api.downloads import BINARY
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Blobs, Db, Id, OpenTrail, Reviewed
+from server.report.tables import curves_csv, parameters_csv
+from server.services import analyses, archives, controls, edit_log, patients, recordings, reports, sessions
+
+router = APIRouter(prefix="/sessions/{session_id}", tags=["report"])
+_PIECE = 1 << 20
+_ZIP = "application/zip"
+
+
+@router.get(
+    "/archive.zip",
+    response_class=StreamingResponse,
+    responses={200: {"description": "The archive", "content": {_ZIP: {"schema": BINARY}}}},
+)
+def read_archive(
+    session_id: Id,
+    db: Db,
+    blobs: Blobs,
+    reviewed: Reviewed,
+    trail: OpenTrail,
+    who: Annotated[Identity, require(Action.READ_RESULT)],
+) -> StreamingResponse:
+    """Recording, manifest, settings, results and tables of the analysis that the pages show, in one zip."""
+    with db.read() as c:
+        session = sessions.get(c, session_id)
+        patient = patients.get(c, session.patient_id)
+        found = analyses.get_shown(c, session_id)
+        recording = recordings.get(c, found.recording_id)
+        edits = edit_log.edits_of(c, found.id)
+        known = controls.list_visits(c, patient, session)
+    model = reports.read(reviewed, found, edits, patient, session, control_visits=known)[1]
+    tables = {"parameters.csv": parameters_csv(model), "curves.csv": curves_csv(model)}
+    out = tempfile.TemporaryFile()  # noqa: SIM115 - the answer closes it
+    try:
+        archives.write_archive(out, blobs, recording, found, edits, tables)
+    except BaseException:
+        out.close()
+        raise
+    trail.record_opened(who, "archive.opened", "session", session_id, {"analysis_id": found.id})
+    size = out.tell()
+    out.seek(0)
+    headers = {
+        "Content-Disposition": f'attachment; filename="visit-{session_id[:8]}.zip"',
+        "Content-Length": str(size),
+    }
+    return StreamingResponse(_pieces(out), media_type=_ZIP, headers=headers)
+
+
+def _pieces(out: IO[bytes]) -> Iterator[bytes]:
+    with out:
+        while piece := out.read(_PIECE):
+            yield piece

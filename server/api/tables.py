@@ -1,0 +1,67 @@
+"""Tables of an upload: what they probably hold, whether a reading fits, and how they are to be read."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter
+from pydantic import Field
+
+from server.api import schemas
+from server.api.documents import refusals
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Blobs, Db, Id, OpenTrail
+from server.http.json_body import StrictJsonRoute
+from server.services import tables
+from server.services.tables import TableReading, TableShape
+
+router = APIRouter(
+    prefix="/sessions/{session_id}/tables",
+    route_class=StrictJsonRoute,
+    tags=["files"],
+    responses=refusals(409),
+)
+Uploader = Annotated[Identity, require(Action.UPLOAD)]
+Name = Annotated[str, Field(min_length=1, max_length=500)]
+
+
+class TableCheckNew(schemas.Request):
+    """A file and an entry of the manifest's `sources` without `file`; a sensor `*` is called as the file."""
+
+    file: Name
+    source: schemas.Json
+
+
+class TableMapping(schemas.Request):
+    """Files of one shape and how all of them are read."""
+
+    files: Annotated[tuple[Name, ...], Field(min_length=1, max_length=1000)]
+    source: schemas.Json
+
+
+@router.get("", response_model=list[TableShape])
+def list_tables(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Uploader) -> list[TableShape]:
+    """The tables of the current recording by their columns, with a guess at what these are."""
+    with db.read() as c:
+        found = tables.list_tables(c, blobs, session_id)
+    trail.record_watched(who, "recording.opened", "session", session_id)
+    return list(found)
+
+
+@router.post("/checks", response_model=list[TableReading])
+def check_table(
+    session_id: Id, body: TableCheckNew, db: Db, blobs: Blobs, who: Uploader
+) -> list[TableReading]:
+    """What the sensors of a table give at its beginning, read as said; changes nothing."""
+    with db.read() as c:
+        return list(tables.check_table(c, blobs, session_id, body.file, body.source))
+
+
+@router.put("", response_model=schemas.RecordingAnswer)
+def map_tables(session_id: Id, body: TableMapping, db: Db, who: Uploader) -> schemas.RecordingAnswer:
+    """Say how tables are read: one entry for each file in the manifest."""
+    with db.write() as c:
+        found = tables.map_tables(c, who, session_id, body.files, body.source)
+        return schemas.make_answer(schemas.RecordingAnswer, found)
