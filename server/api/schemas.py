@@ -10,14 +10,15 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
 from core.frames import Protocol
-from server.auth.api_tokens import MOST_DAYS, Scope
+from server.auth import api_tokens
+from server.auth.api_tokens import Scope
 from server.auth.passwords import MAX_LENGTH, MIN_LENGTH
 from server.auth.roles import Role
 from server.jobs.queue import JobView
 from server.report.behind import StrideValue
+from server.services import report_links
 from server.services.notes import MOST_CHARACTERS
 from server.services.recordings import RecordedFile, RecordingState
-from server.services.report_links import MOST_DAYS, USUAL_DAYS
 from server.services.tunings import MOST_OF_SWARM, Scheme
 from server.storage.tables import now
 
@@ -125,7 +126,7 @@ class ApiTokenNew(Request):
 
     name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=40)]
     scopes: Annotated[list[Scope], Field(min_length=1, max_length=len(Scope))]
-    days: Annotated[int, Field(ge=1, le=MOST_DAYS)]
+    days: Annotated[int, Field(ge=1, le=api_tokens.MOST_DAYS)]
     password: Annotated[str, StringConstraints(max_length=1000)]
 
 
@@ -237,7 +238,7 @@ class Reopening(Request):
 class ReportLinkNew(Request):
     """How long somebody may read a report by a link."""
 
-    days: Annotated[int, Field(ge=1, le=MOST_DAYS)] = USUAL_DAYS
+    days: Annotated[int, Field(ge=1, le=report_links.MOST_DAYS)] = report_links.USUAL_DAYS
 
 
 class NoteNew(Request):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from sqlalchemy import CheckConstraint, Column, Date, ForeignKey, Integer, LargeBinary, String, Table
 
-from server.storage.tables import Json, Utc, metadata
+from server.storage.columns import Json, Utc, metadata
 
 CONSENT_PURPOSES = ("recording", "research", "teaching", "sharing")
 

@@ -452,8 +452,8 @@ def test_a_running_take_is_german(told: Opener, trained: tuple[str, str, str]) -
 
 
 def _faults_everywhere(this: Told, *messages: str) -> dict[str, Any]:
-    """Faults of a state in every size, light and dark; what is said again each time keeps it from going old."""
-    found = {}
+    """Faults of a state in every size, light and dark; what is said again each time keeps it fresh."""
+    found: dict[str, Any] = {}
     for width, height in SIZES:
         this.page.set_viewport_size({"width": width, "height": height})
         for scheme in ("light", "dark"):
