@@ -27,6 +27,12 @@ def test_a_report_is_signed_shared_by_a_slip_with_a_code_and_reopened(opened: Op
     assert not layout_faults(page) | text_faults(page)
     url = slip.locator("[data-url]").inner_text()
     assert page.content().count(url) == 1
+    # the slip goes to somebody else: nothing else is on the paper, the patient's code least of all
+    page.emulate_media(media="print")
+    expect(slip).to_be_visible()
+    for other in (page.locator(".page-head"), page.get_by_role("heading", name="Signed versions")):
+        expect(other).to_be_hidden()
+    page.emulate_media(media="null")
     # whoever has no account
     outside = opened(url, signed_in=False)
     expect(outside.get_by_text("Longer steps.")).to_be_visible()

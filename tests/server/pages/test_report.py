@@ -43,6 +43,10 @@ async def write(clinic: Clinic, session: str, text: str) -> int:
 async def test_a_signed_report_keeps_its_bytes_while_the_page_follows(clinic: Clinic) -> None:
     _, session = await visit(clinic, "S-1")
     assert await write(clinic, session, "Walks faster.\n\nPlan: <b>longer</b> steps.") == 204
+    async with clinic.client("clinician", {"accept-language": "de"}) as client:
+        form = (await client.get(f"/sessions/{session}/report")).text
+    # what was typed is not translated
+    assert ">Walks faster.\n\nPlan: &lt;b&gt;longer&lt;/b&gt; steps.</textarea>" in form
     paper = await page(clinic, f"/sessions/{session}/print")
     assert "Plan: &lt;b&gt;longer&lt;/b&gt; steps." in paper
     assert "not signed" in paper
