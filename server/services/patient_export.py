@@ -125,7 +125,7 @@ def _keep(
         values = {name: _plain(value) for name, value in row._asdict().items() if name not in SECRET}
         known[tuple(getattr(row, column.name) for column in table.primary_key)] = values
         if "id" in values:
-            ids.setdefault(table.name, set()).add(values["id"])
+            ids.setdefault(table.name, set()).add(str(values["id"]))
     if not known:
         del found[table.name]
     return len(known) > before
