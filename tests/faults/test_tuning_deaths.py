@@ -23,9 +23,7 @@ from server.storage.tables import job
 from tests.core.fusion.algorithms.motion import trial_bytes
 from tests.faults.clinic import Clinic, until
 
-ORDER = tunings.TuningOrder(
-    "mahony_2008", ("judge",), particles=10, iterations=70, rounds=2, random_rounds=1
-)
+ORDER = tunings.TuningOrder("mahony_2008", ("judge",), particles=10, iterations=70, rounds=2, random_rounds=1)
 """Some seven seconds of work: longer than a worker takes to be killed, replaced and heard of."""
 
 
