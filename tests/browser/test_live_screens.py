@@ -432,8 +432,8 @@ def test_every_state_obeys_the_design_system(told: Opener, trained: tuple[str, s
 
 
 def _faults_everywhere(this: Told, *messages: str) -> dict[str, Any]:
-    """Faults of a state in every size, light and dark; what is said again each time keeps it from going old."""
-    found = {}
+    """Faults of a state in every size, light and dark; what is said each time keeps it from going old."""
+    found: dict[str, Any] = {}
     for width, height in SIZES:
         this.page.set_viewport_size({"width": width, "height": height})
         for scheme in ("light", "dark"):
