@@ -16,15 +16,23 @@ from pathlib import Path
 
 import httpx
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, Playwright, expect, sync_playwright
-from sqlalchemy import delete
+from playwright.sync_api import (
+    Browser,
+    BrowserContext,
+    Page,
+    Playwright,
+    ViewportSize,
+    expect,
+    sync_playwright,
+)
+from sqlalchemy import delete, select
 
 from server.auth import accounts
 from server.auth.passwords import hash_password
 from server.auth.roles import Role
 from server.storage.db import Database
 from server.storage.migrate import upgrade
-from server.storage.tables import device_check
+from server.storage.tables import device_check, job
 from tests.browser import filling
 from tests.data import ROOT
 
@@ -37,8 +45,8 @@ FLAGS = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-backgrou
 FLAT = [*FLAGS, "--disable-gpu"]
 SOLID = [*FLAGS, "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
          "--disable-gpu-rasterization"]  # fmt: skip
-"""Without 3D (fast 2D) and with software WebGL, which slows pages down to a few frames a second; all of a page
-but the figure is then drawn as without 3D."""
+"""Without 3D (fast 2D) and with software WebGL, which slows pages down to a few frames a second; all of a
+page but the figure is then drawn as without 3D."""
 PACED = """
 if (window !== window.top) {
   const draw = window.requestAnimationFrame.bind(window);
@@ -48,7 +56,7 @@ if (window !== window.top) {
 """
 """A figure drawn by software as often as it can takes all processors from the server that is to be tested."""
 WITHOUT_FIGURE = "if (location.pathname.startsWith('/views/')) location.replace('about:blank');"
-"""Without 3D nobody sees the figure: its megabytes of script, which would draw it all the same, are not run."""
+"""Without 3D nobody sees the figure; its megabytes of script would draw it all the same."""
 FORGET = """async () => {
   localStorage.clear();
   await Promise.all((await indexedDB.databases()).map(({ name }) => new Promise((done) => {
@@ -57,6 +65,7 @@ FORGET = """async () => {
   })));
 }"""
 
+DESK = ViewportSize(width=1280, height=800)
 RECORDS_ONLY = {"SAGITTAL_WORKERS": "0", "SAGITTAL_LIVE_WORKERS": "0"}
 
 
@@ -208,11 +217,9 @@ class KeptContexts:
         self._used: set[BrowserContext] = set()
 
     def take(self, browser: Browser, script: str, locale: str = "en-US") -> BrowserContext:
-        """The one of this browser and language, made at its first use; the script runs in all its documents."""
+        """The one of this browser and language, made at its first use; `script` runs in every document."""
         if (browser, locale) not in self._all:
-            made = browser.new_context(
-                locale=locale, base_url=self._url, viewport={"width": 1280, "height": 800}
-            )
+            made = browser.new_context(locale=locale, base_url=self._url, viewport=DESK)
             made.set_default_timeout(60_000)
             made.add_init_script(script)
             made.add_cookies(self._cookies)  # type: ignore[arg-type]
@@ -250,7 +257,21 @@ Opener = Callable[..., Page]
 
 
 @pytest.fixture
-def opened(flat: Browser, running: RunningServer, kept: KeptContexts) -> Iterator[Opener]:
+def at_rest(running: RunningServer) -> None:
+    """No job of an earlier test is at work: a page that shows one loads itself again when it ends."""
+    at_work = select(job.c.id).where(job.c.state.in_(("queued", "running"))).limit(1)
+    end = time.monotonic() + 60
+    with contextlib.closing(Database(running.folder / "sagittal.db")) as db:
+        while time.monotonic() < end:
+            with db.read() as c:
+                if c.execute(at_work).first() is None:
+                    return
+            time.sleep(0.05)
+    pytest.fail("a job of an earlier test does not end")
+
+
+@pytest.fixture
+def opened(flat: Browser, running: RunningServer, kept: KeptContexts, at_rest: None) -> Iterator[Opener]:
     """Opens pages signed in; a script error or a refused style fails the test at its end."""
     contexts: list[BrowserContext] = []
     said: list[str] = []

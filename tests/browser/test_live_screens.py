@@ -452,7 +452,7 @@ def test_a_running_take_is_german(told: Opener, trained: tuple[str, str, str]) -
 
 
 def _faults_everywhere(this: Told, *messages: str) -> dict[str, Any]:
-    """Faults of a state in every size, light and dark; what is said again each time keeps it fresh."""
+    """Faults of a state in every size, light and dark; what is said each time keeps it from going old."""
     found: dict[str, Any] = {}
     for width, height in SIZES:
         this.page.set_viewport_size({"width": width, "height": height})

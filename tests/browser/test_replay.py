@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page, expect
 from core.frames import SIDES
 from server.viewer.colours import TINTS
 from tests.browser import filling
-from tests.browser.conftest import PACED, Filled, Opener, RunningServer, is_ours
+from tests.browser.conftest import DESK, PACED, Filled, Opener, RunningServer, is_ours
 from tests.browser.picture import wait_for_picture, wait_until_still
 from tests.data import data_folder
 from tests.server.viewer.seeing import pixels_of
@@ -26,8 +26,8 @@ from tests.walks import NEURA
 def figure_page(
     solid: Browser, running: RunningServer, cookies: list[dict[str, str]], filled: Filled
 ) -> Iterator[tuple[Page, list[str]]]:
-    """A session with its figure, opened once: software takes seconds until the figure stands; script errors."""
-    context = solid.new_context(base_url=running.url, viewport={"width": 1280, "height": 800})
+    """A session opened once, for software takes seconds until its figure stands; and its script errors."""
+    context = solid.new_context(base_url=running.url, viewport=DESK)
     context.add_cookies(cookies)  # type: ignore[arg-type]
     context.add_init_script(PACED)
     page, said = context.new_page(), list[str]()

@@ -16,8 +16,8 @@ from server.services import analyses, patients, recordings, sessions
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
-from server.storage.migrate import upgrade
 from server.storage.tables import job
+from tests.databases import write_database
 
 PATIENCE_S = 60.0
 """Longest wait for what must happen: far beyond what it takes, so that a loaded machine is no failure."""
@@ -56,7 +56,7 @@ class Clinic:
             child_memory_bytes=4_000_000_000,
             task_modules=("tests.faults.tiny_tasks",),
         )
-        upgrade(self.settings.database)
+        write_database(self.settings.database)
         self.db = Database(self.settings.database)
         self.blobs = BlobStore(self.settings.blobs)
         self.queue = TableQueue(self.db, lease_s)

@@ -18,6 +18,7 @@ from server.auth.passwords import hash_password
 from server.auth.roles import Role
 from server.settings import Settings
 from server.storage.db import Database
+from tests.databases import write_database
 
 PASSWORD = "correct horse battery"
 ORIGIN = "http://127.0.0.1"
@@ -72,6 +73,8 @@ class Clinic:
 async def open_clinic(folder: Path, **settings: Any) -> AsyncIterator[Clinic]:
     """Start an application on a folder and stop it again; estimators only if `live_workers` says so."""
     options = Settings(data_dir=folder, **{"live_workers": 0, **settings})
+    if not options.database.exists():
+        write_database(options.database)
     app = create_app(options)
     async with app.router.lifespan_context(app):
         yield Clinic(app, options)

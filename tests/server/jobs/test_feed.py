@@ -11,13 +11,13 @@ from server.jobs.feed import JobFeed
 from server.jobs.queue import JobView
 from server.jobs.table import TableQueue
 from server.storage.db import Database
-from server.storage.migrate import upgrade
 from server.storage.tables import job
+from tests.databases import write_database
 
 
 @pytest.fixture
 def db(tmp_path: Path) -> Iterator[Database]:
-    upgrade(tmp_path / "a.db")
+    write_database(tmp_path / "a.db")
     opened = Database(tmp_path / "a.db")
     yield opened
     opened.close()

@@ -18,8 +18,8 @@ from sqlalchemy import select
 from server.jobs.queue import Claim, JobView, LeaseState, Priority
 from server.jobs.table import MAX_DEATHS, TableQueue
 from server.storage.db import Database
-from server.storage.migrate import upgrade
 from server.storage.tables import job
+from tests.databases import write_database
 
 LEASE_S = 15.0
 
@@ -39,7 +39,7 @@ class Bench:
     """A queue with a hand-driven clock and what has been published through it."""
 
     def __init__(self, path: Path) -> None:
-        upgrade(path)
+        write_database(path)
         self.db = Database(path)
         self.clock = Clock()
         self.queue = TableQueue(self.db, LEASE_S, self.clock)

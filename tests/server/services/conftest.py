@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from server.storage.db import Database
-from server.storage.migrate import upgrade
+from tests.databases import write_database
 
 
 @pytest.fixture
 def db(tmp_path: Path) -> Iterator[Database]:
-    upgrade(tmp_path / "sagittal.db")
+    write_database(tmp_path / "sagittal.db")
     opened = Database(tmp_path / "sagittal.db")
     yield opened
     opened.close()

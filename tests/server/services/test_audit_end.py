@@ -12,7 +12,7 @@ from server.services import patients
 from server.settings import Settings
 from server.storage.db import Database
 from server.storage.high_water import raise_mark, set_mark
-from server.storage.migrate import upgrade
+from tests.databases import write_database
 
 ROWS = 6
 
@@ -21,7 +21,7 @@ ROWS = 6
 def settings(tmp_path: Path) -> Settings:
     """A data folder whose audit log has six rows, and the mark that a server leaves."""
     made = Settings(data_dir=tmp_path)
-    upgrade(made.database)
+    write_database(made.database)
     with closing(Database(made.database)) as db:
         with db.write() as c:
             for i in range(ROWS):

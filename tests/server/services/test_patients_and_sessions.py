@@ -31,7 +31,7 @@ from server.settings import Settings
 from server.storage import tables
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
-from server.storage.migrate import upgrade
+from tests.databases import write_database
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Person:
 class Clinic:
     def __init__(self, folder: Path) -> None:
         self.settings = Settings(data_dir=folder, min_free_bytes=0, max_file_bytes=1000, max_files=3)
-        upgrade(self.settings.database)
+        write_database(self.settings.database)
         self.db = Database(self.settings.database)
         self.blobs = BlobStore(self.settings.blobs)
         self.queue = TableQueue(self.db, 15.0)

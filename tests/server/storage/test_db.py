@@ -10,15 +10,15 @@ from sqlalchemy import insert, select, update
 from sqlalchemy.exc import IntegrityError, OperationalError, StatementError
 
 from server.storage.db import Database
-from server.storage.migrate import upgrade
 from server.storage.tables import new_id, now, patient, session
+from tests.databases import write_database
 
 WRITERS, ROUNDS = 50, 4
 
 
 @pytest.fixture
 def db(tmp_path: Path) -> Iterator[Database]:
-    upgrade(tmp_path / "a.db")
+    write_database(tmp_path / "a.db")
     opened = Database(tmp_path / "a.db")
     yield opened
     opened.close()

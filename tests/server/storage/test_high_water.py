@@ -22,6 +22,7 @@ from server.storage.high_water import (
     set_mark,
 )
 from server.storage.migrate import upgrade
+from tests.databases import write_database
 from tests.faults.clinic import until
 from tests.faults.model_disk import ModelDisk
 
@@ -44,7 +45,7 @@ def mark(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def db(tmp_path: Path) -> Iterator[Database]:
-    upgrade(tmp_path / "sagittal.db")
+    write_database(tmp_path / "sagittal.db")
     with closing(Database(tmp_path / "sagittal.db")) as opened:
         yield opened
 
