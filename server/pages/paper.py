@@ -36,12 +36,17 @@ def write_document(language: str, template: str, context: Mapping[str, Any]) -> 
     return page.render({**context, "styles": Markup(read_styles())}).encode()  # noqa: S704 - ours
 
 
-def hide_person(context: dict[str, Any], number: str) -> None:
-    """Take out of a report's patient and session what leads to the person; a number stands for the code."""
-    patient, session = context["patient"], context["session"]
-    context["patient"] = replace(patient, code=number, note="")
+def hide_person(context: Mapping[str, Any], number: str) -> dict[str, Any]:
+    """What a report shows without what leads to the person: a number stands for the patient's code."""
+    patient, session, report = context["patient"], context["session"], context["report"]
     title = PROTOCOL_NAMES.get(session.protocol, session.protocol)
-    context["session"] = replace(session, patient_code=number, title=title, note="")
+    identity = [(k, number if v == patient.code else v) for k, v in report["identity"]]
+    return {
+        **context,
+        "patient": replace(patient, code=number, note=""),
+        "session": replace(session, patient_code=number, title=title, note=""),
+        "report": {**report, "identity": identity},
+    }
 
 
 def show_document(content: bytes, *, is_shared: bool = False) -> Response:

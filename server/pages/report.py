@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Request
@@ -83,22 +82,17 @@ def sign(
     report_id, language = new_id(), language_of(request)
     with db.read() as c:
         signature = signed_reports.prepare_signature(c, sid, report_id, who.display_name)
-    written: dict[str, bytes] = {}
-    hides: Mapping[str, Callable[[dict[str, Any]], None]] = {
-        DOCUMENT: lambda context: None,
-        PSEUDONYMISED: lambda context: hide_person(context, f"R-{report_id[:8]}"),
-    }
-    context: dict[str, Any] = {}
-    for name, hide in hides.items():
-        context = _gather(db, reviewed, sid, who, hide) | {"signature": signature}
-        written[name] = write_document(language, choose_template(PAPER, context), context)
+    context = _gather(db, reviewed, sid, who) | {"signature": signature}
+    shown = {DOCUMENT: context, PSEUDONYMISED: hide_person(context, f"R-{report_id[:8]}")}
+    template = choose_template(PAPER, context)
+    written = {name: write_document(language, template, each) for name, each in shown.items()}
     space = context["session"].patient_id
     stored = {name: blobs.put(space, content) for name, content in written.items()}
     with db.write() as c:
         for blob in stored.values():
             blobs.require(space, blob.sha256)
-        shown = context["analysis"].id
-        found = signed_reports.keep_signed(c, who, signature, sid, shown, language, stored)
+        analysis_id = context["analysis"].id
+        found = signed_reports.keep_signed(c, who, signature, sid, analysis_id, language, stored)
     return {"id": found.id, "sha256": found.sha256}
 
 
@@ -148,14 +142,8 @@ def _open_signed(db: Database, blobs: BlobStore, report_id: str, name: str = DOC
         return signed_reports.read_document(c, blobs, report_id, name)
 
 
-def _gather(
-    db: Database,
-    reviewed: ReviewedAnalyses,
-    sid: str,
-    who: Identity,
-    hide: Callable[[dict[str, Any]], None] = lambda context: None,
-) -> dict[str, Any]:
-    context = gather_report(db, reviewed, sid, who, PAPER, hide)
+def _gather(db: Database, reviewed: ReviewedAnalyses, sid: str, who: Identity) -> dict[str, Any]:
+    context = gather_report(db, reviewed, sid, who, PAPER)
     if context["report"] is None:
         raise NotFound("analysis of session", sid)
     return context

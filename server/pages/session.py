@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Request
@@ -185,18 +185,11 @@ def gather_report(
     sid: str,
     who: Identity,
     template: str,
-    hide: Callable[[dict[str, Any]], None] = lambda context: None,
 ) -> dict[str, Any]:
-    """What a page or the sheets of a session's report show; `report` is None where nothing is analysed.
-
-    Parameters
-    ----------
-    hide : takes out of patient and session what is not to be shown.
-    """
+    """What a page or the sheets of a session's report show; `report` is None where nothing is analysed."""
     paper = template == PAPER
     with db.read() as c:
         context = read_context(c, sid)
-        hide(context)
         patient = context["patient"]
         done = histories.list_analysed(c, patient.id) if who.may(Action.READ_RESULT) else []
         this = next((a for a in done if a.session.id == sid), None)
