@@ -26,6 +26,8 @@ from server.storage.db import Database
 from server.storage.tables import audit, metadata, now, patient, user
 
 PIECE: Final = 1 << 20
+_INTO: Final = "w"
+"""How a zip's own file is opened; on the disk nothing is."""
 SECRET: Final = frozenset({"code_sha256", "token_sha256"})
 """Columns that open something; they are nobody's data."""
 
@@ -102,7 +104,7 @@ def _zip(
             except IntegrityError as error:
                 missing.append({"name": file.name, "why": error.message})
                 continue
-            with source, archive.open(file.name, "w", force_zip64=True) as target:
+            with source, archive.open(file.name, _INTO, force_zip64=True) as target:
                 while piece := source.read(PIECE):
                     target.write(piece)
                     yield sink.take()
