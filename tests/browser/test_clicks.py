@@ -13,6 +13,7 @@ from tests.browser import filling
 from tests.browser.capturing import choose, place, walk_files
 from tests.browser.clicking import Hand
 from tests.browser.conftest import Filled, Opener, RunningServer
+from tests.browser.design import axe_faults
 from tests.browser.test_timeline import pick_counted
 from tests.browser.test_upload import SEGMENTS
 from tests.data import data_folder
@@ -144,6 +145,7 @@ def test_an_unknown_table_is_eight_clicks_from_its_analysis(
         page.keyboard.type(rate)
     expect(columns.locator("[data-check=ok]").first).to_contain_text("Hz", timeout=20_000)
     assert columns.locator("[data-check]:not([data-check=ok])").count() == 0
+    assert axe_faults(page) == []
     hand.click(columns.get_by_role("button", name="Read the files so"))
     expect(page.locator("sensor-map")).to_be_visible(timeout=180_000)
     expect(page.locator("[data-sum]")).not_to_be_empty()

@@ -45,7 +45,7 @@ class Shape {
     this.acc = select([["", "?"], ["m/s2", "m/s²"], ["g", "g"], ["mg", "mg"]], source.acc_unit, { "data-acc-unit": true });
     this.gyr = select([["", "?"], ["rad/s", "rad/s"], ["deg/s", "°/s"]], source.gyr_unit, { "data-gyr-unit": true });
     this.time = select(["s", "ms", "us", "ns"].map((u) => [u, u === "us" ? "µs" : u]), source.time_unit ?? "s", {});
-    this.checks = h("ul", { class: "plainlist stack g2 small", role: "status", "data-checks": true });
+    this.checks = h("ul", { class: "plainlist stack g2 small" });
     this.element = this.draw();
     this.element.addEventListener("input", onchange);
   }
@@ -58,7 +58,7 @@ class Shape {
     const show = () => { whose.hidden = !what.value.includes(" "); };
     what.addEventListener("input", show);
     show();
-    row.element = h("tr", {}, h("td", { class: "wrapany" }, name), h("td", { class: "mono xs dim" }, values), h("td", {}, what), h("td", {}, whose));
+    row.element = h("tr", {}, h("td", { class: "wrapany" }, name), h("td", { class: "mono xs dim hide-sm" }, values), h("td", {}, what), h("td", {}, whose));
     return row;
   }
 
@@ -71,13 +71,13 @@ class Shape {
       h("h3", { class: "wrapany" }, title),
       h("p", { class: "small mut" }, why[basis] ?? speak`Guessed from names and numbers. Change what is not right.`),
       h("div", { class: "scroll" }, h("table", { class: "tbl tight" },
-        h("thead", {}, h("tr", {}, h("th", {}, speak`Column`), h("th", {}, speak`First values`), h("th", {}, speak`What it is`), h("th", {}, speak`Sensor`))),
+        h("thead", {}, h("tr", {}, h("th", {}, speak`Column`), h("th", { class: "hide-sm" }, speak`First values`), h("th", {}, speak`What it is`), h("th", {}, speak`Sensor`))),
         h("tbody", {}, ...this.rows.map((r) => r.element)))),
       h("div", { class: "grid cols2 measures" },
         field(speak`Samples per second`, this.rate, speak`Needed where no column is the time.`),
         field(speak`Unit of time`, this.time, ""),
         field(speak`Unit of acceleration`, this.acc, ""), field(speak`Unit of angular rate`, this.gyr, "")),
-      this.checks);
+      h("div", { role: "status" }, this.checks));
   }
 
   // The entry of the manifest, without the file.
@@ -107,7 +107,7 @@ class Shape {
       c.fastest_radps === null ? "" : speak`turns up to ${(c.fastest_radps * DEG).toFixed(0)} °/s`,
     ].filter(Boolean).map(localise).join(" · ");
     this.checks.replaceChildren(...checks.map((c) => h("li", { "data-check": c.problems.length ? "warn" : "ok" },
-      icon(c.problems.length ? "warn" : "ok"), " ", said(c), ...c.problems.map((p) => h("p", { class: "small" }, translate(p))))));
+      icon(c.problems.length ? "warn" : "check"), " ", said(c), ...c.problems.map((p) => h("p", { class: "small" }, translate(p))))));
   }
 
   refuse(problem) {
