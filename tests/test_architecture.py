@@ -107,8 +107,6 @@ def test_only_fs_opens_files_for_writing() -> None:
             if not isinstance(node, ast.Call):
                 continue
             name = getattr(node.func, "attr", getattr(node.func, "id", ""))
-            if getattr(getattr(node.func, "value", None), "id", "") == "archive":
-                continue  # a member of a zip that fs or a stream holds
             modes = [
                 a.value
                 for a in (*node.args, *(k.value for k in node.keywords if k.arg == "mode"))
