@@ -11,6 +11,7 @@ import re
 import select
 import socket
 import sys
+from pathlib import Path
 
 import pypdfium2
 import pytest
@@ -20,7 +21,7 @@ from server.report.pdf import PdfMissing, render_pdf
 from server.services import report_links
 from server.storage.tables import audit, now, report_link
 from tests.server import analysed
-from tests.server.clinic import Clinic
+from tests.server.clinic import Clinic, open_clinic
 from tests.server.pages.test_pages import page, visit
 
 pytestmark = pytest.mark.anyio
@@ -161,6 +162,24 @@ def test_without_the_library_the_answer_says_what_to_install(monkeypatch: pytest
     with pytest.raises(PdfMissing, match=r"sagittal\[pdf\].*libpango") as refused:
         render_pdf("<p>Nothing</p>")
     assert refused.value.status == 501
+
+
+async def test_who_asks_for_a_pdf_is_written_down_and_told_when_its_process_dies(tmp_path: Path) -> None:
+    async with open_clinic(tmp_path, child_memory_bytes=1_000_000) as small:
+        patient, session = await visit(small, "S-6")
+        report = await sign(small, session)
+        addresses = (
+            f"/sessions/{session}/report.pdf",
+            f"/sessions/{session}/leaflet.pdf",
+            f"/patients/{patient}/course.pdf",
+            f"/signed-reports/{report}/report.pdf",
+        )
+        async with small.client("viewer") as client:
+            answers = [await client.get(address) for address in addresses]
+        with small.db.read() as c:
+            rows = c.execute(sa.select(audit.c.action).filter_by(user_name="viewer")).scalars().all()
+    assert {a.status_code for a in answers} == {503}, answers[0].text
+    assert rows == ["report.opened", "leaflet.opened", "course.opened", "signed_report.opened"]
 
 
 @pytest.mark.slow
