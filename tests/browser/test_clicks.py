@@ -91,8 +91,9 @@ def test_a_live_recording_with_known_sensors_starts_by_ten_clicks(
         hand = Hand()
         page.goto(f"/patients/{patient}")
         hand.click(page.get_by_role("link", name="New session").first)
-        page.wait_for_load_state()  # its script is there
+        page.wait_for_url(re.compile(r"/sessions/new$"))  # loaded: its script is there
         hand.click(page.get_by_role("button", name="Record live"))
+        page.wait_for_url(re.compile(r"/live$"))
         hand.click(page.get_by_role("button", name="Open for the tablet"))
         with page.expect_popup() as opening:
             hand.click(page.get_by_role("link", name="Use this device"))

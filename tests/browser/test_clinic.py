@@ -35,6 +35,7 @@ def test_signing_out_ends_the_sign_in(opened: Opener, running: RunningServer) ->
     page.get_by_label("User name").fill("anna")
     page.get_by_label("Password").fill(PASSWORD)
     page.get_by_role("button", name="Sign in").click()
+    page.wait_for_url(re.compile(r":\d+/account$"))  # loaded: its button works
     page.get_by_role("button", name="Sign out").click()
     page.wait_for_url(re.compile(r"/sign-in$"))
     page.goto("/patients")
@@ -86,6 +87,7 @@ def test_another_mapping_runs_the_analysis_again(
         filling.analyse(client, session, wrong)
     page = opened(f"/sessions/{session}/data")
     page.get_by_role("link", name="Change mapping").click()
+    page.wait_for_url(re.compile(r"/upload$"))
     page.get_by_role("button", name="Swap left and right").click()
     page.get_by_role("button", name="Analyse").click()
     page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), wait_until="commit")
@@ -125,6 +127,7 @@ def test_a_waiting_job_is_shown_live_and_can_be_cancelled(
         # no reload by us: the page hears of the end by itself
         expect(page.locator("h3")).to_have_text("The analysis was cancelled")
     page.get_by_role("link", name="Check sensors").click()
+    page.wait_for_url(re.compile(r"/upload$"))
     page.get_by_role("button", name="Analyse").click()
     expect(page.locator("gait-view")).to_be_visible(timeout=60_000)
 

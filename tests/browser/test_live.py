@@ -89,6 +89,7 @@ def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(
 
     page = opened(f"/patients/{patient['id']}/sessions/new")
     page.get_by_role("button", name="Record live").click()
+    page.wait_for_url(re.compile(r"/live$"))  # loaded: its button works
     page.get_by_role("button", name="Open for the tablet").click()
     expect(page.locator("[data-code]")).to_have_text(re.compile(r"^\w{3} \w{3}$"))
     with tablet(flat, network.url) as device:

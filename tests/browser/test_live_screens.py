@@ -293,6 +293,7 @@ def test_a_code_is_shown_in_two_groups_and_a_second_page_asks_for_a_new_one(
     page = context.new_page()
     page.goto(f"/sessions/{session}")
     page.get_by_role("link", name="Record live").click()
+    page.wait_for_url(re.compile(r"/live$"))  # loaded: its button works
     page.get_by_role("button", name="Open for the tablet").click()
     expect(page.locator("[data-code]")).to_have_text(re.compile(r"^[2-9A-Z]{3} [2-9A-Z]{3}$"))
     expect(page.locator("[data-code-left]")).to_have_text(re.compile("Valid for 09:"))

@@ -30,6 +30,7 @@ def walker(running: RunningServer) -> str:
 def test_a_prescription_is_written_changed_and_ended(opened: Opener, walker: str) -> None:
     page = opened(f"/patients/{walker}")
     page.get_by_role("link", name="Prescribe").click()
+    page.wait_for_url(re.compile(r"/prescription$"))
     # one choice says it all; the rest waits behind "More"
     summary = page.locator("[data-summary]")
     expect(summary).to_have_text(
@@ -68,6 +69,7 @@ def test_a_prescription_is_written_changed_and_ended(opened: Opener, walker: str
     expect(card).to_contain_text("a bar, a tone outside the zone")
     expect(card).to_contain_text("after every 30, 10 without")
     card.get_by_role("link", name="Change").click()
+    page.wait_for_url(re.compile(r"/prescription$"))
     expect(page.get_by_role("checkbox", name="Tone")).to_be_checked()
     expect(page.get_by_label("Ends after")).to_have_value("")
     page.get_by_label("Parameter", exact=True).select_option("stance_pct")
@@ -91,6 +93,7 @@ def test_a_prescription_is_written_changed_and_ended(opened: Opener, walker: str
 def test_without_a_walk_only_an_entered_target_can_be_chosen(opened: Opener, filled: Filled) -> None:
     with_nothing = opened("/patients")
     with_nothing.get_by_role("link", name="P-0043").click()
+    with_nothing.wait_for_url(re.compile(r"/patients/[0-9a-f]{32}$"))
     patient = with_nothing.url.rsplit("/", 1)[1]
     page = opened(f"/patients/{patient}/prescription")
     page.get_by_text("More: side, target").click()

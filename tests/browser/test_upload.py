@@ -127,6 +127,7 @@ def _new_session(page: Page) -> None:
     dialog.get_by_role("button", name="Add patient").click()
     page.wait_for_url(re.compile(r"/patients/[0-9a-f]{32}$"))
     page.get_by_role("link", name="New session").first.click()
+    page.wait_for_url("**/sessions/new")  # loaded: its script is there
     page.get_by_role("button", name="Upload a recording").click()
     page.wait_for_url("**/upload")
 

@@ -89,7 +89,9 @@ def test_a_programme_is_started_linked_to_its_visits_and_ended(
     patient, session = newcomer
     page = opened(f"/patients/{patient}")
     page.get_by_role("link", name="Plan a programme").click()
-    page.wait_for_load_state()  # a click before the scripts are there opens nothing
+    page.wait_for_url(
+        re.compile(r"/programme$")
+    )  # loaded: before its scripts are there a click opens nothing
     page.get_by_role("button", name="Start programme").click()
     today = dt.datetime.now(dt.UTC).date()
     page.get_by_label("Day of the first training").fill(today.isoformat())
@@ -109,6 +111,7 @@ def test_a_programme_is_started_linked_to_its_visits_and_ended(
     row = page.locator(".results tbody tr", has_text="First walk")
     expect(row).to_contain_text("T1 · ")
     page.get_by_role("link", name="Plan", exact=True).click()
+    page.wait_for_url(re.compile(r"/programme$"))
     page.get_by_role("button", name="End programme").click()
     page.locator("dialog[open]").get_by_role("button", name="End programme").click()
     page.wait_for_url(re.compile(rf"/patients/{patient}$"))
