@@ -43,17 +43,17 @@ class Compression:
             await self.app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        takes_gzip = accepts_gzip(headers.get("accept-encoding", "")) and not is_cross_site(headers)
+        takes_gzip = accepts("gzip", headers.get("accept-encoding", "")) and not is_cross_site(headers)
         await self.app(scope, receive, _Answer(send, takes_gzip).pass_on)
 
 
-def accepts_gzip(accept_encoding: str) -> bool:
-    """Whether an Accept-Encoding header (RFC 9110 §12.5.3) allows gzip."""
+def accepts(encoding: str, accept_encoding: str) -> bool:
+    """Whether an Accept-Encoding header (RFC 9110 §12.5.3) allows an encoding, such as gzip or br."""
     allowed = {}
     for part in accept_encoding.lower().replace(" ", "").split(","):
         name, _, weight = part.partition(";q=")
         allowed[name] = weight.strip("0.") != "" or not weight
-    return allowed.get("gzip", allowed.get("*", False))
+    return allowed.get(encoding, allowed.get("*", False))
 
 
 def is_compressible(status: int, headers: Headers) -> bool:

@@ -21,16 +21,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
-import hashlib
 import math
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Any, cast
 
-import viser
 from fastapi import APIRouter, FastAPI, Query, Request, WebSocket
-from fastapi.responses import HTMLResponse, RedirectResponse
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from sqlalchemy import Connection
 from starlette.status import WS_1008_POLICY_VIOLATION
 from starlette.websockets import WebSocketDisconnect
@@ -41,6 +38,7 @@ from core.formats.json_tree import read_json
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.http.compression import accepts
 from server.http.headers import KEPT
 from server.http.problems import Problem, as_problem
 from server.report.bundle import read_poses
@@ -49,6 +47,7 @@ from server.services import analyses, comparisons, edit_log, patients, sessions
 from server.services.histories import AnalysedSession
 from server.services.patients import Patient
 from server.storage.blobs import BlobStore
+from server.viewer.client import client_page, client_version, find_packed_page
 from server.viewer.ghost import match_ghost
 from server.viewer.motion import GhostName, ReplayMotion, prepare_motion
 from server.viewer.pipe import (
@@ -74,9 +73,6 @@ Its WebAssembly for point clouds would also evaluate strings; we show none, so t
 browser's console says so once.
 """
 
-_HIDE_PANEL = "<style>.mantine-Paper-root,.mantine-Notifications-root{display:none!important}</style>"
-_TAKE_ADDRESS = "<script>history.replaceState(null, '', `/views/${location.hash.slice(1)}/`)</script>"
-"""Before viser's scripts: the page is the same for all views; its client asks for the pipe at its address."""
 _GONE = 4404
 """Close code: the view is not there (any more); the page around should connect again."""
 
@@ -99,23 +95,6 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 router = APIRouter(lifespan=_lifespan, include_in_schema=False)
 
 
-@functools.cache
-def client_page() -> str:
-    """Viser's client page from its wheel, without the control panel, which has no switch of its own."""
-    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
-    head, found, body = page.partition("</head>")
-    start, opened, scripts = head.partition("<head>")
-    if not (found and opened):
-        raise RuntimeError("viser's client page has no head; this version of viser is not supported.")
-    return f"{start}{opened}{_TAKE_ADDRESS}{scripts}{_HIDE_PANEL}{found}{body}"
-
-
-@functools.cache
-def client_version() -> str:
-    """What stands in the address of the client page: another one when the page is."""
-    return hashlib.sha256(client_page().encode()).hexdigest()[:16]
-
-
 @router.get("/views/{view_id}/")
 def page(view_id: str, who: Reader, request: Request) -> RedirectResponse:
     """Lead to the document of the 3D view, which learns from its fragment which view it shows."""
@@ -127,12 +106,14 @@ def page(view_id: str, who: Reader, request: Request) -> RedirectResponse:
 
 
 @router.get("/views/client/{version}", dependencies=[require(Action.LOAD_ASSET)])
-def client(version: str) -> HTMLResponse:
+def client(version: str, request: Request) -> Response:
     """The document of every 3D view; the address of an earlier version gets the present one."""
     kept = KEPT if version == client_version() else "no-cache"
-    return HTMLResponse(
-        client_page(), headers={"Content-Security-Policy": CONTENT_POLICY, "Cache-Control": kept}
-    )
+    headers = {"Content-Security-Policy": CONTENT_POLICY, "Cache-Control": kept, "Vary": "Accept-Encoding"}
+    packed = find_packed_page() if accepts("br", request.headers.get("accept-encoding", "")) else None
+    if packed is None:
+        return HTMLResponse(client_page(), headers=headers)
+    return HTMLResponse(packed, headers={**headers, "Content-Encoding": "br"})
 
 
 @router.websocket("/views/{view_id}")

@@ -13,7 +13,7 @@ import httpx
 import pytest
 from starlette.types import Receive, Scope, Send
 
-from server.http.compression import LONG_BYTES, Compression, accepts_gzip
+from server.http.compression import LONG_BYTES, Compression, accepts
 from server.services import analyses, patients, recordings, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic, open_clinic
@@ -184,4 +184,4 @@ async def test_the_first_part_of_a_page_is_readable_before_the_last_is_made() ->
     ],
 )
 def test_gzip_goes_to_those_who_take_it(header: str, expected: bool) -> None:
-    assert accepts_gzip(header) is expected
+    assert accepts("gzip", header) is expected

@@ -123,9 +123,10 @@ async def test_page_is_served_to_its_own_sign_in_only_and_with_its_own_policy(wa
         src = str(opened["src"])
         led = await client.get(src, headers=headers)
         assert led.headers["location"].endswith(f"#{opened['view']}")
-        page = await client.get(led.headers["location"])  # no data of anybody: kept by browsers
+        gzip = {"Accept-Encoding": "gzip"}
+        page = await client.get(led.headers["location"], headers=gzip)  # no data of anybody: kept by browsers
         assert page.headers["cache-control"].endswith("immutable")
-        older = await client.get("/views/client/0123")
+        older = await client.get("/views/client/0123", headers=gzip)
         assert older.headers["cache-control"] == "no-cache"
         assert older.text == page.text
         assert "frame-ancestors 'self'" in page.headers["content-security-policy"]

@@ -16,8 +16,8 @@ from viser.infra import _infra
 
 from server.viewer import pipe
 from server.viewer.batches import DrawnBatch, move_copies
+from server.viewer.client import client_page, unpack_page
 from server.viewer.motion import ReplayMotion, prepare_motion
-from server.viewer.proxy import client_page
 from server.viewer.views import FigureViews
 from tests.server import walk
 
@@ -33,6 +33,21 @@ def test_client_page_is_one_file_without_anything_from_elsewhere() -> None:
 def test_panel_is_hidden_before_the_head_ends() -> None:
     page = client_page()
     assert page.index(".mantine-Paper-root") < page.index("</head>")
+
+
+def test_the_client_can_be_unpacked() -> None:
+    page = client_page()
+    plain = unpack_page(page)
+    assert plain is not None, "viser packs its client in another way: server/viewer/client.py must follow"
+    style = re.search(r'data-ss="(\d+)" data-cs="(\d+)"', page)
+    assert style is not None
+    shown = re.search(
+        r'<style>(.*?)</style><script type="text/plain" id="client">(.*?)</script>', plain, re.DOTALL
+    )
+    assert shown is not None
+    assert [len(part.encode()) for part in shown.groups()] == [int(n) for n in style.groups()]
+    assert "data-p=" not in plain
+    assert unpack_page("<head><script>another()</script></head>") is None
 
 
 def test_message_types_keep_their_names() -> None:
