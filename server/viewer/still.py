@@ -21,6 +21,8 @@ from server.viewer.shapes import Mesh
 HEIGHT_PX: Final = 116
 WIDEST_PX: Final = 92
 CSS: Final[dict[Tint, str]] = {"left": "st-l", "right": "st-r", "body": "st-b", "ring": "st-g"}
+FAINT: Final = "st-f"
+"""Of what no sensor measured."""
 
 
 def draw_still(poses: Poses, t_s: float, near: Side, title: str) -> str | None:
@@ -46,7 +48,7 @@ def draw_still(poses: Poses, t_s: float, near: Side, title: str) -> str | None:
         for k, (tint, measured) in enumerate(zip(batch.tint, batch.measured, strict=True)):
             for points in _split(batch.mesh):
                 outline, depth = _project(points @ turns[k].T + batch.position[0, k], front, near)
-                parts.append((depth, CSS[tint] + ("" if measured else " st-f"), outline))
+                parts.append((depth, CSS[tint] if measured else f"{CSS[tint]} {FAINT}", outline))
     parts.sort(key=lambda part: -part[0])
     return _write([(css, outline) for _, css, outline in parts if len(outline)], title)
 

@@ -11,7 +11,7 @@ from typing import Final
 from tests.data import ROOT
 
 WEB: Final = ROOT / "web"
-SOURCES: Final = (WEB, ROOT / "server" / "report")
+SOURCES: Final = (WEB, ROOT / "server" / "report", ROOT / "server" / "viewer")
 ANY: Final = "\0"
 """Stands in a text for what is only known at run time: in the name of a class the letter of a side (l, r, b)
 or nothing."""

@@ -44,7 +44,7 @@ async def test_a_table_is_described_once_and_its_shape_is_known_from_then_on(cli
         assert (refused.status_code, refused.json()["code"]) == (422, "rate_missing")
         source = shape["source"] | {"rate_hz": 100}
         (check,) = (await client.post(f"{at}/tables/checks", json=ask | {"source": source})).json()
-        assert check["sensor"] == "one_lf"
+        assert check["sensor"] == "foot_l"
         assert check["rate_hz"] == 100.0
         assert check["at_rest_mps2"] == pytest.approx(GRAVITY, abs=0.1)
         assert check["problems"] == []
@@ -55,7 +55,7 @@ async def test_a_table_is_described_once_and_its_shape_is_known_from_then_on(cli
         answer = await client.put(f"{at}/tables", json={"files": list(files), "source": source})
         manifest = answer.json()["manifest"]
         given = [SourceFile.of_bytes(name, data) for name, data in files.items()]
-        assert list(read_recording(given, manifest_of(manifest)).streams) == ["one_lf", "two_rf"]
+        assert list(read_recording(given, manifest_of(manifest)).streams) == ["foot_l", "foot_r"]
         (shape,) = (await client.get(f"{at}/tables")).json()
         assert (shape["basis"], list(shape["source"]["columns"])) == ("said", ["*"])
 
