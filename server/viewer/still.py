@@ -7,9 +7,6 @@ from html import escape
 from typing import Final
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, QhullError
 
 from core.body.poses import Poses
 from core.frames import Floats, Side
@@ -56,11 +53,13 @@ def draw_still(poses: Poses, t_s: float, near: Side, title: str) -> str | None:
 def _split(mesh: Mesh) -> Iterator[Floats]:
     """The vertices of each closed surface of a mesh."""
     vertices, faces = mesh
-    a, b = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
-    joined = coo_array((np.ones(len(a)), (a, b)), shape=(len(vertices), len(vertices)))
-    count, which = connected_components(joined, directed=False)
-    for k in range(count):
-        yield vertices[which == k].astype(np.float64)
+    surface, before = np.arange(len(vertices)), None
+    while before is None or (surface != before).any():  # each vertex takes the least number of its faces
+        before = surface
+        surface = surface.copy()
+        np.minimum.at(surface, faces, before[faces].min(axis=1)[:, None])
+    for k in np.unique(surface):
+        yield vertices[surface == k].astype(np.float64)
 
 
 def _project(points: Floats, front: Floats, near: Side) -> tuple[Floats, float]:
@@ -68,11 +67,27 @@ def _project(points: Floats, front: Floats, near: Side) -> tuple[Floats, float]:
     along = front / np.linalg.norm(front) * (1.0 if near == "right" else -1.0)
     away = np.array([-along[1], along[0]])  # to the left of who looks along `along`
     flat = np.column_stack((points[:, :2] @ along, points[:, 2]))
-    try:
-        outline = flat[ConvexHull(flat).vertices]
-    except QhullError:
-        outline = flat[:0]
-    return outline, float((points[:, :2] @ away).mean())
+    return find_hull(flat), float((points[:, :2] @ away).mean())
+
+
+def find_hull(points: Floats) -> Floats:
+    """The convex hull (m, 2) of points (n, 2), counter-clockwise from the leftmost; none of points on a line.
+
+    A. M. Andrew 1979, doi:10.1016/0020-0190(79)90072-3. The web process draws, and scipy is not loaded there.
+    """
+    ordered = np.unique(points, axis=0).tolist()
+    hull: list[list[float]] = []
+    for way in (ordered, ordered[::-1]):
+        begun = len(hull)
+        for x, y in way:
+            while len(hull) - begun > 1:
+                (x1, y1), (x2, y2) = hull[-2:]
+                if (x2 - x1) * (y - y1) > (y2 - y1) * (x - x1):
+                    break
+                hull.pop()
+            hull.append([x, y])
+        hull.pop()  # where the other way begins
+    return np.array(hull if len(hull) > 2 else []).reshape(-1, 2)
 
 
 def _write(parts: list[tuple[str, Floats]], title: str) -> str:

@@ -195,7 +195,7 @@ def test_a_form_is_kept_when_the_sign_in_ends_and_its_end_is_told_before(
     page.wait_for_url(re.compile(r":\d+/patients$"))
     page.wait_for_load_state()
     page.get_by_role("button", name="New patient").first.click()
-    page.get_by_label("Code", exact=True).fill("KEPT-1")
+    page.locator("#new-patient").get_by_label("Code", exact=True).fill("KEPT-1")
     page.get_by_label("Note", exact=True).fill("Long and carefully written.")
     # two minutes before the end it is told; whoever stays is asked of the server, which counts it
     soon = page.locator("#sign-out-soon")
@@ -227,7 +227,7 @@ def test_a_form_is_kept_when_the_sign_in_ends_and_its_end_is_told_before(
     expect(page.locator("h1")).to_contain_text("KEPT-1")
     # notes have their day
     page.wait_for_load_state()
-    page.get_by_role("button", name="Add", exact=True).click()
+    page.get_by_role("region", name="Notes").get_by_role("button", name="Add", exact=True).click()
     page.get_by_label("Note", exact=True).last.fill("Wants to walk to the bakery.")
     page.get_by_role("button", name="Add note").click()
     expect(page.locator(".notes")).to_contain_text("Wants to walk to the bakery.")

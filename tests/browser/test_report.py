@@ -38,7 +38,8 @@ def test_a_report_is_signed_shared_by_a_slip_with_a_code_and_reopened(opened: Op
     expect(outside.get_by_text("Longer steps.")).to_be_visible()
     said = outside.locator(".sheet").first.evaluate("s => getComputedStyle(s).width")
     assert said.startswith("793"), "its style came with it"
-    page.get_by_role("link", name="Done").click()
+    with page.expect_navigation():
+        page.get_by_role("link", name="Done").click()
     with page.expect_navigation():
         page.get_by_role("button", name="Revoke the link").click()
     outside.reload()

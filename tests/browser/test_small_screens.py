@@ -50,7 +50,7 @@ def test_forms_in_cards_keep_their_distance_from_the_edge(
     width, height = size
     for path, label in (
         (f"/patients/{filled.patient}/sessions/new", "Name of the visit"),
-        ("/account", "Present password"),
+        ("/account", "New password again"),
     ):
         page = opened(path, width=width, height=height)
         field = page.get_by_label(label)

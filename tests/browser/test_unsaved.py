@@ -34,7 +34,7 @@ def leave(page: Page) -> list[str]:
 def test_a_note_that_is_being_written_is_asked_for_before_the_page_goes(opened: Opener, patient: str) -> None:
     page = opened(f"/patients/{patient}")
     assert leave(page) == []
-    page.get_by_role("button", name="Add", exact=True).click()
+    page.get_by_role("region", name="Notes").get_by_role("button", name="Add", exact=True).click()
     text = page.locator("dialog[open] textarea")
     text.press_sequentially("Walks better")
     assert leave(page) == ["beforeunload"]
