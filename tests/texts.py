@@ -7,6 +7,7 @@ import functools
 import itertools
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -156,6 +157,7 @@ _CODE: Final = frozenset(
 """Calls whose arguments are no words."""
 
 
+@cache
 def list_messages() -> dict[str, list[str]]:
     """Every message of the sources → the files it stands in."""
     found: dict[str, list[str]] = {}

@@ -59,6 +59,7 @@ def test_steps_are_wider_by_what_standing_was_wider() -> None:
         assert width(analysed(0.3), side) - width(analysed(0.1), side) == pytest.approx(0.2, abs=0.03)
 
 
+@pytest.mark.slow
 def test_it_changes_no_angle_beyond_its_zero() -> None:
     narrow, wide = analysed(0.1).angles, analysed(0.3).angles
     assert narrow is not None

@@ -18,6 +18,8 @@ from core.rotation import about, angle_between, exp, multiply, normalise
 from core.simulate import WalkTruth
 from tests.walks import analysed, simulated
 
+pytestmark = pytest.mark.slow
+
 LAG_S = -3.2
 TURN = about(2, np.radians(4.0))
 

@@ -119,6 +119,7 @@ def test_drift_correction_leaves_a_short_walk_alone() -> None:
         assert np.array_equal(q, estimate_orientations(take, NO_DRIFT).q[segment])
 
 
+@pytest.mark.slow
 def test_drift_correction_does_not_change_flexion() -> None:
     take = calibrated("five_minutes")
     held = measure_angles(estimate_orientations(take), take.calibration.zero).angles

@@ -56,6 +56,7 @@ def work(clinic: Clinic, session: str, made: SquatSimulation, *others: SourceFil
     return told
 
 
+@pytest.mark.slow
 async def test_both_legs_against_themselves_and_against_a_reference(
     clinic: Clinic, made: SquatSimulation
 ) -> None:

@@ -95,6 +95,7 @@ async def test_signing_in_needs_a_code_that_works_once(clinic: Clinic, clock: At
     assert (await sign_in(clinic, "clinician", totp.at(clock.s))).status_code == 200
 
 
+@pytest.mark.slow
 async def test_it_is_removed_by_oneself_an_administrator_or_the_console(
     clinic: Clinic, clock: At, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -57,6 +57,7 @@ def check_name(path: str, schema: Any) -> None:
     assert required <= given <= set(rule.entities)
 
 
+@pytest.mark.slow
 def test_names_fields_columns_and_counts_are_those_of_the_standard() -> None:
     schema = bids_schema.load_schema()
     files = written(open_walk())

@@ -37,6 +37,7 @@ def codes(value: Any) -> set[str]:
     return set().union(*(codes(x) for x in value)) if isinstance(value, list) else set()
 
 
+@pytest.mark.slow
 def test_the_bundle_is_valid_whole_and_holds_every_value() -> None:
     content = open_walk()
     found = resources(content)

@@ -93,6 +93,7 @@ def contents(clinic: Clinic) -> set[bytes]:
     return {f.path.read_bytes() for f in clinic.blobs.files()}
 
 
+@pytest.mark.slow
 def test_a_backup_under_load_comes_back_whole(clinic: Clinic, key: ClinicKey | None) -> None:
     stop = threading.Event()
 
@@ -266,6 +267,7 @@ def test_days_weeks_and_months_are_kept() -> None:
     assert choose_kept(kept) == set(kept)
 
 
+@pytest.mark.slow
 def test_commands_make_prune_try_and_restore(
     clinic: Clinic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
