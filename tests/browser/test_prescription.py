@@ -81,6 +81,7 @@ def test_a_prescription_is_written_changed_and_ended(opened: Opener, walker: str
     expect(page.get_by_role("alert")).to_contain_text("target.sd is 0. Expected more than 0")
     page.get_by_label("SD, %").fill("1.5")
     page.get_by_role("button", name="Prescribe").click()
+    page.wait_for_url(re.compile(rf"/patients/{walker}$"))  # with the script that opens its dialog
     expect(card).to_contain_text("63.5 ± 1.5\u202f%, entered")
     card.get_by_text("Ended before (1)").click()
     expect(card.get_by_role("listitem")).to_contain_text(f"Step length, {worse}")
