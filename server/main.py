@@ -37,6 +37,11 @@ def _run(command: str, given: dict[str, object]) -> int:
     except SettingsError as error:
         sys.stderr.write(f"{error}\n")
         return 2
+    except OSError as error:
+        if error.filename is None:
+            raise  # of no file: nothing that a person could put right by its name
+        sys.stderr.write(f"{error.filename}: {error.strerror}. Check the path, its rights and the disk.\n")
+        return 1
     except KeyboardInterrupt:
         return 130
 
@@ -70,7 +75,7 @@ def _parser() -> argparse.ArgumentParser:
     p = add("export", "Write the results of an analysis for another program (docs/exports.md).")
     p.add_argument("folder", type=Path, metavar="DIR", help="results of `sagittal analyse`")
     p.add_argument("--as", dest="kind", required=True, metavar="FORMAT", help="xlsx, csv … (docs/exports.md)")
-    p.add_argument("--out", type=Path, metavar="FILE", help="default: export.<ending> beside the results")
+    p.add_argument("--out", type=Path, metavar="FILE", help="default: export-<format>.<ending> there")
     p.add_argument("--code", default="", help="pseudonym of the person, letters and digits")
     p = add("study", "Analyse every recording of a folder: one table of strides and one of takes.")
     p.add_argument("folder", type=Path, metavar="DIR", help="recordings in any layout, BIDS too")

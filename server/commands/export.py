@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from core.errors import SagittalError
+from core.errors import InputError, SagittalError
 from server.storage import fs
 
 
@@ -14,14 +14,20 @@ def export(folder: Path, kind: str, out: Path | None, code: str) -> int:
 
     Parameters
     ----------
-    out : file to write, None = `export.<ending>` in that folder. code : pseudonym of the person.
+    out : file to write, None = `export-<format>.<ending>` in that folder. code : pseudonym of the person.
     """
     from server.export.content import VisitFacts, open_content
-    from server.export.kinds import find_kind, write_export
+    from server.export.kinds import EXPORTED, find_kind, write_export
     from server.services.provenance import CODE_VERSION
     from server.viewer import recorded_walk  # noqa: F401 - registers what is drawn
 
     try:
+        ending = find_kind(kind).ending
+        if not (folder / "analysis.json").is_file():
+            raise InputError(
+                "no_results",
+                f"{folder} holds no analysis.json; give the folder that `sagittal analyse` wrote.",
+            )
         readers = {path.name: path.read_bytes for path in sorted(folder.glob("*")) if path.is_file()}
         content = open_content(
             readers, VisitFacts(subject=code or "anonymous", code=code, version=CODE_VERSION)
@@ -30,7 +36,7 @@ def export(folder: Path, kind: str, out: Path | None, code: str) -> int:
     except SagittalError as error:
         sys.stderr.write(f"No export ({error.code}): {error.message}\n")
         return 1
-    target = folder / f"export.{find_kind(kind).ending}" if out is None else out
+    target = folder / f"{EXPORTED}{kind}.{ending}" if out is None else out
     fs.make_folder(target.parent)
     fs.write_file(target, written)
     sys.stdout.write(f"Written: {target}\n")

@@ -12,6 +12,7 @@ import pytest
 from core.formats.source import SourceFile
 from server.commands.export import export
 from server.jobs.queue import EXPORT
+from server.main import main
 from server.services import analyses, exports
 from tests.server import analysed
 from tests.server.clinic import Clinic
@@ -97,7 +98,12 @@ def test_the_command_line_writes_the_same_from_a_folder(tmp_path: Any, capsys: A
     for name, content in analysed.files().items():
         (tmp_path / name).write_bytes(content)
     assert export(tmp_path, "csv", None, "p1") == 0
-    names = zipfile.ZipFile(tmp_path / "export.zip").namelist()
+    assert export(tmp_path, "opensim", None, "p1") == 0
+    names = zipfile.ZipFile(tmp_path / "export-csv.zip").namelist()
     assert "strides_long.csv" in names
+    assert zipfile.ZipFile(tmp_path / "export-opensim.zip").namelist() != names
     assert export(tmp_path / "nowhere", "csv", None, "p1") == 1
-    assert "analysis.json is missing" in capsys.readouterr().err
+    assert "holds no analysis.json" in capsys.readouterr().err
+    words = ["export", str(tmp_path), "--as", "csv", "--out", str(tmp_path / "analysis.json" / "x.zip")]
+    assert main(words) == 1
+    assert "Check the path" in capsys.readouterr().err
