@@ -21,12 +21,13 @@ _STANDARD: Final = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asc
 
 
 def start_log(settings: Settings, handler: logging.Handler | None = None) -> None:
-    """Log to stderr in the format of the settings: what we do, and of the migrations only what goes wrong."""
+    """Log to stderr in the format of the settings: what we do, and of these libraries only what goes wrong."""
     handler = handler or logging.StreamHandler()
     handler.addFilter(_add_request_id)
     handler.setFormatter(JsonLines() if settings.log_format == "json" else _Lines())
     logging.basicConfig(level=logging.INFO, handlers=[handler])
-    logging.getLogger("alembic").setLevel(logging.WARNING)
+    for library in ("alembic", "weasyprint", "fontTools"):
+        logging.getLogger(library).setLevel(logging.WARNING)
 
 
 class JsonLines(logging.Formatter):
