@@ -21,7 +21,7 @@ _STANDARD: Final = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asc
 
 
 def start_log(settings: Settings, handler: logging.Handler | None = None) -> None:
-    """Log to stderr in the format of the settings: what we do, and of these libraries only what goes wrong."""
+    """Log to stderr in the format of the settings: what we do, and what goes wrong in some libraries."""
     handler = handler or logging.StreamHandler()
     handler.addFilter(_add_request_id)
     handler.setFormatter(JsonLines() if settings.log_format == "json" else _Lines())
