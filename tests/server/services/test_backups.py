@@ -246,7 +246,15 @@ def test_a_key_opens_only_its_own_and_a_public_one_only_encrypts(clinic: Clinic,
 
 def test_what_a_backup_of_another_make_may_not_do(clinic: Clinic, tmp_path: Path) -> None:
     made = make(clinic)
-    for change in ("newer", "outside", "link"):
+    sparse = {"GNU.sparse.size": "1000000000000", "GNU.sparse.map": "0,1"}
+    words = {
+        "newer": "reads 1",
+        "outside": "no backup does",
+        "link": "which is no file",
+        "sparse": "which is no file",
+        "no numbers": CUT,
+    }
+    for change, said in words.items():
         bad = tmp_path / f"{change}.tar"
         with tarfile.open(bad, "w") as tar:
             for name, size, content in read_archive(made.path, None):
@@ -257,9 +265,12 @@ def test_what_a_backup_of_another_make_may_not_do(clinic: Clinic, tmp_path: Path
                 member.size = len(data)
                 if change == "link":
                     member.type, member.linkname, member.size = tarfile.SYMTYPE, "/etc/passwd", 0
+                if change == "sparse":
+                    member.pax_headers = sparse
+                if change == "no numbers":
+                    member.pax_headers = sparse | {"GNU.sparse.map": "a,b"}
                 tar.addfile(member, io.BytesIO(data))
-        words = {"newer": "reads 1", "outside": "no backup does", "link": "which is no file"}[change]
-        with pytest.raises((RestoreError, BackupFileError), match=words):
+        with pytest.raises((RestoreError, BackupFileError), match=said):
             try_restore(bad, clinic.settings, None)
 
 
