@@ -8,6 +8,7 @@ absolute or parent paths, no links, no encryption).
 from __future__ import annotations
 
 import io
+import lzma
 import stat
 import struct
 import zipfile
@@ -26,6 +27,7 @@ _CHUNK = 1 << 20
 _DAMAGE = (
     zipfile.BadZipFile,
     zlib.error,
+    lzma.LZMAError,
     struct.error,
     EOFError,
     OSError,
@@ -38,7 +40,8 @@ EPISODE_MARK: Final = "sagittal-episode.json"
 """At the root of a zip: an archive of a visit; the recording lies in a folder, the rest came out of it."""
 EPISODE_RECORDING: Final = "recording/"
 EPISODE_MANIFEST: Final = "sagittal-manifest.json"
-"""What the analysis was told beside the recording's own files; it goes before a manifest among these."""
+"""What the analysis was told beside the recording's own files, and goes before a manifest among these. An
+archive that was analysed and archived again has that of every generation, the newest first."""
 EPISODE_CONFIG: Final = "config.json"
 _MOST_CONFIG: Final = 1_000_000
 _RATIO_FLOOR = 1 << 20
@@ -134,10 +137,11 @@ def _members(name: str, data: bytes, limits: ArchiveLimits) -> list[SourceFile]:
     ]
     if EPISODE_MARK not in {f.name for f in found}:
         return found
-    return [
+    told = [f for f in found if f.name == EPISODE_MANIFEST]
+    return told + [
         SourceFile(f.name.removeprefix(EPISODE_RECORDING), f.size, f.read, f.opener)
         for f in found
-        if f.name.startswith(EPISODE_RECORDING) or f.name == EPISODE_MANIFEST
+        if f.name.startswith(EPISODE_RECORDING)
     ]
 
 

@@ -83,7 +83,7 @@ def read_recording(
 def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload: _Upload) -> Manifest | None:
     """The manifest has to be known before tables can be read."""
     for member in members:
-        if member.name == EPISODE_MANIFEST:
+        if member.name.rsplit("/", 1)[-1] == EPISODE_MANIFEST:
             told = parse_manifest(member.read())
             given = told if given is None else given.complete_from(told)
             upload.sidecars.add(member.name)

@@ -51,7 +51,7 @@ def delete_session(
     reviewed: Reviewed,
     settings: Config,
     hub: LiveHub,
-    who: Annotated[Identity, require(Action.WRITE_SESSION)],
+    who: Annotated[Identity, require(Action.DELETE_SESSION)],
 ) -> None:
     """Remove a session with its recordings and results, for ever; only the audit rows stay."""
     hub.drop_from_thread([session_id])

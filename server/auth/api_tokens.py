@@ -71,7 +71,7 @@ SCOPES: Final[Mapping[Scope, frozenset[Action]]] = {
     ),
     Scope.METRICS: frozenset({Action.READ_SYSTEM}),
 }
-"""What each scope allows; no scope deletes a patient, reads the audit log or touches accounts."""
+"""What each scope allows; no scope deletes a patient or a visit, reads the audit log or touches accounts."""
 
 
 def issue(

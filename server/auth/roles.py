@@ -34,6 +34,7 @@ class Action(StrEnum):
     READ_SESSION = "read_session"
     CREATE_SESSION = "create_session"
     WRITE_SESSION = "write_session"
+    DELETE_SESSION = "delete_session"
     UPLOAD = "upload"
     ANALYSE = "analyse"
     READ_RESULT = "read_result"
@@ -89,6 +90,7 @@ POLICY: dict[Action, frozenset[Role]] = {
     Action.READ_SESSION: _ALL,
     Action.CREATE_SESSION: _UPLOADERS,
     Action.WRITE_SESSION: _CLINICAL,
+    Action.DELETE_SESSION: _CLINICAL,
     Action.UPLOAD: _UPLOADERS,
     Action.ANALYSE: _CLINICAL,
     Action.READ_RESULT: _READERS,

@@ -67,17 +67,25 @@ def analyse_files(
         progress(stage, share)
 
     tell("reading", 0.0)
-    chosen = override_config(PipelineConfig(), config or _archived_config(files))
+    chosen = override_config(PipelineConfig(), choose_config(files, config))
     take = read_recording(files, parse_manifest(manifest) if manifest is not None else None)
     return analyse(take, chosen, tell, CODE_VERSION)
 
 
-def _archived_config(files: Sequence[SourceFile]) -> Mapping[str, Any]:
-    """Settings that came with an archive of a visit; none without one."""
+def choose_config(files: Sequence[SourceFile], config: Mapping[str, Any] | None) -> Mapping[str, Any]:
+    """The settings that were asked for, else those that came with an archive of a visit; none without one.
+
+    Raises
+    ------
+    ArchiveError
+        the archive is damaged, or its settings are no JSON.
+    """
     from core.errors import ArchiveError
     from core.formats.archive import read_episode_config
     from core.formats.json_tree import read_json
 
+    if config:
+        return config
     said = read_episode_config(files)
     try:
         found = {} if said is None else read_json(said)

@@ -67,7 +67,7 @@ def write_archive(
         for name, content in _originals(blobs, recording):
             add(name, content)
         add(EPISODE_MANIFEST, _json(found.manifest or {}))
-        add(EPISODE_CONFIG, _json(found.config))
+        add(EPISODE_CONFIG, _json(_settings(blobs, recording, found)))
         for name, blob in found.files.items():
             add(f"results/{name}", blobs.read(found.patient_id, blob.sha256))
         for name, content in report.items():
@@ -82,6 +82,15 @@ def write_archive(
             "sha256": dict(sha256),
         }
         add(EPISODE_MARK, _json(mark))
+
+
+def _settings(blobs: BlobStore, recording: StoredRecording, found: AnalysisRecord) -> Mapping[str, Any]:
+    """What the analysis was computed with, also where it came in an archive among the recording's files."""
+    from core.formats.source import SourceFile  # slow import
+    from server.services.analysing import choose_config
+
+    files = [SourceFile.of_path(blobs.path(recording.patient_id, f.sha256), f.name) for f in recording.files]
+    return choose_config(files, found.config)
 
 
 def _originals(blobs: BlobStore, recording: StoredRecording) -> Iterator[tuple[str, bytes]]:

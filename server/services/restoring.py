@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from sqlalchemy import Connection, delete, func, select
+from sqlalchemy import Connection, delete, func, select, update
 
 from core.formats.json_tree import read_json
 from server import audit
@@ -36,7 +36,7 @@ from server.storage.db import Database
 from server.storage.high_water import HighWater, read_newest, set_mark
 from server.storage.migrate import MigrationError, upgrade
 from server.storage.person_tables import api_token
-from server.storage.tables import login_session, one_time_token, patient, session
+from server.storage.tables import login_session, now, one_time_token, patient, report_link, session
 
 RESTORED: Final = "backup.restored"
 _OURS: Final = re.compile(
@@ -201,6 +201,7 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
             c.execute(delete(login_session))
             c.execute(delete(api_token))
             c.execute(delete(one_time_token))
+            c.execute(update(report_link).where(report_link.c.revoked_at.is_(None)).values(revoked_at=now()))
             detail = {"created_at": manifest.created_at.isoformat(), "erased_again": again}
             audit.record(c, None, RESTORED, "database", None, detail)
         with db.read() as c:

@@ -215,13 +215,15 @@ def _members(path: Path, file: BinaryIO) -> Generator[tuple[str, int, ArchivedFi
         with tarfile.open(fileobj=file, mode="r|") as tar:
             while (member := tar.next()) is not None:
                 tar.members = []  # type: ignore[attr-defined]  # it would remember each for ever
-                content = tar.extractfile(member) if member.isreg() else None
+                # a sparse one has its zeros for nothing: a few bytes would fill the disk
+                is_file = member.isreg() and not member.issparse()
+                content = tar.extractfile(member) if is_file else None
                 if content is None:
                     raise BackupFileError(
                         f"{path.name} holds {member.name}, which is no file; it is not ours."
                     )
                 yield member.name, member.size, ArchivedFile(content, path)
-    except (tarfile.TarError, EOFError) as error:
+    except (tarfile.TarError, EOFError, ValueError) as error:  # ValueError: a header of no numbers
         raise _damaged(path) from error
 
 

@@ -94,6 +94,12 @@ def test_damage_is_refused_wherever_it_is() -> None:
     data = zipped({"a.txt": bytes(range(256)) * 40})
     for cut in range(4, len(data), 23):
         refuse(data[:cut], "zip_bad")
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_LZMA) as archive:
+        archive.writestr("a.txt", bytes(range(256)) * 40)
+    broken = bytearray(packed.getvalue())
+    broken[60:70] = bytes(10)
+    refuse(bytes(broken), "zip_bad")
 
 
 def test_a_gzip_bomb_and_a_cut_gzip_are_refused() -> None:

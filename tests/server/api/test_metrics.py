@@ -27,6 +27,8 @@ async def test_figures_of_requests_jobs_parts_disk_and_backups(clinic: Clinic) -
         await admin.get(f"/api/v1/patients?search={CANARY}")
         await admin.get(f"/api/v1/patients/{made.json()['id']}")
         await admin.get(f"/nowhere/{CANARY}")
+        for method in ("MADEUP", "INVENTED"):
+            await admin.request(method, "/metrics")
         text = (await admin.get("/metrics")).text
         body = {"name": "Prometheus", "scopes": ["metrics"], "days": 365, "password": PASSWORD}
         token = (await admin.post("/api/v1/account/tokens", json=body)).json()["token"]
@@ -44,6 +46,8 @@ async def test_figures_of_requests_jobs_parts_disk_and_backups(clinic: Clinic) -
     one = ("method", "GET"), ("route", "/api/v1/patients/{patient_id}"), ("status", "200")
     assert found["sagittal_requests_total", *one] == 1
     assert found["sagittal_requests_total", ("method", "GET"), ("route", "none"), ("status", "404")] == 1
+    other = ("method", "other"), ("route", "/metrics"), ("status", "405")
+    assert found["sagittal_requests_total", *other] == 2
     assert found["sagittal_part_up", ("part", "database")] == 1
     assert found["sagittal_jobs", ("state", "queued")] == 0
     assert found["sagittal_backup_last_success_timestamp_seconds",] == at.timestamp()

@@ -53,6 +53,9 @@ async def test_a_token_does_what_its_scopes_and_its_person_may(clinic: Clinic) -
         path = f"{API}/patients/{made_patient.json()['id']}"
         gone = await client.request("DELETE", path, json={"confirm": "TK-2"})
         assert gone.status_code == 403
+        visit = (await client.post(f"{path}/sessions", json={"title": "Walk"})).json()["id"]
+        assert (await client.patch(f"{API}/sessions/{visit}", json={"title": "Run"})).status_code == 200
+        assert (await client.delete(f"{API}/sessions/{visit}")).status_code == 403
     with clinic.db.read() as c:
         row = c.execute(select(audit).where(audit.c.action == "patient.created")).all()[-1]
     assert (row.user_name, row.detail["token"]) == ("clinician", writer["id"])
@@ -97,5 +100,6 @@ def test_no_scope_reaches_accounts_audit_or_deletion() -> None:
     every = frozenset[Action]().union(*SCOPES.values())
     assert every <= set(POLICY)
     assert not every & {
-        Action.USE_ACCOUNT, Action.MANAGE_USERS, Action.READ_AUDIT, Action.DELETE_PATIENT, Action.RUN_LIVE,
+        Action.USE_ACCOUNT, Action.MANAGE_USERS, Action.READ_AUDIT, Action.DELETE_PATIENT,
+        Action.DELETE_SESSION, Action.RUN_LIVE,
     }  # fmt: skip

@@ -28,13 +28,17 @@ CONFIG = {"poses": {"least_valid": 0.7}}
 
 
 def visit(
-    store: BlobStore, files: Mapping[str, bytes], manifest: dict[str, Any], results: Mapping[str, bytes]
+    store: BlobStore,
+    files: Mapping[str, bytes],
+    manifest: dict[str, Any],
+    results: Mapping[str, bytes],
+    config: Mapping[str, Any] = CONFIG,
 ) -> bytes:
     """An archive of these original files."""
     kept = [RecordedFile(name, len(data), store.put(SPACE, data).sha256) for name, data in files.items()]
     recording = StoredRecording("r", "s", SPACE, "ready", tuple(kept), manifest, None, None)
     found = AnalysisRecord(
-        "a", "r", "s", SPACE, "j", "", "", "source", manifest, CONFIG, dt.datetime(2026, 1, 2, tzinfo=dt.UTC),
+        "a", "r", "s", SPACE, "j", "", "", "source", manifest, config, dt.datetime(2026, 1, 2, tzinfo=dt.UTC),
         {name: store.put(SPACE, data) for name, data in results.items()},
     )  # fmt: skip
     out = io.BytesIO()
@@ -86,6 +90,24 @@ def test_results_in_an_archive_are_not_read_as_recordings(tmp_path: Path) -> Non
     assert (
         visit(store, {"a.csv": table}, manifest, {"angles.parquet": b"PAR1", "strides.csv": table}) == archive
     )
+
+
+def test_an_archive_of_an_archive_has_its_settings_and_the_newest_manifest(tmp_path: Path) -> None:
+    table = b"acc_x,acc_y,acc_z\n" + b"0,0,9.81\n" * 10
+    columns = {"a": {"acc": ["acc_x", "acc_y", "acc_z"]}}
+    source = {"file": "a.csv", "rate_hz": 100, "acc_unit": "m/s2", "columns": columns}
+    store = BlobStore(tmp_path / "blobs")
+    first = {"sources": [source], "sensors": {"a": "pelvis"}, "subject": {"height_m": 1.7}}
+    archive = visit(store, {"a.csv": table}, first, {})
+    # somebody puts right who wears what, and it is handed on twice
+    for told in ({"sensors": {"a": "chest"}}, {}, {"protocol": "walk"}):
+        archive = visit(store, {"visit.zip": archive}, told, {}, {})
+    file = SourceFile.of_bytes("visit.zip", archive)
+    assert analysing.choose_config([file], None) == CONFIG
+    recording = read_recording([file])
+    assert dict(recording.segments) == {"a": "chest"}
+    assert recording.subject.height_m == 1.7
+    assert not recording.notices
 
 
 def test_an_archive_without_settings_says_so() -> None:

@@ -16,7 +16,7 @@ from sqlalchemy import insert, select
 
 from server import audit
 from server.main import main
-from server.services import backups, checks, erasure, patients, recordings, sessions
+from server.services import backups, checks, erasure, patients, recordings, report_links, sessions
 from server.services.backups import MANIFEST, BackupError, MadeBackup, choose_kept, list_backups, make_backup
 from server.services.restoring import RestoredClinic, RestoreError, restore, try_restore
 from server.services.reviewed import ReviewedAnalyses
@@ -28,7 +28,7 @@ from server.storage.archive import BackupFileError, ClinicKey, make_key, read_ar
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.tables import audit as audit_table
-from server.storage.tables import login_session, now, user
+from server.storage.tables import login_session, now, report_file, signed_report, user
 from tests.faults.clinic import Clinic
 
 CUT = "is damaged or was cut"
@@ -140,6 +140,25 @@ def test_a_backup_under_load_comes_back_whole(clinic: Clinic, key: ClinicKey | N
     assert list(again.settings.trash.glob("*/*/*"))
 
 
+def test_a_link_that_was_revoked_since_does_not_open_again(clinic: Clinic) -> None:
+    report, visit, at = "d" * 32, clinic.session.id, now()
+    with clinic.db.write() as c:
+        made_from = {"id": report, "session_id": visit, "analysis_id": "e" * 32}
+        c.execute(insert(signed_report).values(**made_from, number=1, language="en", signed_at=at))
+        document = clinic.blobs.put(clinic.patient.id, b"signed")
+        row = {"report_id": report, "name": "report.html", "size": document.size}
+        c.execute(insert(report_file).values(**row, sha256=document.sha256))
+        link, token = report_links.make(c, None, report, 90, "Ada")
+    made = make(clinic)
+    with clinic.db.write() as c:
+        report_links.revoke(c, None, link.id)
+    _, again = put_back(clinic, made)
+    with again.db.read() as c:
+        assert not report_links.get(c, link.id).is_open
+        with pytest.raises(report_links.LinkNotFound):
+            report_links.find_by_token(c, token)
+
+
 def test_who_was_erased_since_stays_erased(clinic: Clinic) -> None:
     with clinic.db.write() as c:
         other = patients.create(c, None, code="P-2")
@@ -227,7 +246,15 @@ def test_a_key_opens_only_its_own_and_a_public_one_only_encrypts(clinic: Clinic,
 
 def test_what_a_backup_of_another_make_may_not_do(clinic: Clinic, tmp_path: Path) -> None:
     made = make(clinic)
-    for change in ("newer", "outside", "link"):
+    sparse = {"GNU.sparse.size": "1000000000000", "GNU.sparse.map": "0,1"}
+    words = {
+        "newer": "reads 1",
+        "outside": "no backup does",
+        "link": "which is no file",
+        "sparse": "which is no file",
+        "no numbers": CUT,
+    }
+    for change, said in words.items():
         bad = tmp_path / f"{change}.tar"
         with tarfile.open(bad, "w") as tar:
             for name, size, content in read_archive(made.path, None):
@@ -238,9 +265,12 @@ def test_what_a_backup_of_another_make_may_not_do(clinic: Clinic, tmp_path: Path
                 member.size = len(data)
                 if change == "link":
                     member.type, member.linkname, member.size = tarfile.SYMTYPE, "/etc/passwd", 0
+                if change == "sparse":
+                    member.pax_headers = sparse
+                if change == "no numbers":
+                    member.pax_headers = sparse | {"GNU.sparse.map": "a,b"}
                 tar.addfile(member, io.BytesIO(data))
-        words = {"newer": "reads 1", "outside": "no backup does", "link": "which is no file"}[change]
-        with pytest.raises((RestoreError, BackupFileError), match=words):
+        with pytest.raises((RestoreError, BackupFileError), match=said):
             try_restore(bad, clinic.settings, None)
 
 
