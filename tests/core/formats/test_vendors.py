@@ -128,6 +128,16 @@ def test_shimmer_reads_the_accelerometer_that_does_not_clip() -> None:
     assert code_of(made.shimmer(kind="RAW")) == "missing_acc"
 
 
+def test_a_row_of_units_says_what_the_time_is_in_or_the_file_is_refused() -> None:
+    lab = made.apdm_lab()
+    assert np.diff(only(read(lab)).t_s) == pytest.approx(1.0 / made.RATE)
+    fast = only(read(lab.replace(b"\ns,m/s^2", b"\nms,m/s^2"))).t_s
+    assert np.diff(fast) == pytest.approx(1e-3 / made.RATE)
+    assert code_of(lab.replace(b"\ns,m/s^2", b"\nframes,m/s^2")) == "unknown_unit"
+    assert code_of(lab.replace(b"\ns,m/s^2", b"\nms,g")) == "unknown_unit"
+    assert code_of(made.shimmer().replace(b"\nms\t", b"\nticks\t")) == "unknown_unit"
+
+
 def test_a_phones_rates_are_read_as_gravity_turns() -> None:
     for order, listed in (((0, 1, 2), True), ((2, 0, 1), False)):
         stream = only(read(made.phone(order=order, listed=listed)))
