@@ -15,13 +15,14 @@ from core.errors import FormatError
 from core.formats import text
 from core.formats.aliases import segment_named
 from core.formats.draft import Draft, make_draft
-from core.formats.source_spec import ACC_UNITS, GYR_UNITS, SourceSpec
+from core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, SourceSpec
 
 LABEL: Final = "APDM CSV"
 _STUDIO: Final = b"Format=7,"
 _LAB_HEADER: Final = re.compile(rb"(?m)^Time,[^\n]{1,200}/Acceleration/X,")
 _LAB_RATE: Final = re.compile(rb"(?m)^Sample Rate:,\s*(\d{1,5}(?:\.\d+)?)\s*,?\s*Hz")
 _LAB_LINES: Final = 20
+_NUMBER: Final = re.compile(r"[-+]?\d[\d.eE+-]*")
 _KINDS: Final = {
     "Accelerometer": "acc", "Acceleration": "acc", "Gyroscope": "gyr", "Angular Velocity": "gyr",
     "Magnetometer": "mag", "Magnetic Field": "mag", "Orientation": "quat",
@@ -88,19 +89,25 @@ def _read_lab(data: bytes, source: str, spec: SourceSpec | None) -> tuple[Draft,
         raise FormatError("empty", f"{source} has a header but no samples; export it again.")
     names = text.split(lines[at], b",")
     units = text.split(lines[at + 1], b",")
-    has_units = units[0] in ("s", "us")
+    has_units = _NUMBER.fullmatch(units[0]) is None
     if has_units:
         _check_units(names, units, source)
     rate = _LAB_RATE.search(data[:8192])
     body = text.after_lines(data, at + 1 + has_units)
     named = [name.replace("/Orientation/Scalar", "/Orientation/S") for name in names]
-    unit = _MICRO if has_units and units[0] == "us" else 1.0
+    unit = TIME_UNITS[units[0]] if has_units else 1.0
     return _read_table(
         named, body, source, spec, time_unit=unit, rate_hz=float(rate[1]) if rate else None, ids={}
     )
 
 
 def _check_units(names: Sequence[str], units: Sequence[str], source: str) -> None:
+    if units[0] not in TIME_UNITS:
+        raise FormatError(
+            "unknown_unit",
+            f"{source}: its time is in '{units[0]}', expected one of {', '.join(TIME_UNITS)}; "
+            "export it again.",
+        )
     for name, unit in zip(names, units, strict=False):
         wanted = {"Acceleration": "m/s^2", "Angular Velocity": "rad/s"}.get(
             name.split("/")[-2] if "/" in name else ""

@@ -1,8 +1,8 @@
 """A phone's DeviceMotion events as JSON (docs/formats.md, "Phone").
 
 Acceleration with gravity in m/s², rotation rate in deg/s. Browsers disagree on which axis alpha, beta and
-gamma turn about; gravity decides: it must turn as the rates say, ġ = −ω × g. Its sign, on which they disagree
-too, is not told here.
+gamma turn about; gravity decides: it must turn as the rates say, ġ = −ω × g. That holds for either sign of
+it, on which they disagree too, so what was taken is said.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from core import rotation
+from core.correction import AGAINST
 from core.errors import FormatError, Notice
 from core.formats import text
 from core.formats.aliases import segment_in
@@ -23,6 +24,8 @@ from core.formats.source_spec import GYR_UNITS, SourceSpec
 from core.frames import GRAVITY, Floats
 
 LABEL: Final = "DeviceMotion JSON"
+SIGN_ASSUMED: Final = "sign_assumed"
+"""Code of the notice that the sign of acceleration was taken, not known."""
 _MARK: Final = b'"accelerationIncludingGravity"'
 _ORDERS: Final = {
     "alpha, beta, gamma about x, y, z": (0, 1, 2),
@@ -73,20 +76,19 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
         raise FormatError("no_time", f"{source}: its events have no time (t_ms or timeStamp); record again.")
     rates = rates * GYR_UNITS[(spec and spec.gyr_unit) or "deg/s"]
     order, sure = _find_order(t_s, acc, rates)
-    notices = (
-        []
-        if sure
-        else [
+    device = stem_of(source)
+    notices = [_signs(device, source)]
+    if not sure:
+        notices.append(
             Notice(
                 "axes_assumed",
                 f"{source} turns too little to tell which axis is which; {order} was taken. "
                 "Turn the phone about every axis at the start.",
             )
-        ]
-    )
+        )
     return (
         make_draft(
-            stem_of(source),
+            device,
             source,
             "device",
             t_s,
@@ -96,6 +98,17 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
             notices=notices,
             segment=segment_in(source),
         ),
+    )
+
+
+def _signs(device: str, source: str) -> Notice:
+    """Nothing in the events tells the sign; the wrong one exchanges left and right of a phone worn alone."""
+    turned = json.dumps({"corrections": {device: {"acc_axes": AGAINST}}}, ensure_ascii=False)
+    return Notice(
+        SIGN_ASSUMED,
+        f"{source} does not say the sign of its acceleration; +9.8 along the axis that points up was taken. "
+        "An iPhone or iPad gives the opposite, and left and right would be exchanged. "
+        f"If it is from one, declare {turned}.",
     )
 
 

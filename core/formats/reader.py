@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from core.correction import SensorCorrection
+from core.correction import AS_READ, SensorCorrection
 from core.errors import ArchiveError, FormatError, InputError, ManifestError, Notice
 from core.formats import _sniff, bids, cwa, live_reader, mapping_xml, parquet, table, text
 from core.formats.aliases import segment_named
 from core.formats.archive import EPISODE_MANIFEST, ArchiveLimits, expand
+from core.formats.device_motion import SIGN_ASSUMED
 from core.formats.draft import Draft, finish
 from core.formats.manifest import Manifest, parse_manifest
 from core.formats.source import SourceFile, digest_file, sha256
@@ -304,6 +305,9 @@ def correct_streams(
             gyr=None if stream.gyr is None else correction.correct_gyr(stream.gyr),
             # the vendor made it from what was wrong
             quat=None if correction.turns_axes else stream.quat,
+            notices=tuple(
+                n for n in stream.notices if n.code != SIGN_ASSUMED or correction.acc_axes == AS_READ
+            ),
         )
         message = f"Sensor {device} is read with a correction, as was declared: {correction.say()}."
         notices.append(Notice("sensor_corrected", message, device, severity="info"))

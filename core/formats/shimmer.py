@@ -125,12 +125,19 @@ def _sensor(
         raise FormatError(
             "no_time", f"{source}: {device} has no calibrated time stamp; export it too.", sensor=device
         )
-    unit = TIME_UNITS.get(said.get(group["Timestamp"], "").lower(), TIME_UNITS["ms"])
+    clock = said.get(group["Timestamp"], "").lower() or "ms"
+    if clock not in TIME_UNITS:
+        raise FormatError(
+            "unknown_unit",
+            f"{source}: the time of {device} is in '{clock}', expected one of {', '.join(TIME_UNITS)}; "
+            "export it in milliseconds.",
+            sensor=device,
+        )
     return make_draft(
         device,
         source,
         "device",
-        table.values[group["Timestamp"]] * unit,
+        table.values[group["Timestamp"]] * TIME_UNITS[clock],
         acc=acc,
         gyr=signal("Gyro", GYR_UNITS, gyr_unit),
         mag=signal("Mag", None),

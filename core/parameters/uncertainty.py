@@ -101,15 +101,17 @@ def state_uncertainty(
 
 def mark_estimated(parameters: Sequence[Parameter], angles: Collection[str]) -> tuple[Parameter, ...]:
     """The parameters, those read from one of these angles marked as estimated: the other side is its own."""
-    return tuple(replace(p, estimated=True) if _is_of(p, angles) else p for p in parameters)
+    return tuple(
+        replace(p, estimated=True) if is_estimated(p.name, p.side, angles) else p for p in parameters
+    )
 
 
-def _is_of(p: Parameter, angles: Collection[str]) -> bool:
+def is_estimated(name: str, side: Side | None, angles: Collection[str]) -> bool:
     """Whether a parameter is read from one of these angles; those of the pelvis have no side."""
-    variable = _variable(p.name)
+    variable = _variable(name)
     if variable is None:
         return False
-    return variable in angles or (p.side is not None and f"{variable}_{SUFFIX[p.side]}" in angles)
+    return variable in angles or (side is not None and f"{variable}_{SUFFIX[side]}" in angles)
 
 
 def _variable(name: str) -> str | None:

@@ -184,8 +184,11 @@ def _labels(take: FoundTake) -> dict[str, str]:
 def _strides(take: FoundTake, state: Mapping[str, Any], out: Path) -> Iterator[dict[str, object]]:
     path = _folder_of(out, take) / "strides.csv"
     if state["code"] is None and path.exists():
+        modelled = _list_estimated(_read_analysis(take, out))
         for row in csv.DictReader(io.StringIO(path.read_text("utf-8"))):
-            yield {**_labels(take), **{name: _value(cell) for name, cell in row.items()}}
+            own = [a for a in modelled if a.endswith(f"_{row['side'][0]}")]
+            values = {name: _value(cell) for name, cell in row.items()}
+            yield {**_labels(take), **values, "estimated_angles": " ".join(own) or None}
 
 
 def _summary(take: FoundTake, state: Mapping[str, Any], out: Path) -> dict[str, object]:
@@ -193,12 +196,25 @@ def _summary(take: FoundTake, state: Mapping[str, Any], out: Path) -> dict[str, 
     row: dict[str, object] = {**_labels(take), "files": len(take.paths), "error": state["code"]}
     if state["code"] is not None:
         return row
-    found = json.loads((_folder_of(out, take) / "analysis.json").read_bytes())
+    found = _read_analysis(take, out)
     estimator = (found["estimator"] or {}).get("name")
     row |= {"quality": found["quality"]["level"], "estimator": estimator, "warnings": len(found["warnings"])}
+    row["estimated_angles"] = " ".join(_list_estimated(found)) or None
     for p in found["parameters"]:
         row["_".join(part for part in (p["name"], p["side"]) if part)] = p["mean"]
     return row
+
+
+def _read_analysis(take: FoundTake, out: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((_folder_of(out, take) / "analysis.json").read_bytes())
+    return found
+
+
+def _list_estimated(found: Mapping[str, Any]) -> list[str]:
+    """Angles with their side that a model of the leg gives, and no two sensors measure."""
+    from server.report.estimator import list_estimated_angles
+
+    return sorted(list_estimated_angles(found["estimator"]))
 
 
 def _value(cell: str) -> object:

@@ -142,6 +142,8 @@ def _write_part(file: Any, content: ExportContent, found: Trajectories, first: i
     file["data"]["points"] = points
     file.add_parameter("POINT", "ANGLES", list(found.angles_deg))
     file.add_parameter("POINT", "ANGLE_UNITS", ["deg"])
+    if content.estimated:
+        file.add_parameter("SAGITTAL", "ESTIMATED", list(content.estimated))
     start = float(found.t_s[first])
     events = content.bundle.events.events
     own = _lie_within(np.array([e.time_s for e in events]), found.t_s, first, last)

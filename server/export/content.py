@@ -20,6 +20,8 @@ from server.report import signals, tracks
 from server.report.analysis_json import parameter_row
 from server.report.bundle import Bundle, apply_review, load_bundle, read_columns, read_poses
 from server.report.columns import read_table
+from server.report.estimator import list_estimated_angles
+from server.report.numbers import numbers_of
 
 POSES = "poses.parquet"
 LATER = (POSES, signals.NAME, tracks.NAME)
@@ -101,6 +103,16 @@ class ExportContent:
     def poses(self) -> Poses:
         """Segment poses; raises FormatError `export_not_possible` where there are none."""
         return read_poses(self.read_needed(POSES))
+
+    @property
+    def estimated(self) -> tuple[str, ...]:
+        """Angles with their side that a model of the leg gives, and no two sensors measure."""
+        return tuple(sorted(list_estimated_angles(self.bundle.estimator)))
+
+    @property
+    def verdict(self) -> str:
+        """What the session's page says of the data, in words."""
+        return numbers_of(self.bundle).verdict[1]
 
     @property
     def has_poses(self) -> bool:

@@ -100,6 +100,7 @@ def write_fhir(content: ExportContent) -> bytes:
                     f"Condition: {v.condition}." if v.condition else "",
                     f"{len(content.cycles) - left_out} of {len(content.cycles)} strides count.",
                     f"{len(content.edits)} changes by hand.",
+                    f"Data: {content.verdict}.",
                     "Research and documentation software, not a medical device, not for diagnosis.",
                 )
                 if text

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 from math import degrees, isfinite
 from typing import Final
 
+from core.frames import SUFFIX
 from core.parameters.catalogue import CATALOGUE, name_counted, unit_of
 from core.parameters.kinematic import POINTS, MeanCurve, cycle_curves, mean_curve
+from core.parameters.uncertainty import is_estimated
 from server.export.content import ExportContent
 
 Row = tuple[object, ...]
@@ -48,6 +50,7 @@ TABLE_COLUMNS: Final = {
     "ci_high": "Upper end of it",
     "uncertainty": "The mean ± this holds the true value with 95 %",
     "estimated": "1 where a model of the leg gives the angle, and no two sensors measure it",
+    "estimated_angles": "Angles whose values a model of the leg gives, and no two sensors measure",
     "reason": "Why there is no number",
     "note": "What to know of the number, as a code",
     "pct_cycle": "Percent of the stride, from initial contact",
@@ -73,6 +76,8 @@ def list_about(content: ExportContent) -> TableSheet:
         ("affected_side", v.affected_side),
         ("condition", v.condition),
         ("quality", quality.get("level")),
+        ("verdict", content.verdict),
+        ("estimated_angles", " ".join(content.estimated) or None),
         ("angle_zero", None if angles is None else angles.zero),
         ("edits", len(content.edits)),
         ("exported_by", f"Sagittal {v.version}".strip()),
@@ -97,7 +102,10 @@ def list_parameters(content: ExportContent) -> TableSheet:
     return TableSheet("Parameters", (*header, "uncertainty", "estimated", "reason", "note"), rows)
 
 
-CYCLE: Final = ("cycle", "side", "start_s", "tc_s", "end_s", "counted", "excluded_reason", "flags")
+CYCLE: Final = (
+    *("cycle", "side", "start_s", "tc_s", "end_s", "counted", "excluded_reason", "flags"),
+    "estimated_angles",
+)
 
 
 def list_cycles(content: ExportContent) -> TableSheet:
@@ -107,6 +115,7 @@ def list_cycles(content: ExportContent) -> TableSheet:
         (
             *(c.number, c.side, c.start_s, c.tc_s, c.end_s, int(c.excluded is None), c.excluded),
             " ".join(c.flags),
+            " ".join(a for a in content.estimated if a.endswith(f"_{SUFFIX[c.side]}")) or None,
             *(c.values.get(name) for name in names),
         )
         for c in content.cycles
@@ -119,15 +128,15 @@ def list_values(content: ExportContent) -> TableSheet:
     header = ("subject", "visit", "cycle", "side", "start_s", "end_s", "parameter", "value", "unit")
 
     def rows() -> Iterator[Row]:
-        subject, visit = content.visit.subject, content.visit.visit
+        subject, visit, modelled = content.visit.subject, content.visit.visit, content.estimated
         units = {name: unit_of(name) for c in content.cycles for name in c.values}
         for c in content.cycles:
             first = (subject, visit, c.number, c.side, c.start_s, c.end_s)
             last = (int(c.excluded is None), c.excluded, " ".join(c.flags))
             for name, value in c.values.items():
-                yield (*first, name, value, units[name], *last)
+                yield (*first, name, value, units[name], int(is_estimated(name, c.side, modelled)), *last)
 
-    return TableSheet("Values", (*header, "counted", "excluded_reason", "flags"), tuple(rows()))
+    return TableSheet("Values", (*header, "estimated", "counted", "excluded_reason", "flags"), tuple(rows()))
 
 
 def list_curves(content: ExportContent) -> TableSheet:

@@ -21,7 +21,7 @@ from server.pages.words import describe_person
 from server.report.comparison import compare_figures
 from server.report.feedback_words import side_words
 from server.report.leaflet import list_figures
-from server.report.trends import collect_figures
+from server.report.numbers import Numbers
 from server.services import comparisons, histories, patients, pdfs, prescriptions, sessions
 from server.services.errors import NotFound
 from server.services.provenance import CODE_VERSION
@@ -103,22 +103,27 @@ def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[s
         written = prescriptions.of_patient(c, patient.id)
     new = reviewed.read_numbers(this.found, this.edits)
     old = None if before is None else reviewed.read_numbers(before.found, before.edits)
+    if old is not None and not _is_usable(old):
+        old = before = None
     norms = comparisons.find_norms(patient, this.session, new)
     changes = () if old is None else compare_figures(old, new, norms, patient.affected_side)
     trained = next((w.content for w in written if w.ended_at is None), None)
-    values = {(p.name, p.side): p.mean for p in collect_figures(new) if p.mean is not None}
-    is_usable = new.verdict[0] != "bad"
     return {
         "patient": patient,
         "session": this.session,
         "back": f"/sessions/{sid}/report",
         "pdf": f"/sessions/{sid}/leaflet.pdf",
-        "figures": list_figures(values, changes, patient.affected_side) if is_usable else (),
+        "figures": list_figures(new.parameters, changes, patient.affected_side) if _is_usable(new) else (),
         "before": None if before is None else before.session.performed_on,
         "practise": None if trained is None else CATALOGUE[trained.parameter].everyday,
         "practise_side": None if trained is None else side_words(trained.side),
         "made_by": f"Sagittal {this.found.code_version} · {day(this.found.created_at)}",
     }
+
+
+def _is_usable(numbers: Numbers) -> bool:
+    """Whether a number may be told, or be compared with: not of poor data."""
+    return numbers.verdict[0] != "bad"
 
 
 def gather_course(db: Database, reviewed: ReviewedAnalyses, pid: str) -> dict[str, Any]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from core.change import Change
+from core.change import NOT_MEASURED_ALIKE, Change
 from core.frames import Side
+from core.parameters.result import Parameter
 from server.report.wording import format_number
 
 
@@ -56,38 +57,42 @@ class LeafletFigure:
 
     Parameters
     ----------
-    now, before : value with its unit; before None = not measured last time. words : what became of it.
+    now, before : value with its unit; before None = no number that is compared. words : what became of it.
+    estimated : a model of the leg gives it, and no two sensors measure it.
     """
 
     title: str
     now: str
     before: str | None
     words: str
+    estimated: bool
 
 
 def list_figures(
-    values: Mapping[tuple[str, Side | None], float], changes: Sequence[Change], affected: Side | None
+    parameters: Sequence[Parameter], changes: Sequence[Change], affected: Side | None
 ) -> tuple[LeafletFigure, ...]:
     """The figures that were measured; of a leg that of the affected side, else of the smaller value.
 
     Parameters
     ----------
-    values : parameter and side → mean, in its own unit. changes : since the last time, empty without one.
+    changes : since the last time, empty without one that can be compared.
     """
     found = []
     for figure in FIGURES:
-        mine = {side: value for (name, side), value in values.items() if name == figure.name}
+        mine = {p.side: (p.mean, p) for p in parameters if p.name == figure.name and p.mean is not None}
         if not mine:
             continue
-        side = affected if affected in mine else min(mine, key=lambda s: mine[s])
+        side = affected if affected in mine else min(mine, key=lambda s: mine[s][0])
+        value, told = mine[side]
         change = next((c for c in changes if (c.name, c.side) == (figure.name, side)), None)
-        before = None if change is None else change.before
+        before = None if change is None or change.difference is None else change.before
         found.append(
             LeafletFigure(
                 figure.title.format(side=side),
-                _say(figure, mine[side]),
+                _say(figure, value),
                 None if before is None else _say(figure, before),
                 _judge(figure, change),
+                told.estimated,
             )
         )
     return tuple(found)
@@ -99,8 +104,10 @@ def _say(figure: PlainFigure, value: float) -> str:
 
 def _judge(figure: PlainFigure, change: Change | None) -> str:
     """A change is only named where it is larger than the measurement error."""
-    if change is None or change.before is None or change.difference is None:
-        return "Measured for the first time."
+    if change is not None and change.reason == NOT_MEASURED_ALIKE:
+        return "It was measured in another way last time, so the two numbers are not compared."
+    if change is None or change.difference is None:
+        return "There is no earlier number to compare with."
     if change.verdict in REAL:
         return f"This is {figure.up if change.difference > 0 else figure.down} than last time."
     if change.verdict is None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from core import rotation
 from core.errors import FormatError, InputError
-from core.formats import SourceFile, _sniff, read_recording, text
+from core.formats import SourceFile, _sniff, parse_manifest, read_recording, text
 from core.formats.vendors import VENDOR_FORMATS, find_vendor
 from core.frames import GRAVITY
 from core.recording import ImuStream, Recording
@@ -128,13 +128,32 @@ def test_shimmer_reads_the_accelerometer_that_does_not_clip() -> None:
     assert code_of(made.shimmer(kind="RAW")) == "missing_acc"
 
 
+def test_a_row_of_units_says_what_the_time_is_in_or_the_file_is_refused() -> None:
+    lab = made.apdm_lab()
+    assert np.diff(only(read(lab)).t_s) == pytest.approx(1.0 / made.RATE)
+    fast = only(read(lab.replace(b"\ns,m/s^2", b"\nms,m/s^2"))).t_s
+    assert np.diff(fast) == pytest.approx(1e-3 / made.RATE)
+    assert code_of(lab.replace(b"\ns,m/s^2", b"\nframes,m/s^2")) == "unknown_unit"
+    assert code_of(lab.replace(b"\ns,m/s^2", b"\nms,g")) == "unknown_unit"
+    assert code_of(made.shimmer().replace(b"\nms\t", b"\nticks\t")) == "unknown_unit"
+
+
 def test_a_phones_rates_are_read_as_gravity_turns() -> None:
     for order, listed in (((0, 1, 2), True), ((2, 0, 1), False)):
         stream = only(read(made.phone(order=order, listed=listed)))
         assert stream.gyr == pytest.approx(made.GYR, abs=1e-6)
-        assert not stream.notices
+        assert [n.code for n in stream.notices] == ["sign_assumed"]
     still = made.phone().replace(f'"beta": {np.degrees(made.TURN)}'.encode(), b'"beta": 0.0')
-    assert [n.code for n in only(read(still)).notices] == ["axes_assumed"]
+    assert [n.code for n in only(read(still)).notices] == ["sign_assumed", "axes_assumed"]
+
+
+def test_a_phone_whose_sign_was_declared_is_read_so_and_nothing_is_assumed() -> None:
+    said = only(read(made.phone())).notices[0].message
+    declared = said[said.index("{") : said.rindex("}") + 1].encode()
+    files = [SourceFile.of_bytes("x.bin", made.phone())]
+    stream = read_recording(files, parse_manifest(declared)).streams["x"]
+    assert stream.acc == pytest.approx(-made.ACC, abs=1e-6)
+    assert not stream.notices
 
 
 def bids(parts: dict[str, bytes]) -> Recording:

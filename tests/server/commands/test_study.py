@@ -36,6 +36,7 @@ def test_a_folder_becomes_two_tables_and_a_list_of_failures(
     assert [t["take"] for t in takes] == ["one/walk.parquet", "sub-01/motion/sub-01_task-walk"]
     assert [t["error"] for t in takes] == [None, "missing_acc"]
     assert (takes[1]["sub"], takes[1]["task"]) == ("01", "walk")
+    assert takes[0]["estimated_angles"] is None  # every segment wore a sensor
     assert 0.9 < takes[0]["gait_speed_mps"] < 1.6
     strides = pq.read_table(out / "strides.parquet")
     with (out / "strides.csv").open(newline="") as lines:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import zipfile
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -16,6 +17,7 @@ from core.events.edits import Edit
 from core.parameters.catalogue import CATALOGUE
 from server.export.content import ExportContent
 from server.export.kinds import write_export
+from server.report.numbers import numbers_of
 from tests.server import analysed
 from tests.server.export.opened import open_walk
 
@@ -70,6 +72,22 @@ def test_a_stride_that_a_person_left_out_is_told_and_counts_in_no_mean() -> None
 
     assert n(after) == n(before) - 1
     assert {r["what"]: r["value"] for r in after["about.csv"]}["edits"] == "1"
+
+
+def test_an_angle_that_a_model_gives_is_told_beside_every_value() -> None:
+    walk = open_walk()
+    estimator = {**(walk.bundle.estimator or {}), "estimated_angles": ["knee_flexion_l"]}
+    found = tables(replace(walk, bundle=replace(walk.bundle, estimator=estimator)))
+    told = {(r["parameter"], r["side"]) for r in found["strides_long.csv"] if r["estimated"] == "1"}
+    assert ("knee_flexion_rom_deg", "left") in told
+    assert {(CATALOGUE[n].curve.variable, side) for n, side in told} == {("knee_flexion", "left")}  # type: ignore[union-attr]
+    assert {(r["side"], r["estimated_angles"]) for r in found["strides_wide.csv"]} == {
+        ("left", "knee_flexion_l"),
+        ("right", ""),
+    }
+    about = {r["what"]: r["value"] for r in found["about.csv"]}
+    assert about["estimated_angles"] == "knee_flexion_l"
+    assert about["verdict"] == numbers_of(walk.bundle).verdict[1]
 
 
 def test_nothing_that_a_person_typed_becomes_a_formula() -> None:
