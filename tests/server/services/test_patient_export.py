@@ -14,7 +14,8 @@ from server.services import consents, notes, patients, recordings, sessions
 from server.services.errors import NotFound
 from server.services.patient_export import PIECE, export_patient
 from server.services.references import list_referenced
-from server.storage.tables import live_event, live_take, new_id, now
+from server.storage.live_tables import live_event, live_take
+from server.storage.tables import new_id, now
 from tests.faults.clinic import Clinic
 
 
