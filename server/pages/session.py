@@ -445,7 +445,7 @@ def _not_compared(session: Session, model: ReportModel) -> str | None:
 
 
 def _identity(patient: Patient, session: Session, condition: str) -> list[tuple[str, str]]:
-    height = patient.height_at(session)
+    height = patient.find_height(session)
     return [
         ("Code", patient.code),
         ("Age, sex", describe_person(patient.sex, patient.birth_year) or "not given"),

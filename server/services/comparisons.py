@@ -116,8 +116,8 @@ def compare_sessions(reviewed: ReviewedAnalyses, found: SessionPair) -> tuple[Co
 def find_norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
     """The reference of a person on the day of a session, at its speed."""
     speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
-    age = patient.age_on(session.performed_on)
-    height = patient.height_at(session)
+    age = patient.find_age(session.performed_on)
+    height = patient.find_height(session)
     return look_up_norms(
         age,
         patient.sex,

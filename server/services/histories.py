@@ -63,7 +63,7 @@ class PatientHistory:
 
     @property
     def _age(self) -> int | None:
-        return self.patient.age_on(self.visits[-1].performed_on) if self.visits else None
+        return self.patient.find_age(self.visits[-1].performed_on) if self.visits else None
 
 
 @dataclass(frozen=True)

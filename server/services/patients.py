@@ -49,11 +49,11 @@ class Patient:
     last_visit: dt.date | None
     running: bool
 
-    def age_on(self, day: dt.date) -> int | None:
+    def find_age(self, day: dt.date) -> int | None:
         """Age in years as far as the year of birth tells it, None where that is not known."""
         return day.year - self.birth_year if self.birth_year else None
 
-    def height_at(self, session: Session) -> float | None:
+    def find_height(self, session: Session) -> float | None:
         """Height at a visit in metres: as measured then, else the usual one."""
         return session.height_m if session.height_m is not None else self.height_m
 

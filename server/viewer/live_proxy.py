@@ -67,8 +67,8 @@ def _person(db: Database, sid: str) -> tuple[BodyModel, NormAt]:
     with db.read() as c:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
-    height = patient.height_at(session)
-    age = patient.age_on(session.performed_on)
+    height = patient.find_height(session)
+    age = patient.find_age(session.performed_on)
 
     def norm_at(speed_mps: float | None) -> Mapping[str, Floats]:
         bands = look_up_norms(age, None, speed_mps, height).bands
