@@ -80,7 +80,7 @@ def owner(name: str, target: str) -> Column[str]:
     return Column(name, String(32), ForeignKey(f"{target}.id", ondelete="RESTRICT"), primary_key=True)
 
 
-def stored_file() -> tuple[Column[int], Column[str], CheckConstraint]:
+def describe_file() -> tuple[Column[int], Column[str], CheckConstraint]:
     """The columns of a file of storage/blobs.py, size in bytes and SHA-256, and their rule."""
     return (
         Column("size", Integer, nullable=False),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from sqlalchemy import CheckConstraint, Column, Integer, String, Table, Text, UniqueConstraint
 
-from server.storage.columns import Utc, id_column, metadata, owner, reference, stored_file
+from server.storage.columns import Utc, describe_file, id_column, metadata, owner, reference
 
 assessment = Table(
     "assessment",
@@ -39,7 +39,7 @@ report_file = Table(
     metadata,
     owner("report_id", "signed_report"),
     Column("name", String(32), primary_key=True),
-    *stored_file(),
+    *describe_file(),
 )
 
 report_link = Table(

@@ -42,6 +42,7 @@ from sqlalchemy import (
 
 from server.storage import live_tables, person_tables, report_tables  # noqa: F401 - `metadata` has all tables
 from server.storage.columns import Json, Utc
+from server.storage.columns import describe_file as _describe_file
 from server.storage.columns import id_column as _id
 from server.storage.columns import metadata as metadata
 from server.storage.columns import new_id as new_id
@@ -49,7 +50,6 @@ from server.storage.columns import now as now
 from server.storage.columns import one_of as _one_of
 from server.storage.columns import owner as _owner
 from server.storage.columns import reference as _ref
-from server.storage.columns import stored_file as _stored_file
 
 SEXES = ("female", "male")
 SIDES = ("left", "right")
@@ -126,7 +126,7 @@ recording_file = Table(
     metadata,
     _owner("recording_id", "recording"),
     Column("name", String(500), primary_key=True),  # as uploaded, with its folders; any Unicode
-    *_stored_file(),
+    *_describe_file(),
     Column("added_at", Utc, nullable=False),
 )
 
@@ -226,7 +226,7 @@ analysis_file = Table(
     metadata,
     _owner("analysis_id", "analysis"),
     Column("name", String(100), primary_key=True),
-    *_stored_file(),
+    *_describe_file(),
 )
 
 device_check = Table(
@@ -245,7 +245,7 @@ reference_file = Table(
     metadata,
     _owner("session_id", "session"),
     Column("name", String(500), primary_key=True),  # as uploaded; orientations of another system
-    *_stored_file(),
+    *_describe_file(),
     Column("added_at", Utc, nullable=False),
 )
 
@@ -255,7 +255,7 @@ session_video = Table(
     _owner("session_id", "session"),
     Column("name", String(500), nullable=False),
     Column("media_type", String(32), nullable=False),
-    *_stored_file(),
+    *_describe_file(),
     Column("offset_s", Float),  # time in the video at the take's time 0; None: nobody has aligned it
     Column("consent_by", String(64)),  # who said that the person agreed; no key, as accounts may go
     Column("consent_at", Utc, nullable=False),
@@ -280,7 +280,7 @@ filter_run_file = Table(
     metadata,
     _owner("filter_run_id", "filter_run"),
     Column("name", String(100), primary_key=True),
-    *_stored_file(),
+    *_describe_file(),
 )
 
 edit = Table(
