@@ -6,7 +6,6 @@ migration behind that failed for ever; this leaves exactly the old revision).
 
 from alembic import context
 
-import server.storage.person_tables  # noqa: F401 - its tables are in the metadata
 from server.storage.db import foreign_key_violations, migration_engine
 from server.storage.tables import Utc, metadata
 

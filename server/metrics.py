@@ -18,7 +18,8 @@ from server.services import backup_schedule
 from server.settings import Settings
 from server.storage.db import Database
 from server.storage.high_water import read_newest
-from server.storage.tables import JOB_STATES, OPEN_TAKE_STATES, job, live_take, now, session
+from server.storage.live_tables import OPEN_TAKE_STATES, live_take
+from server.storage.tables import JOB_STATES, job, now, session
 
 BUCKETS_S: Final = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 """Page requests are held to 0.3 s."""

@@ -7,7 +7,6 @@ read as any described table.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from typing import Any, Final
 from core.errors import FormatError
 from core.formats import text
 from core.formats.aliases import segment_named
+from core.formats.json_tree import read_json
 from core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, SourceSpec
 from core.frames import Segment
 
@@ -133,8 +133,8 @@ def _unit(said: str, known: Mapping[str, float], name: str) -> str:
 def _rate(sidecar: bytes | None, rows: Sequence[Mapping[str, str]], name: str) -> float:
     """What the sidecar says it came to, else what was set, else what the channels say."""
     said: Any = {}
-    with suppress(ValueError, RecursionError):
-        said = json.loads(sidecar or b"{}")
+    with suppress(ValueError):
+        said = read_json(sidecar or b"{}")
     keys = ("SamplingFrequencyEffective", "SamplingFrequency")
     candidates: list[Any] = [said.get(key) for key in keys] if isinstance(said, dict) else []
     candidates += [row.get("sampling_frequency") for row in rows[:1]]

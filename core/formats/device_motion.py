@@ -19,6 +19,7 @@ from core.errors import FormatError, Notice
 from core.formats import text
 from core.formats.aliases import segment_in
 from core.formats.draft import Draft, make_draft
+from core.formats.json_tree import read_json
 from core.formats.source import stem_of
 from core.formats.source_spec import GYR_UNITS, SourceSpec
 from core.frames import GRAVITY, Floats
@@ -60,12 +61,12 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
     FormatError `bad_json`, `empty`, `no_time`, `missing_acc`.
     """
     try:
-        root = json.loads(data)
+        root: Any = read_json(data)
         events: list[dict[str, Any]] = root["events"] if isinstance(root, dict) else root
         t_s = _times(events)
         acc = _vectors(events, _FELT, ("x", "y", "z"))
         rates = _vectors(events, _TURNED, ("alpha", "beta", "gamma"))
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as e:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as e:
         raise FormatError(
             "bad_json",
             f"{source} is not a list of DeviceMotion events ({type(e).__name__}); export it again.",

@@ -49,7 +49,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
     FormatError `empty`, `bad_table`, `gravity_removed`, `missing_acc`.
     """
     lines = text.head_lines(data, _HEAD)
-    separator = _separator(lines[0])
+    separator = text.read_separator(lines[0]) or b","
     at = next(
         (i for i, line in enumerate(lines) if _COUNTER in text.split(line, separator) and b":" not in line),
         None,
@@ -83,7 +83,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
     if fine is not None and np.isfinite(fine).any():
         clock, ticks, wrap = "device", fine * _MICRO, WRAP_32 * _MICRO
         if says.get("syncstatus", "").lower().startswith("un"):
-            ticks, wrap = np.mod(ticks - ticks[np.isfinite(ticks)][0], wrap), wrap
+            ticks = np.mod(ticks - ticks[np.isfinite(ticks)][0], wrap)
             notices.append(_unsynchronised(source))
     else:
         clock, ticks, wrap = "counter", table.values[_COUNTER], float(WRAP_32)
@@ -105,12 +105,6 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
             segment=segment_in(says.get("devicetag", "")),
         ),
     )
-
-
-def _separator(first: bytes) -> bytes:
-    """What the line "sep=," names, else a comma."""
-    found = re.match(rb'"?sep=([,;\t|])', first.strip(b"\r"))
-    return found[1] if found else b","
 
 
 def _device(says: Mapping[str, str], source: str) -> str:

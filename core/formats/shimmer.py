@@ -68,11 +68,9 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
 
 
 def _separator(data: bytes) -> bytes:
-    """What the first line, "sep=,", names; a tab is written as two letters."""
-    found = re.match(rb'"?sep=(\\t|[,;\t|])', data[:16])
-    if found:
-        return b"\t" if found[1] == rb"\t" else found[1]
-    return b"\t" if b"\t" in data[:4096].split(b"\n", 1)[0] else b","
+    """What the first line, "sep=,", names, else a tab where it has one, else a comma."""
+    first = data[:4096].split(b"\n", 1)[0]
+    return text.read_separator(first) or (b"\t" if b"\t" in first else b",")
 
 
 def _parse(names: Sequence[str]) -> dict[str, dict[str, str]]:

@@ -41,7 +41,7 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
     layout = _lay_out(data, source, spec)
     body = text.after_lines(data, spec.skip_rows + spec.header_rows)
     if layout.separator == b" ":
-        body = memoryview(_squeezed(bytes(body)))
+        body = memoryview(squeeze_blanks(bytes(body)))
     table = layout.read(body, source)
     ticks, clock = _time(table, spec, source)
     return [
@@ -79,7 +79,7 @@ def _lay_out(data: bytes, source: str, spec: SourceSpec) -> _Layout:
     )
     separator = chosen or b","
     if separator == b" ":
-        header, rows = [_squeezed(h) for h in header], [_squeezed(r) for r in rows]
+        header, rows = [squeeze_blanks(h) for h in header], [squeeze_blanks(r) for r in rows]
     names = name_columns(header, rows[0], separator, spec)
     return _Layout(separator, names, _wanted(spec, names, source), text.has_decimal_comma(rows[0], separator))
 
@@ -160,7 +160,7 @@ def _read_blocks(
             end = len(body) if not data else body.rfind(b"\n") + 1
             body, rest = body[:end], body[end:]
             if body.strip():
-                part = memoryview(_squeezed(body) if layout.separator == b" " else body)
+                part = memoryview(squeeze_blanks(body) if layout.separator == b" " else body)
                 table = layout.read(part, file.name)
                 acc = table.stack(channels.acc) * acc_unit
                 gyr = None if channels.gyr is None else table.stack(channels.gyr) * gyr_unit
@@ -175,7 +175,7 @@ def _read_blocks(
                 return
 
 
-def _squeezed(data: bytes) -> bytes:
+def squeeze_blanks(data: bytes) -> bytes:
     """Columns that were lined up with several spaces are one space apart, and none is before the first."""
     return re.sub(rb"(?m)^ +| +(?=\r?$)", b"", re.sub(rb" +", b" ", data))
 

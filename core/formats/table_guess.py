@@ -120,7 +120,7 @@ def look_into_table(file: SourceFile) -> TableLook | None:
         return None
     separator, skip, header, rows_from, index_column = shape
     lines = text.head_lines(data, rows_from + SHOWN + 1)
-    squeeze = _squeeze if separator == b" " else bytes
+    squeeze = table.squeeze_blanks if separator == b" " else bytes
     spec = SourceSpec(file=file.name, skip_rows=skip, header_rows=header, index_column=index_column)
     first = squeeze(lines[rows_from])
     names = table.name_columns([squeeze(x) for x in lines[skip:rows_from]], first, separator, spec)
@@ -163,7 +163,9 @@ def _find_shape(data: bytes) -> tuple[bytes, int, int, int, bool] | None:
     lines = text.head_lines(data, _LINES)
     best: tuple[int, bytes, int] | None = None
     for separator in text.SEPARATORS:
-        cut = [text.split(_squeeze(line) if separator == b" " else line, separator) for line in lines]
+        cut = [
+            text.split(table.squeeze_blanks(line) if separator == b" " else line, separator) for line in lines
+        ]
         for i in range(len(cut) - 1):
             width = len(cut[i])
             if (
@@ -181,17 +183,16 @@ def _find_shape(data: bytes) -> tuple[bytes, int, int, int, bool] | None:
     header = 0
     while header < min(_MOST_HEADER, first):
         cells = text.split(
-            _squeeze(lines[first - header - 1]) if separator == b" " else lines[first - header - 1], separator
+            table.squeeze_blanks(lines[first - header - 1])
+            if separator == b" "
+            else lines[first - header - 1],
+            separator,
         )
         if len(cells) not in (width, width - 1) or _is_numbers(cells) or not any(cells):
             break
         header += 1
     cells = text.split(lines[first - 1], separator) if header else []
     return separator, first - header, header, first, bool(header) and len(cells) == width - 1
-
-
-def _squeeze(line: bytes) -> bytes:
-    return re.sub(rb" +", b" ", line.strip(b" \r"))
 
 
 def _is_numbers(cells: Sequence[str]) -> bool:
@@ -215,7 +216,7 @@ def _values(
     end = bytes(body).rfind(b"\n") + 1
     rows = bytes(body[:end] if end else body)
     if separator == b" ":
-        rows = b"\n".join(_squeeze(line) for line in rows.split(b"\n"))
+        rows = table.squeeze_blanks(rows)
     try:
         return text.read_columns(memoryview(rows), "", separator, names, names, decimal_comma=comma).values
     except FormatError:

@@ -54,21 +54,21 @@ def find_takes(root: Path) -> list[FoundTake]:
 
 
 def _of_folder(root: Path, folder: Path, paths: Sequence[Path]) -> list[FoundTake]:
+    kinds = {path: _kind_of(path) for path in paths}
     groups: dict[str, list[Path]] = {}
     loose: list[Path] = []
     for path in paths:
-        kind = _kind_of(path)
         if bids.is_table(path.name):
             groups.setdefault(
                 re.sub(r"_tracksys-[^_]+", "", path.name).removesuffix("_motion.tsv"), []
             ).append(path)
-        elif kind == "take":
+        elif kinds[path] == "take":
             groups.setdefault(path.name, []).append(path)
-        elif kind == "sensor":
+        elif kinds[path] == "sensor":
             loose.append(path)
     for name, own in _by_name(loose).items():
         groups.setdefault(name, []).extend(own)
-    beside = [p for p in paths if _kind_of(p) == "mapping"]
+    beside = [p for p in paths if kinds[p] == "mapping"]
     takes = []
     for name, own in groups.items():
         sidecars = [part for p in own if bids.is_table(p.name) for part in bids.find_parts(p.name)]

@@ -66,6 +66,12 @@ def head_lines(data: bytes, most: int = 64) -> list[bytes]:
     return lines
 
 
+def read_separator(first: bytes) -> bytes | None:
+    """What a first line "sep=," names, None without one; a tab may be written as two letters."""
+    found = re.match(rb'"?sep=(\\t|[,;\t|])', first)
+    return None if found is None else b"\t" if found[1] == rb"\t" else found[1]
+
+
 def after_lines(data: bytes, n: int) -> memoryview:
     """What follows the first n lines, without a copy."""
     at = 0

@@ -10,10 +10,6 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
 from core.frames import Protocol
-from server.auth import api_tokens
-from server.auth.api_tokens import Scope
-from server.auth.passwords import MAX_LENGTH, MIN_LENGTH
-from server.auth.roles import Role
 from server.jobs.queue import JobView
 from server.report.behind import StrideValue
 from server.services import report_links
@@ -37,14 +33,17 @@ def _one_line(refused: str) -> str:
 _NO_TEXT = f"\\x00-\\x08\\x0b\\x0c\\x0e-\\x1f\\x7f{_HIDDEN}"
 # text of many lines
 _TEXT = f"^[^{_NO_TEXT}]*$"
-_SOME_TEXT = f"^[^{_NO_TEXT}]*[^\\s{_NO_TEXT}][^{_NO_TEXT}]*$"
 Line = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=_one_line(_HIDDEN))]
 Code = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=_one_line(_HIDDEN + _JOINERS))]
-SignInName = Annotated[
-    str, StringConstraints(min_length=1, max_length=64, pattern=r"^[a-z0-9][a-z0-9._@-]*$")
-]
 Note = Annotated[str, StringConstraints(max_length=10_000, pattern=_TEXT)] | None
-Password = Annotated[str, StringConstraints(min_length=MIN_LENGTH, max_length=MAX_LENGTH)]
+SomeText = Annotated[
+    str,
+    StringConstraints(
+        min_length=1,
+        max_length=MOST_CHARACTERS,
+        pattern=f"^[^{_NO_TEXT}]*[^\\s{_NO_TEXT}][^{_NO_TEXT}]*$",
+    ),
+]
 Height = Annotated[float, Field(ge=0.5, le=2.5, allow_inf_nan=False, description="m")]
 BirthYear = Annotated[int, Field(ge=1850, le=now().year)]
 Sex = Literal["female", "male"]
@@ -97,112 +96,12 @@ class ProblemDetails:
     errors: list[FieldProblem] | None = None
 
 
-class SignIn(Request):
-    """Name and password, and a code where the account has a second factor."""
-
-    name: Annotated[str, StringConstraints(max_length=200)]
-    password: Annotated[str, StringConstraints(max_length=1000)]
-    code: Annotated[str, StringConstraints(max_length=40)] | None = None
-    next: str | None = Field(default=None, max_length=2000, description="page to go on to (forms)")
-
-
-class SetUp(Request):
-    """The first administrator."""
-
-    name: SignInName
-    display_name: Line | None = None
-    password: Password
-
-
-class PasswordChange(Request):
-    """One's own new password."""
-
-    current: Annotated[str, StringConstraints(max_length=1000)]
-    password: Password
-
-
-class ApiTokenNew(Request):
-    """A token for a program: what for, for how many days, and one's password."""
-
-    name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=40)]
-    scopes: Annotated[list[Scope], Field(min_length=1, max_length=len(Scope))]
-    days: Annotated[int, Field(ge=1, le=api_tokens.MOST_DAYS)]
-    password: Annotated[str, StringConstraints(max_length=1000)]
-
-
-class PasswordProof(Request):
-    """One's password, for what a browser left open must not do."""
-
-    password: Annotated[str, StringConstraints(max_length=1000)]
-
-
-class CodeProof(Request):
-    """A code of the authenticator, or a recovery code."""
-
-    code: Annotated[str, StringConstraints(min_length=1, max_length=40)]
-
-
 class ConsentNew(Request):
     """What a patient agreed to, when, and where that is written."""
 
     purpose: Literal["recording", "research", "teaching", "sharing"]
     evidence: Line
     given_on: dt.date | None = None
-
-
-class LanguageChoice(Request):
-    """In which language one reads the pages."""
-
-    language: Literal["en", "de"] | None
-
-
-@dataclass(frozen=True)
-class User:
-    """An account."""
-
-    id: str
-    name: str
-    display_name: str
-    role: Role
-    active: bool
-    created_at: dt.datetime
-
-
-@dataclass(frozen=True)
-class Account:
-    """Who is signed in, and what this person may do."""
-
-    id: str
-    name: str
-    display_name: str
-    role: Role
-    actions: list[str]
-
-
-@dataclass(frozen=True)
-class SignInState:
-    """Who is signed in, and seconds until that ends if nobody does anything."""
-
-    name: str
-    left_s: float
-
-
-class UserNew(Request):
-    """A new account."""
-
-    name: SignInName
-    display_name: Line | None = None
-    role: Role
-    password: Password
-
-
-class UserChange(Request):
-    """What to change of an account; members left out stay as they are."""
-
-    display_name: Line = ""
-    role: Role = Role.VIEWER
-    active: bool = True
-    password: Password = ""
 
 
 class PatientNew(Request):
@@ -232,7 +131,7 @@ class Assessment(Request):
 class Reopening(Request):
     """Why a signed report is taken out of force."""
 
-    reason: Annotated[str, StringConstraints(min_length=1, max_length=MOST_CHARACTERS, pattern=_SOME_TEXT)]
+    reason: SomeText
 
 
 class ReportLinkNew(Request):
@@ -244,14 +143,7 @@ class ReportLinkNew(Request):
 class NoteNew(Request):
     """A note about a patient, of today unless said otherwise."""
 
-    content: Annotated[
-        str,
-        StringConstraints(
-            min_length=1,
-            max_length=MOST_CHARACTERS,
-            pattern=f"^[^{_NO_TEXT}]*[^\\s{_NO_TEXT}][^{_NO_TEXT}]*$",
-        ),
-    ]
+    content: SomeText
     written_on: dt.date = dt.date.min
 
 
@@ -387,41 +279,6 @@ class ParameterBehind:
     parameter: dict[str, Any]
     definition: str
     strides: list[StrideValue]
-
-
-@dataclass(frozen=True)
-class ApiToken:
-    """A token for a program, without the token itself."""
-
-    id: str
-    name: str
-    scopes: list[str]
-    created_at: dt.datetime
-    expires_at: dt.datetime
-    used_at: dt.datetime | None
-
-
-@dataclass(frozen=True)
-class NewApiToken(ApiToken):
-    """A token that has just been made; it is shown this once."""
-
-    token: str
-
-
-@dataclass(frozen=True)
-class SecondFactorSetUp:
-    """What an authenticator needs, shown this once: the secret, its otpauth address, a picture of that."""
-
-    secret: str
-    address: str
-    picture: str
-
-
-@dataclass(frozen=True)
-class RecoveryCodes:
-    """Codes for when the telephone is lost, one a line; shown this once, each works once."""
-
-    codes: str
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Request
 
 from server import audit
-from server.api import schemas
+from server.api import account_schemas
 from server.api.documents import refusals
 from server.auth import accounts, second_factor
 from server.auth.access import require
@@ -20,36 +20,36 @@ router = APIRouter(route_class=StrictJsonRoute, prefix="/account/second-factor",
 Self = Annotated[Identity, require(Action.USE_ACCOUNT)]
 
 
-@router.post("", response_model=schemas.SecondFactorSetUp, responses=refusals(409, 429))
+@router.post("", response_model=account_schemas.SecondFactorSetUp, responses=refusals(409, 429))
 def set_up(
-    body: schemas.PasswordProof,
+    body: account_schemas.PasswordProof,
     request: Request,
     db: Db,
     settings: Config,
     trail: OpenTrail,
     failures: Failures,
     who: Self,
-) -> schemas.SecondFactorSetUp:
+) -> account_schemas.SecondFactorSetUp:
     """Make a secret for an authenticator; it is asked for once a code has proved it (`confirm`)."""
     accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
     with db.write() as c:
         made = second_factor.begin(c, settings.second_factor_key, who.user_id, who.name)
-    return schemas.SecondFactorSetUp(made.secret, made.address, made.picture)
+    return account_schemas.SecondFactorSetUp(made.secret, made.address, made.picture)
 
 
-@router.post("/confirm", response_model=schemas.RecoveryCodes, responses=refusals(429))
+@router.post("/confirm", response_model=account_schemas.RecoveryCodes, responses=refusals(429))
 def confirm(
-    body: schemas.CodeProof, db: Db, settings: Config, failures: Failures, who: Self
-) -> schemas.RecoveryCodes:
+    body: account_schemas.CodeProof, db: Db, settings: Config, failures: Failures, who: Self
+) -> account_schemas.RecoveryCodes:
     """Ask for codes from now on; the answer has the recovery codes, this once."""
     with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
         codes = second_factor.confirm(c, settings.second_factor_key, who.user_id, body.code)
         audit.record(c, who, "user.second_factor_on", "user", who.user_id)
-    return schemas.RecoveryCodes("\n".join(codes))
+    return account_schemas.RecoveryCodes("\n".join(codes))
 
 
 @router.post("/remove", status_code=204, responses=refusals(429))
-def remove(body: schemas.CodeProof, db: Db, settings: Config, failures: Failures, who: Self) -> None:
+def remove(body: account_schemas.CodeProof, db: Db, settings: Config, failures: Failures, who: Self) -> None:
     """Ask for no code any more; needs one, or a recovery code."""
     with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
         if not second_factor.use(c, settings.second_factor_key, who.user_id, body.code):

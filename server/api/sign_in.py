@@ -16,7 +16,7 @@ from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, RedirectResponse
 
 from server import audit
-from server.api import schemas
+from server.api import account_schemas
 from server.api.documents import PUBLIC, refusals
 from server.api.users import user_answer
 from server.auth import accounts, one_time, second_factor
@@ -36,12 +36,12 @@ from server.trail import AuditTrail
 router = APIRouter(route_class=StrictJsonRoute, tags=["account"])
 address_router = APIRouter(include_in_schema=False)
 
-_USER = TypeAdapter(schemas.User)
+_USER = TypeAdapter(account_schemas.User)
 _FORM = "application/x-www-form-urlencoded"
-_BODY = {"schema": schemas.SignIn.model_json_schema()}
+_BODY = {"schema": account_schemas.SignIn.model_json_schema()}
 
 
-async def _credentials(request: Request) -> schemas.SignIn:
+async def _credentials(request: Request) -> account_schemas.SignIn:
     """Read JSON, or the form of a page without scripts."""
     is_form = request.headers.get("content-type", "").startswith(_FORM)
     try:
@@ -50,8 +50,8 @@ async def _credentials(request: Request) -> schemas.SignIn:
         raise Problem(400, "bad_request", SENTENCES["bad_request"]) from None
     try:
         if is_form:
-            return schemas.SignIn.model_validate(dict(await request.form()))
-        return schemas.SignIn.model_validate(await request.json())
+            return account_schemas.SignIn.model_validate(dict(await request.form()))
+        return account_schemas.SignIn.model_validate(await request.json())
     except json.JSONDecodeError as error:
         told = {"type": "json_invalid", "loc": ("body", error.pos), "msg": error.msg}
         raise RequestValidationError([told]) from None
@@ -63,14 +63,14 @@ async def _credentials(request: Request) -> schemas.SignIn:
 @router.post(
     "/sign-in",
     dependencies=[require(Action.SIGN_IN)],
-    response_model=schemas.User,
+    response_model=account_schemas.User,
     responses=refusals(401, 429),
     openapi_extra=PUBLIC
     | {"requestBody": {"required": True, "content": {"application/json": _BODY, _FORM: _BODY}}},
 )
 def sign_in(
     request: Request,
-    body: Annotated[schemas.SignIn, Depends(_credentials)],
+    body: Annotated[account_schemas.SignIn, Depends(_credentials)],
     db: Db,
     settings: Config,
     logins: OpenLogins,
@@ -122,12 +122,12 @@ def sign_out(
     "/set-up/{token}",
     status_code=201,
     dependencies=[require(Action.SET_UP)],
-    response_model=schemas.User,
+    response_model=account_schemas.User,
     responses=refusals(404, 409),
     openapi_extra=PUBLIC,
 )
 def set_up(
-    token: str, body: schemas.SetUp, request: Request, db: Db, logins: OpenLogins, trail: OpenTrail
+    token: str, body: account_schemas.SetUp, request: Request, db: Db, logins: OpenLogins, trail: OpenTrail
 ) -> Any:
     """Make the first administrator with the token of the printed address, and sign in."""
     with db.read() as c:
@@ -144,18 +144,18 @@ def set_up(
     return response
 
 
-@router.get("/sign-in", response_model=schemas.SignInState)
+@router.get("/sign-in", response_model=account_schemas.SignInState)
 def read_sign_in(
     logins: OpenLogins, who: Annotated[Identity, require(Action.WATCH_SIGN_IN)]
-) -> schemas.SignInState:
+) -> account_schemas.SignInState:
     """Tell how long this sign-in still lasts; asking does not prolong it."""
-    return schemas.SignInState(name=who.name, left_s=round(logins.seconds_left(who.login_id), 1))
+    return account_schemas.SignInState(name=who.name, left_s=round(logins.seconds_left(who.login_id), 1))
 
 
-@router.get("/account", response_model=schemas.Account)
-def read_account(who: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> schemas.Account:
+@router.get("/account", response_model=account_schemas.Account)
+def read_account(who: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> account_schemas.Account:
     """Tell who is signed in and what this person may do."""
-    return schemas.Account(
+    return account_schemas.Account(
         id=who.user_id,
         name=who.name,
         display_name=who.display_name,
@@ -166,7 +166,7 @@ def read_account(who: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> schem
 
 @router.post("/account/password", status_code=204, responses=refusals(429))
 def change_password(
-    body: schemas.PasswordChange,
+    body: account_schemas.PasswordChange,
     request: Request,
     db: Db,
     logins: OpenLogins,
@@ -186,7 +186,7 @@ def change_password(
 
 @router.put("/account/language", status_code=204)
 def choose_language(
-    body: schemas.LanguageChoice, db: Db, who: Annotated[Identity, require(Action.USE_ACCOUNT)]
+    body: account_schemas.LanguageChoice, db: Db, who: Annotated[Identity, require(Action.USE_ACCOUNT)]
 ) -> None:
     """Choose the language of the pages; null = the one the browser asks for."""
     with db.write() as c:

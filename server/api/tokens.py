@@ -7,8 +7,9 @@ from typing import Annotated
 from fastapi import APIRouter, Request
 
 from server import audit
-from server.api import schemas
+from server.api.account_schemas import ApiToken, ApiTokenNew, NewApiToken
 from server.api.documents import refusals
+from server.api.schemas import make_answer
 from server.auth import accounts, api_tokens
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -20,24 +21,29 @@ router = APIRouter(route_class=StrictJsonRoute, prefix="/account/tokens", tags=[
 Self = Annotated[Identity, require(Action.USE_ACCOUNT)]
 
 
-@router.get("", response_model=list[schemas.ApiToken])
-def list_tokens(db: Db, who: Self) -> list[schemas.ApiToken]:
+@router.get("", response_model=list[ApiToken])
+def list_tokens(db: Db, who: Self) -> list[ApiToken]:
     """One's own tokens, the newest first; what they are is not told again."""
     with db.read() as c:
-        return [schemas.make_answer(schemas.ApiToken, row) for row in api_tokens.list_tokens(c, who.user_id)]
+        return [make_answer(ApiToken, row) for row in api_tokens.list_tokens(c, who.user_id)]
 
 
-@router.post("", status_code=201, response_model=schemas.NewApiToken, responses=refusals(409, 429))
+@router.post("", status_code=201, response_model=NewApiToken, responses=refusals(409, 429))
 def make_token(
-    body: schemas.ApiTokenNew, request: Request, db: Db, trail: OpenTrail, failures: Failures, who: Self
-) -> schemas.NewApiToken:
+    body: ApiTokenNew,
+    request: Request,
+    db: Db,
+    trail: OpenTrail,
+    failures: Failures,
+    who: Self,
+) -> NewApiToken:
     """Make a token; the answer is the only one that shows it. Asks for one's password."""
     accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
     with db.write() as c:
         row, token = api_tokens.issue(c, who.user_id, body.name, set(body.scopes), body.days)
         detail = {"scopes": row.scopes, "days": body.days}
         audit.record(c, who, "token.made", "api_token", row.id, detail)
-    return schemas.make_answer(schemas.NewApiToken, row, token=token)
+    return make_answer(NewApiToken, row, token=token)
 
 
 @router.delete("/{token_id}", status_code=204, responses=refusals(404))

@@ -8,7 +8,7 @@ from fastapi import APIRouter
 from sqlalchemy import Row
 
 from server import audit
-from server.api import schemas
+from server.api import account_schemas, schemas
 from server.api.documents import refusals
 from server.auth import accounts, api_tokens, second_factor
 from server.auth.access import require
@@ -23,15 +23,15 @@ router = APIRouter(route_class=StrictJsonRoute, prefix="/users", tags=["users"])
 Admin = Annotated[Identity, require(Action.MANAGE_USERS)]
 
 
-@router.get("", response_model=list[schemas.User])
-def list_users(db: Db, who: Admin) -> list[schemas.User]:
+@router.get("", response_model=list[account_schemas.User])
+def list_users(db: Db, who: Admin) -> list[account_schemas.User]:
     """All accounts in order of their names."""
     with db.read() as c:
         return [user_answer(row) for row in accounts.list_accounts(c)]
 
 
-@router.post("", status_code=201, response_model=schemas.User, responses=refusals(409))
-def add_user(body: schemas.UserNew, db: Db, who: Admin) -> schemas.User:
+@router.post("", status_code=201, response_model=account_schemas.User, responses=refusals(409))
+def add_user(body: account_schemas.UserNew, db: Db, who: Admin) -> account_schemas.User:
     """Add an account with its first password."""
     hashed = hash_password(body.password)
     with db.write() as c:
@@ -40,10 +40,10 @@ def add_user(body: schemas.UserNew, db: Db, who: Admin) -> schemas.User:
     return user_answer(row)
 
 
-@router.patch("/{user_id}", response_model=schemas.User, responses=refusals(409))
+@router.patch("/{user_id}", response_model=account_schemas.User, responses=refusals(409))
 def change_user(
-    user_id: Id, body: schemas.UserChange, db: Db, logins: OpenLogins, failures: Failures, who: Admin
-) -> schemas.User:
+    user_id: Id, body: account_schemas.UserChange, db: Db, logins: OpenLogins, failures: Failures, who: Admin
+) -> account_schemas.User:
     """Change role, shown name, password, or close the account; sign-ins end, by a new password tokens too."""
     values = body.model_dump(exclude_unset=True, mode="json")
     fields = sorted(values)
@@ -73,6 +73,6 @@ def reset_second_factor(user_id: Id, db: Db, logins: OpenLogins, who: Admin) -> 
         audit.record(c, who, "user.second_factor_reset", "user", user_id)
 
 
-def user_answer(row: Row[Any]) -> schemas.User:
+def user_answer(row: Row[Any]) -> account_schemas.User:
     """Return an account as it is answered: of its row everything but the password."""
-    return schemas.make_answer(schemas.User, row, role=Role(row.role))
+    return schemas.make_answer(account_schemas.User, row, role=Role(row.role))

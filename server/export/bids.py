@@ -79,7 +79,8 @@ def write_bids(content: ExportContent) -> bytes:
 README: Final = """Motion of body-worn inertial sensors, written by Sagittal.
 
 Signals are as measured, in each sensor's own axes, laid on one time axis. Holes of up to 0.1 s are
-filled by straight lines; longer ones are n/a. Contacts and strides in the events are those that count after a person's changes; strides that were left out say why.
+filled by straight lines; longer ones are n/a. Contacts and strides in the events are those that count
+after a person's changes; strides that were left out say why.
 """
 
 PARTICIPANTS: Final = {

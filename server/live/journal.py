@@ -16,7 +16,8 @@ from sqlalchemy.exc import SQLAlchemyError
 from core.feedback import Cue
 from server.services.live_training import note_feedback
 from server.storage.db import Database
-from server.storage.tables import live_event, live_take, now
+from server.storage.live_tables import live_event, live_take
+from server.storage.tables import now
 
 log = logging.getLogger(__name__)
 

@@ -39,5 +39,5 @@ def show_account(request: Request, db: Db, who: Annotated[Identity, require(Acti
         request, db, who, "account.html", "account",
         user=who, role_text=ROLE_WORDS[who.role], min_password=MIN_LENGTH, tokens=tokens, at=now(),
         scopes=[(scope.value, word) for scope, word in SCOPE_WORDS.items()],
-        has_factor=has_factor, codes=codes,
+        has_factor=has_factor, codes=codes, most_days=api_tokens.MOST_DAYS,
     )  # fmt: skip

@@ -17,7 +17,7 @@ def view_guided_test(session: Session, patient: Patient) -> dict[str, Any] | Non
     total = TOTAL.get(session.protocol)
     if total is None:
         return None
-    age = session.performed_on.year - patient.birth_year if patient.birth_year else None
+    age = patient.find_age(session.performed_on)
     return {
         "title": PROTOCOL_NAMES[session.protocol],
         "total": total,

@@ -13,8 +13,7 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Config, Db, Id, OpenTrail, Reviewed
-from server.http.templates import language_of
-from server.pages.paper import show_pdf, write_document
+from server.pages.paper import print_pdf
 from server.pages.shell import render_sheets
 from server.pages.trends import view_trends
 from server.pages.words import describe_person
@@ -22,7 +21,7 @@ from server.report.comparison import compare_figures
 from server.report.feedback_words import side_words
 from server.report.leaflet import list_figures
 from server.report.numbers import Numbers
-from server.services import comparisons, histories, patients, pdfs, prescriptions, sessions
+from server.services import comparisons, histories, patients, prescriptions, sessions
 from server.services.errors import NotFound
 from server.services.provenance import CODE_VERSION
 from server.services.reviewed import ReviewedAnalyses
@@ -60,8 +59,7 @@ def make_leaflet(
     """The same as PDF."""
     context = gather_leaflet(db, reviewed, sid)
     trail.record_opened(who, "leaflet.opened", "session", sid)
-    document = write_document(language_of(request), LEAFLET, context)
-    return show_pdf(pdfs.make_pdf(settings, document), f"leaflet-{sid[:8]}.pdf")
+    return print_pdf(request, settings, LEAFLET, context, f"leaflet-{sid[:8]}.pdf")
 
 
 @router.get("/patients/{pid}/course")
@@ -87,8 +85,7 @@ def make_course(
     """The same as PDF."""
     context = gather_course(db, reviewed, pid)
     trail.record_opened(who, "course.opened", "patient", pid)
-    document = write_document(language_of(request), COURSE, context)
-    return show_pdf(pdfs.make_pdf(settings, document), f"course-{pid[:8]}.pdf")
+    return print_pdf(request, settings, COURSE, context, f"course-{pid[:8]}.pdf")
 
 
 def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[str, Any]:

@@ -11,12 +11,15 @@ from dataclasses import replace
 from typing import Any, Final
 
 from markupsafe import Markup
+from starlette.requests import Request
 from starlette.responses import Response
 
 from server.http.headers import allow_camera, lock_document
-from server.http.templates import TEMPLATES
+from server.http.templates import TEMPLATES, language_of
 from server.pages.assets import STATIC
 from server.pages.words import PROTOCOL_NAMES
+from server.services import pdfs
+from server.settings import Settings
 
 SHEETS: Final = ("tokens", "base", "pages", "visits", "daily", "paper")
 """Style sheets of paper, in their order."""
@@ -66,6 +69,14 @@ def show_document(content: bytes, *, is_shared: bool = False) -> Response:
     if is_shared:
         headers["Referrer-Policy"] = "no-referrer"
     return Response(content, media_type="text/html; charset=utf-8", headers=headers)
+
+
+def print_pdf(
+    request: Request, settings: Settings, template: str, context: Mapping[str, Any], name: str
+) -> Response:
+    """Answer with the PDF of a template's document, in the reader's language; raises as `pdfs.make_pdf`."""
+    document = write_document(language_of(request), template, context)
+    return show_pdf(pdfs.make_pdf(settings, document), name)
 
 
 def show_pdf(content: bytes, name: str) -> Response:

@@ -14,7 +14,7 @@ from server.auth.roles import Action
 from server.context import Blobs, Config, Db, Failures, Id, OpenTrail, Reviewed, address_of
 from server.http.json_body import StrictJsonRoute
 from server.http.templates import language_of
-from server.pages.paper import hide_person, show_document, show_pdf, write_document
+from server.pages.paper import hide_person, print_pdf, show_document, show_pdf, write_document
 from server.pages.session import PAPER, choose_template, gather_report
 from server.pages.session_context import read_context
 from server.pages.shell import record_opening, render_page
@@ -23,7 +23,6 @@ from server.services.errors import NotFound
 from server.services.report_links import LinkNotFound
 from server.services.reviewed import ReviewedAnalyses
 from server.services.signed_reports import DOCUMENT, PSEUDONYMISED
-from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.tables import new_id
 
@@ -65,8 +64,7 @@ def make_draft(
     """The report as it stands now, as PDF; it says that it is not signed."""
     context = _gather(db, reviewed, sid, who)
     trail.record_opened(who, "report.opened", "session", sid)
-    document = write_document(language_of(request), choose_template(PAPER, context), context)
-    return show_pdf(pdfs.make_pdf(settings, document), f"report-{sid[:8]}.pdf")
+    return print_pdf(request, settings, choose_template(PAPER, context), context, f"report-{sid[:8]}.pdf")
 
 
 @router.post("/sessions/{sid}/report/sign", status_code=201, response_class=JSONResponse)
@@ -99,9 +97,9 @@ def sign(
 @router.get("/signed-reports/{report_id}")
 def show_signed(db: Db, blobs: Blobs, trail: OpenTrail, report_id: Id, who: Reader) -> Response:
     """A signed report, byte by byte as it was signed."""
-    content = _open_signed(db, blobs, report_id)
     with db.read() as c:
         session_id = signed_reports.get(c, report_id).session_id
+        content = signed_reports.read_document(c, blobs, report_id)
     trail.record_opened(who, "signed_report.opened", "session", session_id, {"report_id": report_id})
     return show_document(content)
 
@@ -134,12 +132,9 @@ def show_shared(
         trail.record_refused("report_link.refused", "session", None, address)
         raise
     report_links.note_opening(db, link, address)
-    return show_document(_open_signed(db, blobs, link.report_id, PSEUDONYMISED), is_shared=True)
-
-
-def _open_signed(db: Database, blobs: BlobStore, report_id: str, name: str = DOCUMENT) -> bytes:
     with db.read() as c:
-        return signed_reports.read_document(c, blobs, report_id, name)
+        content = signed_reports.read_document(c, blobs, link.report_id, PSEUDONYMISED)
+    return show_document(content, is_shared=True)
 
 
 def _gather(db: Database, reviewed: ReviewedAnalyses, sid: str, who: Identity) -> dict[str, Any]:

@@ -10,9 +10,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
 from core.events.result import Strides
-from core.frames import SIDES
 from core.parameters.catalogue.entry import SQUAT
-from core.parameters.result import Parameter
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -26,6 +24,7 @@ from server.pages.charts import (
     PAPER_HEIGHTS,
     draw_chart,
 )
+from server.pages.profile import view_profile
 from server.pages.report_rows import (
     FIRST_ROWS,
     SECONDARY,
@@ -36,15 +35,12 @@ from server.pages.report_rows import (
 )
 from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import FRAGMENT, record_opening, render_page, render_sheets
+from server.pages.takes import view_takes
 from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
-from server.report import level
 from server.report.bundle import read_poses
-from server.report.change_words import NO_LIMIT, ChangeWords, find_term, format_difference
 from server.report.curves import GLANCE_STRIDES, strip_svg
 from server.report.model import ReportModel
-from server.report.profile import ProfileBar, bar_svg
-from server.report.table import ParameterRow
-from server.report.wording import format_number, speak_places
+from server.report.wording import speak_places
 from server.services import (
     analyses,
     comparisons,
@@ -54,7 +50,6 @@ from server.services import (
     reports,
     signed_reports,
     videos,
-    visits,
 )
 from server.services.controls import ControlVisit
 from server.services.histories import AnalysedSession
@@ -308,95 +303,6 @@ def _draw_still(
     return None if svg is None else {"svg": svg, "caption": caption}
 
 
-def view_takes(
-    reviewed: ReviewedAnalyses,
-    done: Sequence[AnalysedSession],
-    session_id: str,
-    first: Sequence[ParameterRow],
-) -> dict[str, Any] | None:
-    """The first values of every take of this visit and their mean; None where it has only this one."""
-    visit = visits.find_visit_of(done, session_id)
-    if visit is None or len(visit.takes) < 2:
-        return None
-    measured = visits.measure_visit(reviewed, visit)
-    ids = [t.session.id for t in visit.takes]
-    rows = []
-    for row in first:
-        name = level.from_standing(row.name) or row.name  # levels are read from standing in every take
-        for side in (None, *SIDES):
-            found = measured.get((name, side))
-            if found is None or found.mean.mean is None:
-                continue
-            digits = find_term(name).digits
-            rows.append(
-                {
-                    "title": find_term(name).label,
-                    "unit": find_term(name).unit,
-                    "side": side,
-                    "cells": [_print_take(found.by_take.get(sid), digits) for sid in ids],
-                    "mean": format_number(found.mean.mean, digits),
-                }
-            )
-    columns = [
-        {"id": t.session.id, "title": t.session.title, "this": t.session.id == session_id}
-        for t in visit.takes
-    ]
-    return {"columns": columns, "rows": rows}
-
-
-def _print_take(p: Parameter | None, digits: int) -> str:
-    if p is None or p.mean is None:
-        return "–"
-    spread = "" if p.sd is None else f" ± {format_number(p.sd, digits)}"
-    return format_number(p.mean, digits) + spread
-
-
-def view_profile(
-    reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any]
-) -> tuple[dict[str, Any] | None, list[dict[str, Any]]]:
-    """The sagittal score and the bars of its curves, both with the visit before; None, [] without curves."""
-    if model.profile is None or model.quality.kind == "bad":
-        return None, []
-    earlier, before = None, context.get("before")
-    if before is not None and model.since is not None:
-        _, old = reports.read(reviewed, before.found, before.edits, context["patient"], before.session)
-        earlier = old.profile
-    found = {} if earlier is None else {b.title: b for b in earlier.bars}
-    bars = [
-        {"title": b.title, "svg": bar_svg(b, found.get(b.title)), **_print_sides(b)}
-        for b in model.profile.bars
-    ]
-    score = model.profile.score
-    if score is None:
-        return None, bars
-    was = None if earlier is None else earlier.score
-    matched = model.profile.score_at_speed
-    return {
-        **_print_sides(score),
-        "title": score.title,
-        "at_speed": None if matched is None else _print_sides(matched),
-        "healthy": None if score.p95 is None else format_number(score.p95, 1),
-        "before": None if was is None else tuple(_print_sides(was).values()),
-        "change": () if was is None else _change_score(was, score),
-    }, bars
-
-
-def _print_sides(bar: ProfileBar) -> dict[str, str]:
-    return {side: format_number(bar.values[side], 1) if side in bar.values else "–" for side in SIDES}
-
-
-def _change_score(before: ProfileBar, now: ProfileBar) -> tuple[ChangeWords, ...]:
-    """Of each side with both values; no source has a limit for it, so there is no verdict."""
-    term = find_term("gps_sagittal_deg")
-    return tuple(
-        ChangeWords(
-            side, format_difference(now.values[side] - before.values[side], term), "none", NO_LIMIT, ()
-        )
-        for side in SIDES
-        if side in now.values and side in before.values
-    )
-
-
 def _draw_panels(model: ReportModel, heights: Mapping[bool, int]) -> list[dict[str, Any]]:
     """All cycle charts; those of the last row also say the unit of the x axis."""
     last_row = len(model.panels) - COLUMNS
@@ -445,7 +351,7 @@ def _not_compared(session: Session, model: ReportModel) -> str | None:
 
 
 def _identity(patient: Patient, session: Session, condition: str) -> list[tuple[str, str]]:
-    height = session.height_m or patient.height_m
+    height = patient.find_height(session)
     return [
         ("Code", patient.code),
         ("Age, sex", describe_person(patient.sex, patient.birth_year) or "not given"),

@@ -20,6 +20,7 @@ from collections.abc import Iterator, Mapping
 from typing import IO, Any, Final
 
 from core.errors import InputError
+from server.export.zipping import EARLIEST
 from server.services.analyses import AnalysisRecord
 from server.services.edit_log import EditHistory
 from server.services.provenance import CODE_VERSION
@@ -27,8 +28,6 @@ from server.services.recordings import StoredRecording
 from server.storage.blobs import BlobStore
 
 SCHEMA: Final = 1
-_EPOCH: Final = (1980, 1, 1, 0, 0, 0)
-"""Time of every entry: the same visit gives the same bytes."""
 _PACKED: Final = (".parquet", ".gz", ".h5")
 _LEVEL: Final = 1
 """Of deflate: text packs four to one at once, and no better for ten times as long."""
@@ -59,7 +58,7 @@ def write_archive(
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
 
         def add(name: str, content: bytes) -> None:
-            info = zipfile.ZipInfo(name, _EPOCH)
+            info = zipfile.ZipInfo(name, EARLIEST)
             info.compress_type = zipfile.ZIP_STORED if name.endswith(_PACKED) else zipfile.ZIP_DEFLATED
             archive.writestr(info, content, compresslevel=_LEVEL)
             sha256[name] = hashlib.sha256(content).hexdigest()

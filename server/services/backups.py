@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from sqlalchemy import func, select, update
+from sqlalchemy import Connection, func, select, update
 
 from server import audit
 from server.services.provenance import CODE_VERSION
@@ -176,6 +176,12 @@ def prune(folder: Path) -> list[Path]:
     return gone
 
 
+def count_patients_and_sessions(c: Connection) -> tuple[int, int]:
+    """How many patients and sessions there are."""
+    people = c.execute(select(func.count()).select_from(patient)).scalar_one()
+    return people, c.execute(select(func.count()).select_from(session)).scalar_one()
+
+
 def _write(
     db: Database, settings: Settings, path: Path, key: ClinicKey | None, at: dt.datetime
 ) -> MadeBackup:
@@ -189,8 +195,7 @@ def _write(
                     c.execute(update(job).values(checkpoint=None))
                 with snapshot.read() as c:
                     used, head = sorted(list_referenced(c)), read_newest(c)
-                    people = c.execute(select(func.count()).select_from(patient)).scalar_one()
-                    visits = c.execute(select(func.count()).select_from(session)).scalar_one()
+                    people, visits = count_patients_and_sessions(c)
                 snapshot.close()  # folds its write-ahead log into the file
                 revision = read_revision(copy)
                 _add(archive, DATABASE, copy, content)

@@ -116,8 +116,8 @@ def compare_sessions(reviewed: ReviewedAnalyses, found: SessionPair) -> tuple[Co
 def find_norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
     """The reference of a person on the day of a session, at its speed."""
     speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
-    age = session.performed_on.year - patient.birth_year if patient.birth_year else None
-    height = session.height_m if session.height_m is not None else patient.height_m
+    age = patient.find_age(session.performed_on)
+    height = patient.find_height(session)
     return look_up_norms(
         age,
         patient.sex,

@@ -28,18 +28,17 @@ from server.settings import Settings
 from server.storage import fs
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.storage.live_tables import live_event, live_take
 from server.storage.person_tables import consent
+from server.storage.report_tables import assessment, report_file, report_link, signed_report
 from server.storage.tables import (
     analysis,
     analysis_file,
-    assessment,
     device_check,
     edit,
     filter_run,
     filter_run_file,
     job,
-    live_event,
-    live_take,
     new_id,
     patient,
     patient_note,
@@ -49,11 +48,8 @@ from server.storage.tables import (
     recording,
     recording_file,
     reference_file,
-    report_file,
-    report_link,
     session,
     session_video,
-    signed_report,
     tuning,
 )
 from server.storage.tables import audit as audit_table

@@ -63,9 +63,7 @@ class PatientHistory:
 
     @property
     def _age(self) -> int | None:
-        if not self.visits or not self.patient.birth_year:
-            return None
-        return self.visits[-1].performed_on.year - self.patient.birth_year
+        return self.patient.find_age(self.visits[-1].performed_on) if self.visits else None
 
 
 @dataclass(frozen=True)

@@ -25,16 +25,8 @@ from server import audit
 from server.auth.tokens import new_token, token_hash
 from server.services import devices, sessions
 from server.services.errors import Conflict, NotFound, ServiceError
-from server.storage.tables import (
-    OPEN_TAKE_STATES,
-    live_event,
-    live_take,
-    new_id,
-    now,
-    patient,
-    session,
-    user,
-)
+from server.storage.live_tables import OPEN_TAKE_STATES, live_event, live_take
+from server.storage.tables import new_id, now, patient, session, user
 
 ALPHABET = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
 """Characters of a code: none that looks or sounds on a tablet like another (0 O, 1 I L)."""

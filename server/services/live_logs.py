@@ -24,7 +24,7 @@ from server.settings import Settings
 from server.storage import fs, segments
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
-from server.storage.tables import live_take
+from server.storage.live_tables import live_take
 
 _ID = re.compile(r"[0-9a-f]{32}")
 

@@ -21,7 +21,8 @@ from server.settings import Settings
 from server.storage import fs, segments
 from server.storage.blobs import Blob, BlobStore
 from server.storage.db import Database
-from server.storage.tables import OPEN_TAKE_STATES, live_take, new_id, now, recording, recording_file, user
+from server.storage.live_tables import OPEN_TAKE_STATES, live_take
+from server.storage.tables import new_id, now, recording, recording_file, user
 
 log = logging.getLogger(__name__)
 

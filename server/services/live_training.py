@@ -17,7 +17,8 @@ from server import audit
 from server.services import analyses, live, prescriptions, sessions
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
-from server.storage.tables import live_event, live_take, session
+from server.storage.live_tables import live_event, live_take
+from server.storage.tables import session
 
 log = logging.getLogger(__name__)
 

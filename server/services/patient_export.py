@@ -21,11 +21,11 @@ from sqlalchemy import Connection, Table, or_, select
 
 from server.services import patients
 from server.services.provenance import CODE_VERSION
+from server.storage.archive import PIECE
 from server.storage.blobs import BlobStore, IntegrityError
 from server.storage.db import Database
 from server.storage.tables import audit, metadata, now, patient, user
 
-PIECE: Final = 1 << 20
 _INTO: Final = "w"
 """How a zip's own file is opened; on the disk nothing is."""
 SECRET: Final = frozenset({"code_sha256", "token_sha256"})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 from unicodedata import normalize
 
 from sqlalchemy import Connection, func, insert, select, update
@@ -16,6 +16,9 @@ from server import audit
 from server.jobs.queue import BESIDE
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.storage.tables import ACTIVE_STATES, job, new_id, now, patient, recording, session
+
+if TYPE_CHECKING:
+    from server.services.sessions import Session
 
 CHANGEABLE = frozenset({"code", "sex", "birth_year", "height_m", "affected_side", "is_control", "note"})
 
@@ -45,6 +48,14 @@ class Patient:
     sessions: int
     last_visit: dt.date | None
     running: bool
+
+    def find_age(self, day: dt.date) -> int | None:
+        """Age in years as far as the year of birth tells it, None where that is not known."""
+        return day.year - self.birth_year if self.birth_year else None
+
+    def find_height(self, session: Session) -> float | None:
+        """Height at a visit in metres: as measured then, else the usual one."""
+        return session.height_m if session.height_m is not None else self.height_m
 
 
 def create(

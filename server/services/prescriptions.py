@@ -24,7 +24,8 @@ from server.services.errors import Conflict, NotFound, ServiceError
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.services.targets import AnalysedWalk
-from server.storage.tables import live_event, live_take, new_id, now, prescription, session, user
+from server.storage.live_tables import live_event, live_take
+from server.storage.tables import new_id, now, prescription, session, user
 
 
 @dataclass(frozen=True)

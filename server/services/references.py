@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import Connection, select, union
 
+from server.storage.report_tables import report_file, signed_report
 from server.storage.tables import (
     analysis,
     analysis_file,
@@ -14,10 +15,8 @@ from server.storage.tables import (
     recording,
     recording_file,
     reference_file,
-    report_file,
     session,
     session_video,
-    signed_report,
 )
 
 

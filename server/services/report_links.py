@@ -18,7 +18,8 @@ from server.auth.tokens import new_token, token_hash
 from server.services import signed_reports
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.storage.db import Database
-from server.storage.tables import new_id, now, report_link, signed_report
+from server.storage.report_tables import report_link, signed_report
+from server.storage.tables import new_id, now
 
 MOST_DAYS: Final = 90
 USUAL_DAYS: Final = 14

@@ -39,8 +39,8 @@ def read(
     control_visits : of the clinic's own controls.
     """
     bundle = reviewed.read_bundle(found, edits)
-    age = session.performed_on.year - patient.birth_year if patient.birth_year else None
-    height = session.height_m if session.height_m is not None else patient.height_m
+    age = patient.find_age(session.performed_on)
+    height = patient.find_height(session)
     speed = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
     model = report_model(
         bundle,

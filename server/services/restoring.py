@@ -19,12 +19,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from sqlalchemy import Connection, delete, func, select, update
+from sqlalchemy import delete, select, update
 
 from core.formats.json_tree import read_json
 from server import audit
 from server.services import checks, erasure, patients
-from server.services.backups import DATABASE, FORMAT, MANIFEST
+from server.services.backups import DATABASE, FORMAT, MANIFEST, count_patients_and_sessions
 from server.services.reviewed import ReviewedAnalyses
 from server.services.tombstones import NAME as TOMBSTONES
 from server.services.tombstones import Tombstones, parse_tombstones, read_tombstones
@@ -36,7 +36,8 @@ from server.storage.db import Database
 from server.storage.high_water import HighWater, read_newest, set_mark
 from server.storage.migrate import MigrationError, upgrade
 from server.storage.person_tables import api_token
-from server.storage.tables import login_session, now, one_time_token, patient, report_link, session
+from server.storage.report_tables import report_link
+from server.storage.tables import login_session, now, one_time_token, patient, session
 
 RESTORED: Final = "backup.restored"
 _OURS: Final = re.compile(
@@ -185,7 +186,7 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
     fs.make_folder(stage.live)
     with closing(Database(stage.database)) as db:
         with db.read() as c:
-            head, counted = read_newest(c), _count(c)
+            head, counted = read_newest(c), count_patients_and_sessions(c)
         if head != manifest.audit_head or counted != (manifest.patients, manifest.sessions):
             raise RestoreError(f"{archive.name}: its database is not the one that its manifest describes.")
         defects = [
@@ -205,7 +206,7 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
             detail = {"created_at": manifest.created_at.isoformat(), "erased_again": again}
             audit.record(c, None, RESTORED, "database", None, detail)
         with db.read() as c:
-            people, visits = _count(c)
+            people, visits = count_patients_and_sessions(c)
         set_mark(db, stage.mark)
     fs.sync_file(stage.database)
     files = sum(1 for _ in blobs.files()) + sum(1 for _ in stage.live.iterdir())
@@ -268,11 +269,6 @@ def _read_manifest(archive: Path, data: bytes) -> BackupManifest:
         )
     except (ValueError, KeyError, TypeError) as error:
         raise RestoreError(f"{archive.name}: its manifest cannot be read ({error}).") from error
-
-
-def _count(c: Connection) -> tuple[int, int]:
-    people = c.execute(select(func.count()).select_from(patient)).scalar_one()
-    return people, c.execute(select(func.count()).select_from(session)).scalar_one()
 
 
 def _erase_again(db: Database, blobs: BlobStore, stage: Settings, gone: Tombstones) -> int:

@@ -17,7 +17,8 @@ from server import audit
 from server.services import sessions
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.storage.blobs import Blob, BlobStore
-from server.storage.tables import assessment, now, report_file, session, signed_report
+from server.storage.report_tables import assessment, report_file, signed_report
+from server.storage.tables import now, session
 
 MOST_CHARACTERS: Final = 10_000
 

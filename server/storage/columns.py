@@ -1,4 +1,4 @@
-"""What tables are made of: ids, times, JSON, references the rule of a few values, their names."""
+"""What tables are made of: ids, times, JSON, references, stored files, names, the rule of a few values."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from sqlalchemy import (
     DateTime,
     Dialect,
     ForeignKey,
+    Integer,
     MetaData,
     String,
     TypeDecorator,
@@ -72,6 +73,20 @@ def reference(name: str, target: str, *, nullable: bool = False, index: bool = T
     """A column of ids of another table, whose rows cannot go while this one refers to them."""
     key = ForeignKey(f"{target}.id", ondelete="RESTRICT")
     return Column(name, String(32), key, nullable=nullable, index=index)
+
+
+def owner(name: str, target: str) -> Column[str]:
+    """The primary key, or a part of it, of rows that belong to a row of another table: that row's id."""
+    return Column(name, String(32), ForeignKey(f"{target}.id", ondelete="RESTRICT"), primary_key=True)
+
+
+def describe_file() -> tuple[Column[int], Column[str], CheckConstraint]:
+    """The columns of a file of storage/blobs.py, size in bytes and SHA-256, and their rule."""
+    return (
+        Column("size", Integer, nullable=False),
+        Column("sha256", String(64), nullable=False, index=True),
+        CheckConstraint("size >= 0", name="size"),
+    )
 
 
 def one_of(column: str, values: Sequence[str]) -> CheckConstraint:

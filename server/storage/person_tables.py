@@ -5,32 +5,32 @@ By the rules of storage/tables.py.
 
 from __future__ import annotations
 
-from sqlalchemy import CheckConstraint, Column, Date, ForeignKey, Integer, LargeBinary, String, Table
+from sqlalchemy import CheckConstraint, Column, Date, Integer, LargeBinary, String, Table
 
-from server.storage.columns import Json, Utc, metadata
+from server.storage.columns import Json, Utc, id_column, metadata, one_of, owner, reference
 
 CONSENT_PURPOSES = ("recording", "research", "teaching", "sharing")
 
 consent = Table(
     "consent",
     metadata,
-    Column("id", String(32), primary_key=True),
-    Column("patient_id", ForeignKey("patient.id", ondelete="RESTRICT"), nullable=False, index=True),
+    id_column(),
+    reference("patient_id", "patient"),
     Column("purpose", String(16), nullable=False),
     Column("given_on", Date, nullable=False),
     Column("evidence", String(200), nullable=False),  # where it is written: "signed form, file 12"
     Column("withdrawn_on", Date),
     Column("created_at", Utc, nullable=False),
-    Column("created_by", ForeignKey("user.id", ondelete="RESTRICT")),
-    CheckConstraint(f"purpose IN ({', '.join(repr(one) for one in CONSENT_PURPOSES)})", name="purpose"),
+    reference("created_by", "user", nullable=True, index=False),
+    one_of("purpose", CONSENT_PURPOSES),
     CheckConstraint("withdrawn_on >= given_on", name="withdrawn"),
 )
 
 api_token = Table(
     "api_token",
     metadata,
-    Column("id", String(32), primary_key=True),
-    Column("user_id", ForeignKey("user.id", ondelete="RESTRICT"), nullable=False, index=True),
+    id_column(),
+    reference("user_id", "user"),
     Column("name", String(40), nullable=False),
     Column("token_sha256", String(64), nullable=False, unique=True),  # the token itself was shown once
     Column("scopes", Json, nullable=False),
@@ -42,7 +42,7 @@ api_token = Table(
 second_factor = Table(
     "second_factor",
     metadata,
-    Column("user_id", ForeignKey("user.id", ondelete="RESTRICT"), primary_key=True),
+    owner("user_id", "user"),
     Column("secret", LargeBinary, nullable=False),  # encrypted (server/auth/second_factor.py)
     Column("recovery", Json, nullable=False),  # hashes of the codes that have not been used
     Column("last_step", Integer, nullable=False),  # of the newest code that was taken: none is taken twice

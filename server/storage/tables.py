@@ -1,4 +1,4 @@
-"""All tables, in portable types: string ids (uuid4 hex), JSON, UTC times, CHECK constraints, no native enums.
+"""Tables, in portable types: string ids (uuid4 hex), JSON, UTC times, CHECK constraints, no native enums.
 
 Nothing is deleted by cascade (RESTRICT everywhere): clinical rows leave only through services/erasure.py.
 
@@ -15,6 +15,8 @@ patient ─< session ─< recording ─< recording_file          user ─< login
         └──< prescription ─< live_take >── session, recording (the one it became)
                                  └──< live_event (append-only)
 user ─< api_token, second_factor; patient ─< consent (storage/person_tables.py)
+
+Reports, live takes and what opens an account have modules of their own; `metadata` has the tables of all.
 """
 
 from __future__ import annotations
@@ -38,12 +40,15 @@ from sqlalchemy import (
     text,
 )
 
+from server.storage import live_tables, person_tables, report_tables  # noqa: F401 - `metadata` has all tables
 from server.storage.columns import Json, Utc
+from server.storage.columns import describe_file as _describe_file
 from server.storage.columns import id_column as _id
 from server.storage.columns import metadata as metadata
 from server.storage.columns import new_id as new_id
 from server.storage.columns import now as now
 from server.storage.columns import one_of as _one_of
+from server.storage.columns import owner as _owner
 from server.storage.columns import reference as _ref
 
 SEXES = ("female", "male")
@@ -53,12 +58,6 @@ JOB_STATES = ("queued", "running", "done", "failed", "cancelled")
 ACTIVE_STATES = ("queued", "running")
 TOKEN_PURPOSES = ("set_up", "sign_in")
 VISIT_KINDS = ("assessment", "training")
-TAKE_STATES = ("pairing", "open", "streaming", "finished", "closed")
-OPEN_TAKE_STATES = ("pairing", "open", "streaming")
-LIVE_EVENT_KINDS = (
-    "start", "stop", "mark", "undo_mark", "feedback", "level", "pause", "redo_calibration",
-    "ghost", "test", "prescription", "stale", "calibration", "cue", "guard", "notice",
-)  # fmt: skip
 EDIT_KINDS = ("move_event", "add_event", "delete_event", "exclude_stride", "include_stride", "undo")
 
 
@@ -125,12 +124,10 @@ recording = Table(
 recording_file = Table(
     "recording_file",
     metadata,
-    Column("recording_id", ForeignKey("recording.id", ondelete="RESTRICT"), primary_key=True),
+    _owner("recording_id", "recording"),
     Column("name", String(500), primary_key=True),  # as uploaded, with its folders; any Unicode
-    Column("size", Integer, nullable=False),
-    Column("sha256", String(64), nullable=False, index=True),
+    *_describe_file(),
     Column("added_at", Utc, nullable=False),
-    CheckConstraint("size >= 0", name="size"),
 )
 
 user = Table(
@@ -227,17 +224,15 @@ analysis = Table(
 analysis_file = Table(
     "analysis_file",
     metadata,
-    Column("analysis_id", ForeignKey("analysis.id", ondelete="RESTRICT"), primary_key=True),
+    _owner("analysis_id", "analysis"),
     Column("name", String(100), primary_key=True),
-    Column("size", Integer, nullable=False),
-    Column("sha256", String(64), nullable=False, index=True),
-    CheckConstraint("size >= 0", name="size"),
+    *_describe_file(),
 )
 
 device_check = Table(
     "device_check",
     metadata,
-    Column("recording_id", ForeignKey("recording.id", ondelete="RESTRICT"), primary_key=True),
+    _owner("recording_id", "recording"),
     Column("device_id", String(32), primary_key=True, index=True),  # serial numbers only, never a file's name
     Column("segment", String(16), nullable=False),  # where the analysis took it to be
     Column("exchanged", Boolean, nullable=False),  # its place was said wrongly: it is not offered again
@@ -248,78 +243,22 @@ device_check = Table(
 reference_file = Table(
     "reference_file",
     metadata,
-    Column("session_id", ForeignKey("session.id", ondelete="RESTRICT"), primary_key=True),
+    _owner("session_id", "session"),
     Column("name", String(500), primary_key=True),  # as uploaded; orientations of another system
-    Column("size", Integer, nullable=False),
-    Column("sha256", String(64), nullable=False, index=True),
+    *_describe_file(),
     Column("added_at", Utc, nullable=False),
-    CheckConstraint("size >= 0", name="size"),
 )
 
 session_video = Table(
     "session_video",
     metadata,
-    Column("session_id", ForeignKey("session.id", ondelete="RESTRICT"), primary_key=True),
+    _owner("session_id", "session"),
     Column("name", String(500), nullable=False),
     Column("media_type", String(32), nullable=False),
-    Column("size", Integer, nullable=False),
-    Column("sha256", String(64), nullable=False, index=True),
+    *_describe_file(),
     Column("offset_s", Float),  # time in the video at the take's time 0; None: nobody has aligned it
     Column("consent_by", String(64)),  # who said that the person agreed; no key, as accounts may go
     Column("consent_at", Utc, nullable=False),
-    CheckConstraint("size >= 0", name="size"),
-)
-
-assessment = Table(
-    "assessment",
-    metadata,
-    Column("session_id", ForeignKey("session.id", ondelete="RESTRICT"), primary_key=True),
-    Column("content", Text, nullable=False),  # of the therapist, on the report
-    Column("changed_at", Utc, nullable=False),
-)
-
-signed_report = Table(
-    "signed_report",
-    metadata,
-    _id(),
-    _ref("session_id", "session"),
-    Column("number", Integer, nullable=False),  # version of the session's report, from 1
-    Column("analysis_id", String(32), nullable=False),  # what it was made from; no key: it stands by itself
-    Column("language", String(8), nullable=False),
-    Column("signed_by", String(200)),  # the name it bears; no key, as accounts may go
-    Column("signed_at", Utc, nullable=False),
-    Column("reopened_by", String(200)),
-    Column("reopened_at", Utc),  # None: in force
-    Column("reopened_because", Text),
-    UniqueConstraint("session_id", "number"),
-    CheckConstraint("(reopened_at IS NULL) = (reopened_because IS NULL)", name="reopened"),
-)
-
-report_file = Table(
-    "report_file",
-    metadata,
-    Column("report_id", ForeignKey("signed_report.id", ondelete="RESTRICT"), primary_key=True),
-    Column("name", String(32), primary_key=True),
-    Column("size", Integer, nullable=False),
-    Column("sha256", String(64), nullable=False, index=True),
-    CheckConstraint("size >= 0", name="size"),
-)
-
-report_link = Table(
-    "report_link",
-    metadata,
-    _id(),
-    _ref("report_id", "signed_report"),
-    Column(
-        "token_sha256", String(64), nullable=False, unique=True
-    ),  # the token itself is only in the address
-    Column("made_by", String(200)),
-    Column("made_at", Utc, nullable=False),
-    Column("expires_at", Utc, nullable=False),
-    Column("revoked_at", Utc),
-    Column("openings", Integer, nullable=False),
-    Column("opened_at", Utc),  # last
-    CheckConstraint("openings >= 0", name="openings"),
 )
 
 filter_run = Table(
@@ -339,11 +278,9 @@ filter_run = Table(
 filter_run_file = Table(
     "filter_run_file",
     metadata,
-    Column("filter_run_id", ForeignKey("filter_run.id", ondelete="RESTRICT"), primary_key=True),
+    _owner("filter_run_id", "filter_run"),
     Column("name", String(100), primary_key=True),
-    Column("size", Integer, nullable=False),
-    Column("sha256", String(64), nullable=False, index=True),
-    CheckConstraint("size >= 0", name="size"),
+    *_describe_file(),
 )
 
 edit = Table(
@@ -409,52 +346,6 @@ prescription = Table(
     Column("ended_at", Utc),  # None: in force
 )
 
-live_take = Table(
-    "live_take",
-    metadata,
-    _id(),
-    _ref("session_id", "session"),
-    Column("state", String(16), nullable=False),
-    Column("code_sha256", String(64), unique=True),  # of the pairing code; None once it was used
-    Column("code_expires_at", Utc),
-    Column("token_sha256", String(64), unique=True),  # of the tablet's token, which opens this take only
-    Column("token_expires_at", Utc),
-    _ref("opened_by", "user", nullable=True, index=False),
-    _ref("prescription_id", "prescription", nullable=True, index=False),  # the one in force at its start
-    Column("source", String(32)),  # what the tablet said it streams
-    Column("count", Integer),  # batches at the end
-    Column("sha256", String(64)),  # of all payloads, as the tablet said at the end
-    _ref("recording_id", "recording", nullable=True, index=False),  # None: not stored yet, or nothing came
-    Column("problem", String(64)),  # code of what was wrong at the end
-    Column("created_at", Utc, nullable=False),
-    Column("finished_at", Utc),
-    _one_of("state", TAKE_STATES),
-    CheckConstraint("(state IN ('finished', 'closed')) = (finished_at IS NOT NULL)", name="finished"),
-)
-
-_OPEN_TAKE = text("state IN ('pairing', 'open', 'streaming')")
-Index(
-    "uq_live_take_open",
-    live_take.c.session_id,
-    unique=True,
-    sqlite_where=_OPEN_TAKE,
-    postgresql_where=_OPEN_TAKE,
-)
-
-live_event = Table(
-    "live_event",
-    metadata,
-    Column("seq", Integer, primary_key=True, autoincrement=True),
-    _ref("take_id", "live_take"),
-    Column("kind", String(16), nullable=False),
-    Column("t_s", Float),  # on the take's axis; None before its first sample
-    Column("content", Json, nullable=False),
-    _ref("user_id", "user", nullable=True, index=False),  # None: the estimator
-    Column("at", Utc, nullable=False),
-    _one_of("kind", LIVE_EVENT_KINDS),
-    sqlite_autoincrement=True,
-)
-
 audit = Table(
     "audit",
     metadata,
@@ -485,10 +376,3 @@ EDIT_TRIGGER = (
     "BEGIN SELECT RAISE(ABORT, 'edits are append-only'); END"
 )
 event.listen(edit, "after_create", DDL(EDIT_TRIGGER).execute_if(dialect="sqlite"))  # type: ignore[no-untyped-call]
-
-LIVE_EVENT_TRIGGER = (
-    "CREATE TRIGGER live_event_no_update BEFORE UPDATE ON live_event "
-    "BEGIN SELECT RAISE(ABORT, 'live events are append-only'); END"
-)
-_append_only = DDL(LIVE_EVENT_TRIGGER).execute_if(dialect="sqlite")  # type: ignore[no-untyped-call]
-event.listen(live_event, "after_create", _append_only)

@@ -67,8 +67,8 @@ def _person(db: Database, sid: str) -> tuple[BodyModel, NormAt]:
     with db.read() as c:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
-    height = session.height_m if session.height_m is not None else patient.height_m
-    age = session.performed_on.year - patient.birth_year if patient.birth_year else None
+    height = patient.find_height(session)
+    age = patient.find_age(session.performed_on)
 
     def norm_at(speed_mps: float | None) -> Mapping[str, Floats]:
         bands = look_up_norms(age, None, speed_mps, height).bands

@@ -19,7 +19,7 @@ from core.formats.live_log import Hello, SampleBatch, SensorInfo, StreamInfo, en
 from core.frames import SEGMENTS
 from server.live.client import StreamReport, stream
 from server.services import live, sessions
-from server.storage.tables import live_take
+from server.storage.live_tables import live_take
 from tests.faults.clinic import Clinic
 from tests.faults.test_server_deaths import serving
 

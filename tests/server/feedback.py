@@ -11,7 +11,8 @@ from server.services import live, live_training, patients, sessions
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
-from server.storage.tables import live_take, new_id
+from server.storage.live_tables import live_take
+from server.storage.tables import new_id
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

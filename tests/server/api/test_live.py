@@ -16,7 +16,8 @@ from sqlalchemy.exc import IntegrityError
 from server.auth.throttle import MAX_PER_PAIR, Throttle
 from server.services import patients, sessions
 from server.services.live import ALPHABET
-from server.storage.tables import live_event, live_take, now, prescription, recording
+from server.storage.live_tables import live_event, live_take
+from server.storage.tables import now, prescription, recording
 from tests.live_clinic import closed, heard, new_session, open_code, visit
 from tests.live_takes import finish_text, frame
 from tests.server.clinic import Clinic, open_clinic

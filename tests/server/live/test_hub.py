@@ -27,7 +27,7 @@ from server.live.messages import Report as Told
 from server.live.take import STEERING
 from server.services import live, prescriptions, recordings, sessions
 from server.services.live_recordings import log_path
-from server.storage.tables import live_event
+from server.storage.live_tables import live_event
 from tests.live_clinic import Visit, heard, new_session, visit
 from tests.live_takes import finish_text
 from tests.live_walk import items, replayed, walk, walk_hello

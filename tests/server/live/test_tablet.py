@@ -18,7 +18,8 @@ from core.formats.live_log import StreamInfo
 from server.live.protocol import CloseCode
 from server.services import recordings
 from server.services.live_recordings import log_path
-from server.storage.tables import audit, job, live_take, now
+from server.storage.live_tables import live_take
+from server.storage.tables import audit, job, now
 from tests.live_clinic import closed, heard, visit
 from tests.live_takes import HELLO, digest, finish_text, frame
 from tests.server.clinic import Clinic

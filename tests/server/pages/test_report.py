@@ -19,7 +19,8 @@ import sqlalchemy as sa
 
 from server.report.pdf import PdfMissing, render_pdf
 from server.services import report_links
-from server.storage.tables import audit, now, report_link
+from server.storage.report_tables import report_link
+from server.storage.tables import audit, now
 from tests.server import analysed
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.pages.test_pages import page, visit

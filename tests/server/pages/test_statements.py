@@ -14,7 +14,8 @@ from core.feedback import Baseline, Cue
 from server.pages.routes import ROUTERS
 from server.pages.shell import FRAGMENT
 from server.services import live, prescriptions, programmes, sessions
-from server.storage.tables import analysis, live_take, new_id, recording
+from server.storage.live_tables import live_take
+from server.storage.tables import analysis, new_id, recording
 from tests.server import analysed, crowd
 from tests.server.clinic import Clinic, open_clinic
 

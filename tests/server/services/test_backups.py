@@ -27,8 +27,9 @@ from server.storage import fs
 from server.storage.archive import BackupFileError, ClinicKey, make_key, read_archive, read_key
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.storage.report_tables import report_file, signed_report
 from server.storage.tables import audit as audit_table
-from server.storage.tables import login_session, now, report_file, signed_report, user
+from server.storage.tables import login_session, now, user
 from tests.faults.clinic import Clinic
 
 CUT = "is damaged or was cut"

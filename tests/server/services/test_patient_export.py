@@ -12,9 +12,11 @@ from sqlalchemy import insert
 
 from server.services import consents, notes, patients, recordings, sessions
 from server.services.errors import NotFound
-from server.services.patient_export import PIECE, export_patient
+from server.services.patient_export import export_patient
 from server.services.references import list_referenced
-from server.storage.tables import live_event, live_take, new_id, now
+from server.storage.archive import PIECE
+from server.storage.live_tables import live_event, live_take
+from server.storage.tables import new_id, now
 from tests.faults.clinic import Clinic
 
 

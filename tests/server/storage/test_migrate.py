@@ -16,10 +16,7 @@ import pytest
 from alembic import command
 from alembic.script import ScriptDirectory
 
-from server.storage import (
-    migrate,
-    person_tables,  # noqa: F401 - its tables are in the metadata
-)
+from server.storage import migrate
 from server.storage.db import Database
 from server.storage.tables import metadata
 from tests.data import ROOT

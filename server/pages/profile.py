@@ -1,0 +1,60 @@
+"""The profile of a walk as pages show it: the sagittal score and the bars of its curves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from core.frames import SIDES
+from server.report.change_words import NO_LIMIT, ChangeWords, find_term, format_difference
+from server.report.model import ReportModel
+from server.report.profile import ProfileBar, bar_svg
+from server.report.wording import format_number
+from server.services import reports
+from server.services.reviewed import ReviewedAnalyses
+
+
+def view_profile(
+    reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any]
+) -> tuple[dict[str, Any] | None, list[dict[str, Any]]]:
+    """The sagittal score and the bars of its curves, both with the visit before; None, [] without curves."""
+    if model.profile is None or model.quality.kind == "bad":
+        return None, []
+    earlier, before = None, context.get("before")
+    if before is not None and model.since is not None:
+        _, old = reports.read(reviewed, before.found, before.edits, context["patient"], before.session)
+        earlier = old.profile
+    found = {} if earlier is None else {b.title: b for b in earlier.bars}
+    bars = [
+        {"title": b.title, "svg": bar_svg(b, found.get(b.title)), **_print_sides(b)}
+        for b in model.profile.bars
+    ]
+    score = model.profile.score
+    if score is None:
+        return None, bars
+    was = None if earlier is None else earlier.score
+    matched = model.profile.score_at_speed
+    return {
+        **_print_sides(score),
+        "title": score.title,
+        "at_speed": None if matched is None else _print_sides(matched),
+        "healthy": None if score.p95 is None else format_number(score.p95, 1),
+        "before": None if was is None else tuple(_print_sides(was).values()),
+        "change": () if was is None else _change_score(was, score),
+    }, bars
+
+
+def _print_sides(bar: ProfileBar) -> dict[str, str]:
+    return {side: format_number(bar.values[side], 1) if side in bar.values else "–" for side in SIDES}
+
+
+def _change_score(before: ProfileBar, now: ProfileBar) -> tuple[ChangeWords, ...]:
+    """Of each side with both values; no source has a limit for it, so there is no verdict."""
+    term = find_term("gps_sagittal_deg")
+    return tuple(
+        ChangeWords(
+            side, format_difference(now.values[side] - before.values[side], term), "none", NO_LIMIT, ()
+        )
+        for side in SIDES
+        if side in now.values and side in before.values
+    )

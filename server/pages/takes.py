@@ -1,0 +1,59 @@
+"""The takes of one visit beside each other, as the overview of each of them shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from core.frames import SIDES
+from core.parameters.result import Parameter
+from server.report import level
+from server.report.change_words import find_term
+from server.report.table import ParameterRow
+from server.report.wording import format_number
+from server.services import visits
+from server.services.histories import AnalysedSession
+from server.services.reviewed import ReviewedAnalyses
+
+
+def view_takes(
+    reviewed: ReviewedAnalyses,
+    done: Sequence[AnalysedSession],
+    session_id: str,
+    first: Sequence[ParameterRow],
+) -> dict[str, Any] | None:
+    """The first values of every take of this visit and their mean; None where it has only this one."""
+    visit = visits.find_visit_of(done, session_id)
+    if visit is None or len(visit.takes) < 2:
+        return None
+    measured = visits.measure_visit(reviewed, visit)
+    ids = [t.session.id for t in visit.takes]
+    rows = []
+    for row in first:
+        name = level.from_standing(row.name) or row.name  # levels are read from standing in every take
+        for side in (None, *SIDES):
+            found = measured.get((name, side))
+            if found is None or found.mean.mean is None:
+                continue
+            digits = find_term(name).digits
+            rows.append(
+                {
+                    "title": find_term(name).label,
+                    "unit": find_term(name).unit,
+                    "side": side,
+                    "cells": [_print_take(found.by_take.get(sid), digits) for sid in ids],
+                    "mean": format_number(found.mean.mean, digits),
+                }
+            )
+    columns = [
+        {"id": t.session.id, "title": t.session.title, "this": t.session.id == session_id}
+        for t in visit.takes
+    ]
+    return {"columns": columns, "rows": rows}
+
+
+def _print_take(p: Parameter | None, digits: int) -> str:
+    if p is None or p.mean is None:
+        return "–"
+    spread = "" if p.sd is None else f" ± {format_number(p.sd, digits)}"
+    return format_number(p.mean, digits) + spread
