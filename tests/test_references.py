@@ -18,8 +18,6 @@ from tests.data import ROOT
 FOLDERS: Final = (".ci", "core", "docs", "migrations", "sagittal", "server", "tests", "web")
 SUFFIXES: Final = {".css", ".html", ".js", ".mako", ".md", ".py", ".toml"}
 NAMES: Final = {".importlinter", "Dockerfile", "run"}
-RECORDINGS: Final = {"README.md", "tests/data/__init__.py", ".ci/run"}
-"""Where it is said that recordings may lie beside the repository."""
 
 PAGE: Final = re.compile(r"(?<![\w./])(?<!\]\()docs/(?:[a-z-]+/)*[\w-]+\.md(?:#[\w-]+)?")
 LINK: Final = re.compile(r"\]\(([^)\s]+)\)")
@@ -109,7 +107,6 @@ def mentions(root: Path) -> list[str]:
         for path, text in texts(root)
         for what, pattern in OUTSIDE.items()
         for m in pattern.finditer(text)
-        if not (str(path) in RECORDINGS and what == "a folder beside the repository")
     ]
 
 
@@ -125,7 +122,7 @@ GOOD: Final = {
     "core/a.py": '"""docs/page.md, "One" and\n# "Two `b`"; docs/page.md, *One*, "Two `b`"."""\n',
     "docs/page.md": "# Page\n\n## One\n\n[here](#one) [a](../core/a.py) [out](https://a.org/x)\n\n"
     "## Two `b`\n\n```\n## no heading\n```\n\n`core/a.py`, docs/page.md#two-b\n",
-    "README.md": '[page](docs/page.md#one), "One"; recordings in ../shared/data\n',
+    "README.md": '[page](docs/page.md#one), "One"\n',
 }
 
 
@@ -180,7 +177,7 @@ def test_a_planted_reference_that_leads_nowhere_is_found(small: Path, name: str,
         ("core/a.py", "# (clinic.md, 4)"),
         ("core/a.py", "# spec §3"),
         ("docs/page.md", "DESIGN.md"),
-        ("docs/page.md", "in ../shared/data"),
+        ("docs/page.md", "in ../shared"),
         ("tests/a.py", "A = '/home/anna/sagittal'"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Where the real recordings are: the variable SAGITTAL_DATA, else ../shared/data beside the project.
+"""Where the real recordings are: the variable SAGITTAL_DATA, else a folder `data` in one beside the project.
 
 One walk, the feet of `gaitmap_foot`, lies in this folder and is always there.
 """
@@ -6,6 +6,7 @@ One walk, the feet of `gaitmap_foot`, lies in this folder and is always there.
 from __future__ import annotations
 
 import os
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -14,11 +15,17 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 
 
+@cache
+def _find_recordings() -> Path | None:
+    named = os.environ.get("SAGITTAL_DATA")
+    beside = (path.parent for path in sorted(ROOT.parent.glob("*/data/neura_walk")))
+    return Path(named) if named else next(beside, None)
+
+
 def data_folder(*parts: str) -> Path:
     """Folder or file of recordings, or skip the test with the reason."""
-    base = Path(os.environ.get("SAGITTAL_DATA") or ROOT.parent / "shared" / "data")
-    path = base.joinpath(*parts)
-    if path.exists():
+    base = _find_recordings()
+    if base is not None and (path := base.joinpath(*parts)).exists():
         return path
     # a file only: a folder with some of the recordings would let a test pass that has not seen the others
     if (own := HERE.joinpath(*parts)).is_file():
