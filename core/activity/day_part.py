@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from core.activity.frames import FRAME_HZ, PER_MINUTE, Frames, Singles, Slab, measure_length
 from core.activity.params import ActivityParams
-from core.activity.reduction import FRAME_HZ, PER_MINUTE, Frames, Singles, Slab, measure_length
 from core.activity.result import PosturalTransition, TransitionCandidate, WearPeriod
 from core.activity.stairs import measure_walking, tell_stairs
 from core.activity.transitions import (

@@ -10,9 +10,10 @@ from typing import Final
 import numpy as np
 
 from core.activity.day_part import DayPart, read_day
+from core.activity.frames import FRAME_HZ, FrameStore, Slab
 from core.activity.params import ActivityParams, StairParams
 from core.activity.postures import FixedStretch, decide_postures
-from core.activity.reduction import FRAME_HZ, FrameStore, Slab, reduce_stream
+from core.activity.reduction import reduce_stream
 from core.activity.result import (
     ActivityBout,
     ActivityResult,

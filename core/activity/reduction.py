@@ -11,12 +11,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, floor
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from core.activity.frames import FRAME_HZ, PER_MINUTE, Frames, Singles, Slab
 from core.activity.params import ActivityParams
 from core.errors import SignalError
 from core.events.lumbar import LumbarParams, detect_steps, find_moving, split_about_vertical
@@ -28,12 +28,7 @@ from core.sample_blocks import LongStream, SampleBlock, find_complete_rows
 from core.timeline.grid import lay_signal
 from core.timeline.params import TimelineParams
 
-Singles = NDArray[np.float32]
-
 Samples = TypeVar("Samples", Floats, Bools)
-
-FRAME_HZ: Final = 10
-"""Frames a second: the low-passed signals have nothing above 1 Hz."""
 
 PASS_HZ: Final = 0.25
 RIPPLE_DB: Final = 0.01
@@ -64,113 +59,6 @@ EDGE_S: Final = 5.0
 
 LONGEST_S: Final = 60 * 86400.0
 """A longer recording is a clock that jumped."""
-
-
-@dataclass(frozen=True, eq=False)
-class Frames:
-    """Ten frames a second, f of them, in single precision: a day of them is held at a time.
-
-    Parameters
-    ----------
-    first : number of the first frame since the recording's first sample. valid : (f,) every sample is there.
-    gravity : (f, 3) low-passed specific force, m/s², sensor axes. up : (f,) acceleration along it, mean of
-        the frame, m/s². spread : (f,) mean square of |acc| about its mean over 1 s, (m/s²)².
-    sd, wobble : (f / 600, 3) per minute: standard deviation of the samples and of their means over 1 s, m/s²;
-        NaN where less than half of it was measured.
-    """
-
-    first: int
-    valid: Bools
-    gravity: Singles
-    up: Singles
-    spread: Singles
-    sd: Singles
-    wobble: Singles
-
-
-@dataclass(frozen=True, eq=False)
-class Slab:
-    """Frames of one slab, the steps and the turns that lie in it (s since the recording's first sample)."""
-
-    frames: Frames
-    steps_s: tuple[float, ...]
-    turns: tuple[Turn, ...]
-
-
-PER_MINUTE: Final = 60 * FRAME_HZ
-"""Frames of a minute."""
-
-
-class FrameStore:
-    """Frames of a day and of what lies around it: arrays that are made once and used day after day.
-
-    Pieces that came and went, a day of them, would leave the process' memory in holes.
-    """
-
-    def __init__(self, room: int) -> None:
-        """Make room for so many frames, a whole number of minutes; pages are touched when they are filled."""
-        minutes = room // PER_MINUTE
-        self._kept = Frames(
-            0,
-            np.empty(room, np.bool_),
-            np.empty((room, 3), np.float32),
-            np.empty(room, np.float32),
-            np.empty(room, np.float32),
-            np.empty((minutes, 3), np.float32),
-            np.empty((minutes, 3), np.float32),
-        )
-        self._first = self._count = 0
-
-    @property
-    def end(self) -> int:
-        """Number of the frame that comes next."""
-        return self._first + self._count
-
-    def append(self, more: Frames) -> None:
-        """Keep the frames that follow; only the last of a recording may end within a minute."""
-        end = self._count + len(more.valid)
-        for kept, new in zip(_list_columns(self._kept, self._count, end), _list_columns(more), strict=True):
-            kept[:] = new[: len(kept)]
-        self._count = end
-
-    def view(self, end: int) -> Frames:
-        """What is kept up to frame `end`, as long as nothing is dropped."""
-        kept, n = self._kept, min(end, self.end) - self._first
-        minutes = -(-n // PER_MINUTE)
-        return Frames(
-            self._first,
-            kept.valid[:n],
-            kept.gravity[:n],
-            kept.up[:n],
-            kept.spread[:n],
-            kept.sd[:minutes],
-            kept.wobble[:minutes],
-        )
-
-    def drop_before(self, first: int) -> None:
-        """Let go of the frames before a minute's first."""
-        cut = min(self._count, max(0, first - self._first))
-        left = self._count - cut
-        whole = -(-left // PER_MINUTE) * PER_MINUTE
-        to, of = _list_columns(self._kept, 0, left), _list_columns(self._kept, cut, cut + whole)
-        for kept, moved in zip(to, of, strict=True):
-            kept[:] = moved[: len(kept)]
-        self._first, self._count = self._first + cut, left
-
-
-def _list_columns(frames: Frames, first: int = 0, end: int | None = None) -> list[NDArray[Any]]:
-    """Columns of the frames from a minute's first to `end`, as they lie in memory."""
-    minutes = slice(first // PER_MINUTE, None if end is None else -(-end // PER_MINUTE))
-    part = slice(first, end)
-    return [
-        *(x[part] for x in (frames.valid, frames.gravity, frames.up, frames.spread)),
-        *(x[minutes] for x in (frames.sd, frames.wobble)),
-    ]
-
-
-def measure_length(x: Singles) -> Floats:
-    """Length (n,) of vectors (n, 3), in double precision without a copy of them."""
-    return np.asarray(np.sqrt(np.einsum("ni,ni->n", x, x, dtype=np.float64)))
 
 
 def working_rate(rate_hz: float) -> int:

@@ -13,8 +13,8 @@ from typing import Literal
 
 import numpy as np
 
+from core.activity.frames import FRAME_HZ, Singles
 from core.activity.params import StairParams
-from core.activity.reduction import FRAME_HZ, Singles
 from core.errors import ParameterError
 from core.frames import Bools, Floats
 from core.rest import find_runs

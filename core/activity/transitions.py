@@ -9,8 +9,8 @@ from math import degrees
 
 import numpy as np
 
+from core.activity.frames import FRAME_HZ, Frames, Singles, measure_length
 from core.activity.params import TransitionParams
-from core.activity.reduction import FRAME_HZ, Frames, Singles, measure_length
 from core.activity.result import PosturalTransition, TransitionCandidate, TransitionKind, TransitionRefusal
 from core.frames import GRAVITY, Bools, Floats
 from core.rest import find_runs

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from core.activity.frames import FRAME_HZ, PER_MINUTE, Frames, Singles, measure_length
 from core.activity.params import UprightParams, WearParams
-from core.activity.reduction import FRAME_HZ, PER_MINUTE, Frames, Singles, measure_length
 from core.activity.result import UprightMethod, WearPeriod
 from core.frames import Bools, Floats
 from core.rest import find_runs

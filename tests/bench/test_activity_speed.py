@@ -159,8 +159,8 @@ def test_days_of_an_axivity_are_linear_in_time_and_fit(tmp_path: Path) -> None:
     files = [write_long_cwa(tmp_path / f"{days}.cwa", days) for days in (0.05, short, long)]
     _, less, more = (analyse_alone(path, tmp_path / path.stem) for path in files)
     sys.stdout.write(
-        f"\naxivity at 50 Hz, whole analysis: {less[1]:.1f} s of CPU and {less[0]:.0f} MB for {short:g} days, "
-        f"{more[1]:.0f} s and {more[0]:.0f} MB for {long:g}\n"
+        f"\naxivity at 50 Hz, whole analysis: {less[1]:.1f} s of CPU, {less[0]:.0f} MB for {short:g} days, "
+        f"{more[1]:.0f} s, {more[0]:.0f} MB for {long:g}\n"
     )
     assert more[1] <= 1.2 * long / short * less[1]
     assert more[0] <= OTHERS * MOST_MB + DAY_MB * (long - 1.0)

@@ -15,14 +15,9 @@ import numpy as np
 from core.errors import ParameterError
 from core.frames import Floats
 from core.fusion.algorithms.gains import FixedGain, FuzzyGain, Gain, ThreeLevelGain, TwoLevelGain
-from core.fusion.algorithms.parameters import (
-    DEVIATION,
-    MAGNETIC,
-    TURNING,
-    AlgorithmGains,
-    TuningRange,
-)
+from core.fusion.algorithms.parameters import MAGNETIC, AlgorithmGains
 from core.fusion.algorithms.schemes import Scheme
+from core.fusion.algorithms.tuning_ranges import DEVIATION, TURNING, TuningRange
 
 DIGITS: Final = 4
 """Significant digits of a tuned gain: more would be noise of the data."""
