@@ -1,5 +1,6 @@
 // <filter-choice>: whole engines or single filters, then one job. <reference-files>: orientations of another system.
 import { Problem, request, showProblem } from "./common/api.js";
+import { StoredFile } from "./common/stored-file.js";
 import { speak } from "./common/words.js";
 
 class FilterChoice extends HTMLElement {
@@ -55,30 +56,18 @@ class FilterChoice extends HTMLElement {
   }
 }
 
-class ReferenceFiles extends HTMLElement {
+class ReferenceFiles extends StoredFile {
   connectedCallback() {
     this.base = `/api/v1/sessions/${this.getAttribute("session")}/references/`;
     const input = this.querySelector("[data-file]");
     this.querySelector("[data-pick]")?.addEventListener("click", () => input.click());
-    input?.addEventListener("change", () => input.files[0] && this.change(() => this.send(input.files[0])));
+    input?.addEventListener("change", () => {
+      const [file] = input.files;
+      if (file) this.change(() => this.send(this.base + encodeURIComponent(file.name), file));
+    });
     for (const button of this.querySelectorAll("[data-remove]")) {
       button.addEventListener("click", () => this.change(() => request("DELETE", this.base + encodeURIComponent(button.dataset.remove))));
     }
-  }
-
-  async change(action) {
-    try {
-      await action();
-      location.reload();
-    } catch (problem) {
-      this.querySelector("[data-say]").textContent = "";
-      showProblem(this.querySelector(".form-error"), problem);
-    }
-  }
-
-  async send(file) {
-    this.querySelector("[data-say]").textContent = speak`Uploading ${file.name}…`;
-    await request("PUT", this.base + encodeURIComponent(file.name), file);
   }
 }
 
