@@ -8,7 +8,7 @@ COPY sagittal sagittal
 COPY server server
 COPY web web
 COPY migrations migrations
-RUN python -m venv /opt/sagittal && /opt/sagittal/bin/pip install --no-cache-dir '.[apdm,c3d,pdf]'
+RUN python -m venv /opt/sagittal && /opt/sagittal/bin/pip install --no-cache-dir '.[apdm,c3d,pdf,postgres]'
 
 FROM python:3.13-slim
 # Pango lays out the text of PDFs

@@ -1,12 +1,13 @@
-"""Alembic environment; run by server/storage/migrate.py, which passes the database's path.
+"""Alembic environment; run by server/storage/migrate.py, which says where the database is.
 
 All steps are one transaction with the row of the revision (measured: Alembic's default on SQLite left half a
-migration behind that failed for ever; this leaves exactly the old revision).
+migration behind that failed for ever; this leaves exactly the old revision). A second program that migrates
+waits at the first statement, and finds it done.
 """
 
 from alembic import context
 
-from server.storage.db import foreign_key_violations, migration_engine
+from server.storage.db import engine_of
 from server.storage.tables import Utc, metadata
 
 
@@ -18,7 +19,8 @@ def render(kind: str, item: object, _: object) -> str | bool:
 if context.is_offline_mode():
     raise SystemExit("Migrations are checked against the data; run them online.")
 
-engine = migration_engine(context.config.attributes["database"])
+kind = engine_of(context.config.attributes["database"])
+engine = kind.migrator()
 try:
     with engine.connect() as connection:
         context.configure(
@@ -32,7 +34,7 @@ try:
         )
         with context.begin_transaction():
             context.run_migrations()
-            violations = foreign_key_violations(connection)
+            violations = kind.dangling(connection)
             if violations:
                 raise RuntimeError(
                     f"The migration would leave {len(violations)} dangling rows: {violations[0]}."

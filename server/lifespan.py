@@ -62,8 +62,8 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     """Open database, files, queue and live takes of `app.state.settings` while the block runs."""
     settings: Settings = app.state.settings
     refuse_strangers(settings)
-    upgrade(settings.database)
-    db = Database(settings.database)
+    upgrade(settings.database_source, backups=settings.backups)
+    db = Database(settings.database_source)
     app.state.db = db
     app.state.blobs = BlobStore(settings.blobs)
     app.state.reviewed = ReviewedAnalyses(app.state.blobs)

@@ -32,7 +32,8 @@ def _run(command: str, given: dict[str, object]) -> int:
     share_allocator()
     try:
         share_compile_cache(load_settings({"data_dir": given.get("data_dir")}).cache)
-        run = getattr(import_module(f"server.commands.{command}"), command)
+        name = command.replace("-", "_")
+        run = getattr(import_module(f"server.commands.{name}"), name)
         return int(run(**given))
     except SettingsError as error:
         sys.stderr.write(f"{error}\n")
@@ -59,7 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     p = add("serve", "Run the web server and its workers.")
     _server_options(p)
     p.add_argument("--workers", type=int, help="worker processes (default 1)")
-    _data_option(add("worker", "Run one worker on the data folder of a server."))
+    _data_option(add("worker", "Run one worker on the data folder of a server, on another computer too."))
     p = add("demo", "Run a temporary clinic with simulated patients; nothing is kept.")
     p.add_argument("--port", type=int, default=None, help="port on 127.0.0.1 (default: a free one)")
     p = add("analyse", "Analyse recording files and write the results into a folder.")
@@ -184,6 +185,7 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--session", metavar="ADDRESS", help="the session's page, or its id")
     _data_option(add("accept", "Go on with this database, though it was emptied, put back or exchanged."))
     _data_option(add("migrate", "Bring the database to the schema of this version (after a backup)."))
+    _data_option(add("move-database", "Move the database from the data folder's file to PostgreSQL."))
     add("warm", "Compile the filters now, so that the first analysis does not wait for it.")
     p = add("user", "Add a user, or give one a new password, on the command line.")
     _data_option(p)

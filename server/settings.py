@@ -54,6 +54,9 @@ class Settings:
     backup_key : file with the key that encrypts them (`sagittal keygen`), "" = they are not encrypted.
     retention_years : patients without a visit for longer are listed on the page System, 0 = none are.
     log_format : "text" for people or "json", one object a line with a line for each request.
+    database_url : a PostgreSQL database instead of the file in the data folder, as
+        postgresql://user:password@host:port/database; what it leaves out, such as the password, comes from
+        where PostgreSQL's own programs have it (PGPASSFILE). "" = the file.
     task_modules : modules whose import registers kinds of jobs, and what they draw.
     """
 
@@ -81,6 +84,7 @@ class Settings:
     backup_key: str = ""
     retention_years: int = 0
     log_format: str = "text"
+    database_url: str = field(default="", repr=False)
     task_modules: tuple[str, ...] = ("server.worker.tasks", "server.viewer.recorded_walk")
 
     def __post_init__(self) -> None:
@@ -99,6 +103,9 @@ class Settings:
         _require(0 <= years <= 200, "retention_years", years, "0 to 200 (0 = no list)")
         _require(_CLOCK.fullmatch(self.backup_at) is not None, "backup_at", f"'{self.backup_at}'", "HH:MM")
         _require(self.log_format in {"text", "json"}, "log_format", f"'{self.log_format}'", "text or json")
+        if self.database_url and not self.database_url.startswith("postgresql://"):
+            # what was given is not repeated: it may hold a password
+            raise SettingsError("database_url is no postgresql://user:password@host:port/database.")
         for name in ("backup_dir", "backup_key"):
             path = getattr(self, name)
             _require(not path or Path(path).is_absolute(), name, f"'{path}'", "a path from the root, /…")
@@ -130,8 +137,13 @@ class Settings:
 
     @property
     def database(self) -> Path:
-        """The SQLite file."""
+        """The SQLite file, used where no database_url is set."""
         return self.data_dir / "sagittal.db"
+
+    @property
+    def database_source(self) -> Path | str:
+        """Where the database is: the SQLite file, or the URL of PostgreSQL."""
+        return self.database_url or self.database
 
     @property
     def blobs(self) -> Path:

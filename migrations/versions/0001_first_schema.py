@@ -3,6 +3,8 @@
 import sqlalchemy as sa
 from alembic import op
 
+from server.storage.migration_steps import forbid_changes, is_sqlite
+
 revision = "0001"
 down_revision = None
 
@@ -187,7 +189,7 @@ def upgrade() -> None:
         "recording_file",
         sa.Column("recording_id", sa.String(length=32), nullable=False),
         sa.Column("name", sa.String(length=500), nullable=False),
-        sa.Column("size", sa.Integer(), nullable=False),
+        sa.Column("size", sa.Integer().with_variant(sa.BigInteger(), "postgresql"), nullable=False),
         sa.Column("sha256", sa.String(length=64), nullable=False),
         sa.Column("added_at", sa.DateTime(timezone=True), nullable=False),
         sa.CheckConstraint("size >= 0", name=op.f("ck_recording_file_size")),
@@ -228,7 +230,7 @@ def upgrade() -> None:
         "analysis_file",
         sa.Column("analysis_id", sa.String(length=32), nullable=False),
         sa.Column("name", sa.String(length=100), nullable=False),
-        sa.Column("size", sa.Integer(), nullable=False),
+        sa.Column("size", sa.Integer().with_variant(sa.BigInteger(), "postgresql"), nullable=False),
         sa.Column("sha256", sa.String(length=64), nullable=False),
         sa.CheckConstraint("size >= 0", name=op.f("ck_analysis_file_size")),
         sa.ForeignKeyConstraint(
@@ -240,13 +242,11 @@ def upgrade() -> None:
         sa.PrimaryKeyConstraint("analysis_id", "name", name=op.f("pk_analysis_file")),
     )
     op.create_index(op.f("ix_analysis_file_sha256"), "analysis_file", ["sha256"], unique=False)
-    for verb in ("UPDATE", "DELETE"):
-        op.execute(
-            f"CREATE TRIGGER audit_no_{verb.lower()} BEFORE {verb} ON audit "
-            "BEGIN SELECT RAISE(ABORT, 'audit rows are append-only'); END"
-        )
+    forbid_changes("audit", ("UPDATE", "DELETE"), "audit rows are append-only")
 
 
 def downgrade() -> None:
     for table in TABLES:
         op.drop_table(table)
+    if not is_sqlite():
+        op.execute("DROP FUNCTION refuse_change()")

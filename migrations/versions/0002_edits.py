@@ -3,6 +3,8 @@
 import sqlalchemy as sa
 from alembic import op
 
+from server.storage.migration_steps import forbid_changes
+
 revision = "0002"
 down_revision = "0001"
 
@@ -29,10 +31,7 @@ def upgrade() -> None:
         sqlite_autoincrement=True,
     )
     op.create_index(op.f("ix_edit_analysis_id"), "edit", ["analysis_id"], unique=False)
-    op.execute(
-        "CREATE TRIGGER edit_no_update BEFORE UPDATE ON edit "
-        "BEGIN SELECT RAISE(ABORT, 'edits are append-only'); END"
-    )
+    forbid_changes("edit", ("UPDATE",), "edits are append-only")
 
 
 def downgrade() -> None:

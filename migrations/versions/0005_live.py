@@ -3,6 +3,8 @@
 import sqlalchemy as sa
 from alembic import op
 
+from server.storage.migration_steps import forbid_changes
+
 revision = "0005"
 down_revision = "0004"
 
@@ -109,10 +111,7 @@ def upgrade() -> None:
         sqlite_autoincrement=True,
     )
     op.create_index(op.f("ix_live_event_take_id"), "live_event", ["take_id"], unique=False)
-    op.execute(
-        "CREATE TRIGGER live_event_no_update BEFORE UPDATE ON live_event "
-        "BEGIN SELECT RAISE(ABORT, 'live events are append-only'); END"
-    )
+    forbid_changes("live_event", ("UPDATE",), "live events are append-only")
 
 
 def downgrade() -> None:

@@ -1,9 +1,9 @@
 """The condition a session was walked in; nobody stated that of earlier ones, but feedback was kept."""
 
-import json
-
 import sqlalchemy as sa
 from alembic import op
+
+from server.storage.migration_steps import rebuild
 
 revision = "0006"
 down_revision = "0005"
@@ -16,19 +16,19 @@ TOLD = sa.text(
     "WHERE live_event.kind = 'cue' AND live_take.recording_id = ("
     "  SELECT recording.id FROM recording WHERE recording.session_id = live_take.session_id"
     "  ORDER BY recording.created_at DESC LIMIT 1)"
-)
+).columns(session_id=sa.String(), content=sa.JSON())
 
 
 def upgrade() -> None:
-    with op.batch_alter_table("session", recreate="always") as batch:
+    with op.batch_alter_table("session", recreate=rebuild()) as batch:
         for name in STATED:
             batch.add_column(sa.Column(name, sa.String(length=32), nullable=True))
         batch.add_column(sa.Column("feedback", sa.Boolean(), nullable=False, server_default=sa.false()))
     connection = op.get_bind()
-    told = {session_id for session_id, cue in connection.execute(TOLD) if _with_feedback(json.loads(cue))}
+    told = {session_id for session_id, cue in connection.execute(TOLD) if _with_feedback(cue)}
     for session_id in sorted(told):
-        row = sa.text("UPDATE session SET feedback = 1 WHERE id = :id")
-        connection.execute(row, {"id": session_id})
+        row = sa.text("UPDATE session SET feedback = :told WHERE id = :id")
+        connection.execute(row, {"id": session_id, "told": True})
 
 
 def _with_feedback(cue: dict[str, object]) -> bool:
@@ -37,6 +37,6 @@ def _with_feedback(cue: dict[str, object]) -> bool:
 
 
 def downgrade() -> None:
-    with op.batch_alter_table("session", recreate="always") as batch:
+    with op.batch_alter_table("session", recreate=rebuild()) as batch:
         for name in ("feedback", *STATED):
             batch.drop_column(name)

@@ -3,12 +3,14 @@
 import sqlalchemy as sa
 from alembic import op
 
+from server.storage.migration_steps import rebuild
+
 revision = "0007"
 down_revision = "0006"
 
 
 def upgrade() -> None:
-    with op.batch_alter_table("job", recreate="always") as batch:
+    with op.batch_alter_table("job", recreate=rebuild()) as batch:
         batch.add_column(sa.Column("checkpoint", sa.String(length=64), nullable=True))
     op.create_table(
         "tuning",
@@ -37,5 +39,5 @@ def upgrade() -> None:
 def downgrade() -> None:
     op.drop_index(op.f("ix_tuning_recording_id"), table_name="tuning")
     op.drop_table("tuning")
-    with op.batch_alter_table("job", recreate="always") as batch:
+    with op.batch_alter_table("job", recreate=rebuild()) as batch:
         batch.drop_column("checkpoint")

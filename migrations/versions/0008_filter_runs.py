@@ -12,7 +12,7 @@ def upgrade() -> None:
         "reference_file",
         sa.Column("session_id", sa.String(length=32), nullable=False),
         sa.Column("name", sa.String(length=500), nullable=False),
-        sa.Column("size", sa.Integer(), nullable=False),
+        sa.Column("size", sa.Integer().with_variant(sa.BigInteger(), "postgresql"), nullable=False),
         sa.Column("sha256", sa.String(length=64), nullable=False),
         sa.Column("added_at", sa.DateTime(timezone=True), nullable=False),
         sa.CheckConstraint("size >= 0", name=op.f("ck_reference_file_size")),
@@ -52,7 +52,7 @@ def upgrade() -> None:
         "filter_run_file",
         sa.Column("filter_run_id", sa.String(length=32), nullable=False),
         sa.Column("name", sa.String(length=100), nullable=False),
-        sa.Column("size", sa.Integer(), nullable=False),
+        sa.Column("size", sa.Integer().with_variant(sa.BigInteger(), "postgresql"), nullable=False),
         sa.Column("sha256", sa.String(length=64), nullable=False),
         sa.CheckConstraint("size >= 0", name=op.f("ck_filter_run_file_size")),
         sa.ForeignKeyConstraint(

@@ -3,6 +3,8 @@
 import sqlalchemy as sa
 from alembic import op
 
+from server.storage.migration_steps import forbid_changes, is_sqlite, rebuild
+
 revision = "0010"
 down_revision = "0009"
 
@@ -23,13 +25,10 @@ def downgrade() -> None:
 
 
 def _allow(kinds: str) -> None:
-    # the copy of a table has no trigger
     with op.batch_alter_table(
-        "live_event", recreate="always", table_kwargs={"sqlite_autoincrement": True}
+        "live_event", recreate=rebuild(), table_kwargs={"sqlite_autoincrement": True}
     ) as batch:
         batch.drop_constraint(op.f("ck_live_event_kind"), type_="check")
         batch.create_check_constraint(op.f("ck_live_event_kind"), sa.text(f"kind IN ({kinds})"))
-    op.execute(
-        "CREATE TRIGGER live_event_no_update BEFORE UPDATE ON live_event "
-        "BEGIN SELECT RAISE(ABORT, 'live events are append-only'); END"
-    )
+    if is_sqlite():  # the copy of a table has no trigger
+        forbid_changes("live_event", ("UPDATE",), "live events are append-only")

@@ -13,7 +13,7 @@ def upgrade() -> None:
         sa.Column("session_id", sa.String(length=32), nullable=False),
         sa.Column("name", sa.String(length=500), nullable=False),
         sa.Column("media_type", sa.String(length=32), nullable=False),
-        sa.Column("size", sa.Integer(), nullable=False),
+        sa.Column("size", sa.Integer().with_variant(sa.BigInteger(), "postgresql"), nullable=False),
         sa.Column("sha256", sa.String(length=64), nullable=False),
         sa.Column("offset_s", sa.Float(), nullable=True),
         sa.Column("consent_by", sa.String(length=64), nullable=True),

@@ -47,7 +47,7 @@ def upgrade() -> None:
         "report_file",
         sa.Column("report_id", sa.String(length=32), nullable=False),
         sa.Column("name", sa.String(length=32), nullable=False),
-        sa.Column("size", sa.Integer(), nullable=False),
+        sa.Column("size", sa.Integer().with_variant(sa.BigInteger(), "postgresql"), nullable=False),
         sa.Column("sha256", sa.String(length=64), nullable=False),
         sa.CheckConstraint("size >= 0", name=op.f("ck_report_file_size")),
         sa.ForeignKeyConstraint(

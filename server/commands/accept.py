@@ -17,11 +17,11 @@ def accept(data_dir: Path | None) -> int:
 
     settings = load_settings({"data_dir": data_dir})
     try:
-        upgrade(settings.database)
+        upgrade(settings.database_source, backups=settings.backups)
     except MigrationError as error:
         sys.stderr.write(f"{error}\n")
         return 1
-    with closing(Database(settings.database)) as db:
+    with closing(Database(settings.database_source)) as db:
         doubted = custody.accept(db, settings)
     if doubted is None:
         sys.stdout.write("There was no doubt about this database; nothing is changed.\n")

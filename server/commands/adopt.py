@@ -19,7 +19,7 @@ def adopt(data_dir: Path | None, take: str | None, session: str | None) -> int:
         sys.stderr.write("Give both a take and --session, or neither to list what can be adopted.\n")
         return 2
     try:
-        require_current(settings.database)
+        require_current(settings.database_source)
         if take is None or session is None:
             return _list(settings)
         return _adopt(settings, take, session.rstrip("/").rsplit("/", 1)[-1])
@@ -32,7 +32,7 @@ def _list(settings: Settings) -> int:
     from server.services import live_logs
     from server.storage.db import Database
 
-    with closing(Database(settings.database)) as db, db.read() as c:
+    with closing(Database(settings.database_source)) as db, db.read() as c:
         strangers = [log for log in live_logs.list_logs(c, settings.live) if not log.known]
     for log in strangers:
         sys.stdout.write(f"{log.take_id}  {log.words}\n")
@@ -51,7 +51,7 @@ def _adopt(settings: Settings, take: str, session: str) -> int:
     from server.storage.blobs import BlobStore
     from server.storage.db import Database
 
-    with closing(Database(settings.database)) as db:
+    with closing(Database(settings.database_source)) as db:
         queue = TableQueue(db, settings.lease_s)
         live_logs.adopt(db, BlobStore(settings.blobs), settings, queue, None, take, session)
     sys.stdout.write(f"It is the newest recording of /sessions/{session} now and will be analysed.\n")

@@ -15,16 +15,16 @@ def backup(data_dir: Path | None, target: Path, key: Path | None, prune: bool) -
     from server.services.tombstones import TombstoneError
     from server.storage.archive import BackupFileError, read_key
     from server.storage.db import Database
-    from server.storage.migrate import MigrationError, require_current
+    from server.storage.migrate import MigrationError, exists, require_current
 
     settings = load_settings({"data_dir": data_dir})
-    if not settings.database.exists():
-        sys.stderr.write(f"There is no database in {settings.data_dir}; give the folder with --data.\n")
-        return 1
     try:
-        require_current(settings.database)
+        if not exists(settings.database_source):
+            sys.stderr.write(f"There is no database in {settings.data_dir}; give the folder with --data.\n")
+            return 1
+        require_current(settings.database_source)
         clinic_key = None if key is None else read_key(key)
-        with closing(Database(settings.database)) as db:
+        with closing(Database(settings.database_source)) as db:
             made = backups.make_backup(db, settings, target.absolute(), clinic_key)
         gone = backups.prune(made.path.parent) if prune else []
     except (BackupFileError, TombstoneError, backups.BackupError, MigrationError) as error:

@@ -17,18 +17,18 @@ def check(data_dir: Path | None, head: Path | None = None) -> int:
     from server.services import checks
     from server.storage.blobs import BlobStore
     from server.storage.db import Database
-    from server.storage.migrate import MigrationError, require_current
+    from server.storage.migrate import MigrationError, exists, require_current
 
     settings = load_settings({"data_dir": data_dir})
-    if not settings.database.exists():
-        sys.stderr.write(f"There is no database in {settings.data_dir}; give the folder with --data.\n")
-        return 1
     try:
-        require_current(settings.database)
+        if not exists(settings.database_source):
+            sys.stderr.write(f"There is no database in {settings.data_dir}; give the folder with --data.\n")
+            return 1
+        require_current(settings.database_source)
     except MigrationError as error:
         sys.stderr.write(f"{error}\n")
         return 1
-    with closing(Database(settings.database)) as db:
+    with closing(Database(settings.database_source)) as db:
         findings = checks.check(db, BlobStore(settings.blobs), settings, kept_head=head)
     for finding in findings:
         sys.stdout.write(f"{finding.area}: {finding.message}\n")

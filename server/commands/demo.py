@@ -35,6 +35,7 @@ def demo(port: int | None) -> int:
                 "host": "127.0.0.1",
                 "port": port or 0,
                 "workers": DEMO_WORKERS,
+                "database_url": "",  # nor may they come among its patients
                 "backup_dir": "",  # the clinic's own backups must not be pushed out by simulated ones
             }
         )
@@ -45,7 +46,7 @@ def demo(port: int | None) -> int:
             helpers.append(subprocess.Popen(command, env=make_environment(settings)))  # noqa: S603 - our own
 
         def announce(address: str) -> None:
-            with closing(Database(settings.database)) as db, db.write() as c:
+            with closing(Database(settings.database_source)) as db, db.write() as c:
                 person = accounts.create(
                     c, "demo", "Demo", Role.ADMIN, hash_password(secrets.token_urlsafe(24))
                 )
@@ -54,7 +55,7 @@ def demo(port: int | None) -> int:
             say("(signs you in once; everything is simulated and is removed when you stop with Ctrl-C)")
             # simulating takes seconds of computing: never in the web process
             start("server.demo.clinic")
-            _report(settings.database)
+            _report(settings.database_source)
             start("server.demo.live", address)
             say("One of the patients is walking live now: the first in the list of patients.")
 

@@ -14,7 +14,7 @@ def migrate(data_dir: Path | None) -> int:
 
     settings = load_settings({"data_dir": data_dir})
     try:
-        backup = upgrade(settings.database)
+        backup = upgrade(settings.database_source, backups=settings.backups)
     except MigrationError as error:
         sys.stderr.write(f"{error}\n")
         return 1

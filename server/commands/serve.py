@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import sys
@@ -21,7 +22,7 @@ def serve(data_dir: Path | None, host: str | None, port: int | None, workers: in
     settings = load_settings({"data_dir": data_dir, "host": host, "port": port, "workers": workers})
 
     def announce(address: str) -> None:
-        with closing(Database(settings.database)) as db, db.write() as c:
+        with closing(Database(settings.database_source)) as db, db.write() as c:
             token = one_time.issue_set_up(c) if one_time.needs_set_up(c) else None
         if token:
             say(f"First start: set up the first administrator at {address}/set-up/{token}")
@@ -37,6 +38,7 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
     from server.processes.supervisor import Workers
     from server.services.custody import StrangersError, refuse_strangers
     from server.storage import fs
+    from server.storage.db import Database
     from server.storage.migrate import MigrationError, upgrade
     from server.web_server.build import build_server
     from server.web_server.connection import ConnectionLimits
@@ -56,7 +58,15 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
         return 1
     try:
         refuse_strangers(settings)
-        upgrade(settings.database)
+        upgrade(settings.database_source, backups=settings.backups)
+        served = contextlib.ExitStack()
+        db = served.enter_context(closing(Database(settings.database_source)))
+        if not served.enter_context(db.serve_alone()):
+            served.close()
+            raise StrangersError(
+                "Another server is running on this PostgreSQL database; stop it first. To share its work, "
+                "start `sagittal worker` here instead."
+            )
         listener = open_listener(settings.host, settings.port)
     except (StrangersError, MigrationError, OSError) as error:
         sys.stderr.write(f"{error}\n")
@@ -82,6 +92,7 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
         keeper.stop()
         workers.stop()
         listener.close()
+        served.close()
         lock.release()
     return 0 if server.started else 1
 

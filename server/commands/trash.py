@@ -28,11 +28,11 @@ def trash(data_dir: Path | None, restore: bool) -> int:
         sys.stdout.flush()
         return 0
     try:
-        require_current(settings.database)
+        require_current(settings.database_source)
     except MigrationError as error:
         sys.stderr.write(f"{error}\n")
         return 1
-    with closing(Database(settings.database)) as db:
+    with closing(Database(settings.database_source)) as db:
         back = sweep.put_back(db, BlobStore(settings.blobs), settings)
     sys.stdout.write(f"{back} files that the database refers to are back in {settings.blobs}\n")
     sys.stdout.flush()

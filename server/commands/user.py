@@ -32,8 +32,8 @@ def user(data_dir: Path | None, name: str, role: str) -> int:
     )
     try:
         hashed = hash_password(password)
-        upgrade(settings.database)
-        with closing(Database(settings.database)) as db, db.write() as c:
+        upgrade(settings.database_source, backups=settings.backups)
+        with closing(Database(settings.database_source)) as db, db.write() as c:
             known = c.execute(
                 select(table.c.id).where(table.c.name == name.strip().lower())
             ).scalar_one_or_none()

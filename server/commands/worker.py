@@ -11,7 +11,8 @@ from server.settings import load_settings
 
 
 def worker(data_dir: Path | None) -> int:
-    """Work until SIGTERM or Ctrl-C; 1 when the database is not of this version."""
+    """Work until SIGTERM or Ctrl-C; 1 when database or folder are not the server's."""
+    from server.services.custody import StrangersError
     from server.storage.migrate import MigrationError
     from server.worker.worker import run_worker
 
@@ -20,7 +21,7 @@ def worker(data_dir: Path | None) -> int:
     os.umask(0o077)
     try:
         run_worker(settings)
-    except MigrationError as error:
+    except (MigrationError, StrangersError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
     return 0

@@ -145,7 +145,7 @@ def fill(settings: Settings) -> None:
     """Add all patients and visits and ask for their analyses."""
     from core.simulate import mt_files
 
-    with closing(Database(settings.database)) as db:
+    with closing(Database(settings.database_source)) as db:
         blobs = BlobStore(settings.blobs)
         known: dict[str, str] = {}
         with db.write() as c:

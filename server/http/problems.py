@@ -23,7 +23,7 @@ from core.errors import SagittalError
 from server.http.headers import add_security_headers
 from server.http.templates import render
 from server.log import request_id
-from server.storage.refusal import refusal_of
+from server.storage.refusal import is_busy, refusal_of
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
@@ -93,7 +93,7 @@ def as_problem(error: Exception) -> Problem:
     refusal = refusal_of(error)
     if refusal is not None:
         return Problem(507, refusal.value, refusal.sentence)
-    if isinstance(error, OperationalError) and "locked" in str(error.orig):
+    if is_busy(error):
         return Problem(503, "database_busy", SENTENCES["database_busy"], headers={"Retry-After": "5"})
     return Problem(500, "internal_error", SENTENCES["internal_error"])
 

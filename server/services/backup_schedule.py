@@ -112,9 +112,9 @@ def run(settings: Settings) -> BackupState:
     state = read_state(settings)
     key: ClinicKey | None = None
     try:
-        require_current(settings.database)
+        require_current(settings.database_source)
         key = read_key(Path(settings.backup_key)) if settings.backup_key else None
-        with closing(Database(settings.database)) as db:
+        with closing(Database(settings.database_source)) as db:
             made = make_backup(db, settings, folder, key)
         prune(folder)
         said = (

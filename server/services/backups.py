@@ -35,7 +35,7 @@ from server.storage.archive import ArchiveWriter, ClinicKey, write_archive
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.high_water import HighWater, read_newest
-from server.storage.migrate import read_revision
+from server.storage.migrate import copy_database, read_revision
 from server.storage.tables import job, new_id, now, patient, session
 from server.storage.trash import Trash
 
@@ -229,7 +229,7 @@ def _snapshot(db: Database, settings: Settings) -> Iterator[Path]:
     copy = settings.backups / f"{new_id()}.tmp"
     try:
         fs.keep_private(copy)
-        db.backup(copy)
+        copy_database(db.source, copy)
         yield copy
     finally:
         for path in (copy, *(copy.with_name(copy.name + end) for end in ("-wal", "-shm"))):

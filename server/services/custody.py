@@ -7,6 +7,7 @@ accept(db, settings)            # somebody answers: this database is the right o
 
 from __future__ import annotations
 
+import time
 from contextlib import closing
 
 from sqlalchemy import Connection, func, select
@@ -18,6 +19,7 @@ from server.settings import Settings
 from server.storage.blobs import INCOMING, BlobStore
 from server.storage.db import Database
 from server.storage.high_water import explain_lost_rows, set_mark
+from server.storage.migrate import exists
 from server.storage.tables import audit as audit_table
 from server.storage.tables import patient
 
@@ -31,9 +33,9 @@ class StrangersError(RuntimeError):
 def refuse_strangers(settings: Settings) -> None:
     """Raise StrangersError when files are here and the database is missing or knows no patient.
 
-    Creates no database; one that cannot be read is left to `storage.migrate`, which says so.
+    Creates no database; a file that cannot be read is left to `storage.migrate`, which says so.
     """
-    if not settings.database.exists():
+    if not exists(settings.database_source):
         if settings.restoring.exists():
             raise StrangersError(
                 f"A restore into {settings.data_dir} was interrupted. Run `sagittal restore` again; to begin "
@@ -41,7 +43,7 @@ def refuse_strangers(settings: Settings) -> None:
             )
         text = _strangers(settings, erased=set())
     else:
-        with closing(Database(settings.database)) as db:
+        with closing(Database(settings.database_source)) as db:
             try:
                 with db.read() as c:
                     text = _strangers_of(c, settings)
@@ -51,6 +53,33 @@ def refuse_strangers(settings: Settings) -> None:
                 text = _strangers(settings, erased=set())
     if text is not None:
         raise StrangersError(text)
+
+
+def refuse_foreign_folder(db: Database, settings: Settings, patience_s: float = 10.0) -> None:
+    """Raise StrangersError where this host's data folder or clock is not that of the PostgreSQL database.
+
+    A worker elsewhere needs the server's own folder of stored files (shared by the network), and leases need
+    clocks that agree. The server writes the mark some seconds after the first row.
+    """
+    theirs = db.read_clock()
+    if theirs is None:
+        return
+    apart = abs(time.time() - theirs)
+    if apart > settings.lease_s / 3:
+        raise StrangersError(
+            f"This computer's clock and PostgreSQL's are {apart:.1f} s apart, allowed are "
+            f"{settings.lease_s / 3:.1f}. Set both by NTP."
+        )
+    until = time.monotonic() + patience_s
+    while not settings.mark.exists() and time.monotonic() < until:
+        time.sleep(0.2)
+    with db.read() as c:
+        lost = explain_lost_rows(c, settings.mark)
+    if lost is not None or not settings.mark.exists():
+        raise StrangersError(
+            f"{settings.data_dir} is not the data folder of this database's server"
+            f"{f' ({lost})' if lost else ''}. Share that folder with this computer and name it by --data."
+        )
 
 
 def find_doubt(c: Connection, settings: Settings) -> str | None:

@@ -5,8 +5,8 @@
 
 All of it is written into `restoring/` of that folder and verified there: every hash, the database by SQLite's
 own checks, the audit chain, every file that a row refers to. Who was erased since is erased again. Then four
-renames, the database last: without it no server starts on the folder, and a restore that was killed is simply
-made again.
+renames, the database last (into PostgreSQL its rows, in one transaction): without it no server starts on the
+folder, and a restore that was killed is simply made again.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from server.storage.archive import PIECE, ArchivedFile, ClinicKey, read_archive
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.high_water import HighWater, read_newest, set_mark
-from server.storage.migrate import MigrationError, upgrade
+from server.storage.migrate import MigrationError, copy_database, exists, upgrade
 from server.storage.person_tables import api_token
 from server.storage.report_tables import report_link
 from server.storage.tables import login_session, now, one_time_token, patient, session
@@ -132,7 +132,7 @@ def try_restore(archive: Path, settings: Settings, key: ClinicKey | None) -> Res
     home = settings.backups / "restore-test"
     fs.remove_tree(home)
     try:
-        return restore(archive, replace(settings, data_dir=home), key)
+        return restore(archive, replace(settings, data_dir=home, database_url=""), key)
     finally:
         fs.remove_tree(home)
 
@@ -140,7 +140,7 @@ def try_restore(archive: Path, settings: Settings, key: ClinicKey | None) -> Res
 def _restore(archive: Path, settings: Settings, key: ClinicKey | None, gone: Tombstones) -> RestoredClinic:
     _require_empty(settings)
     _require_room(archive, settings.data_dir)
-    stage = replace(settings, data_dir=settings.restoring)
+    stage = replace(settings, data_dir=settings.restoring, database_url="")
     fs.make_folder(stage.data_dir)
     try:
         restored = _prepare(archive, stage, key, gone)
@@ -154,7 +154,7 @@ def _restore(archive: Path, settings: Settings, key: ClinicKey | None, gone: Tom
 def _require_empty(settings: Settings) -> None:
     """Remove what a killed restore left; raise RestoreError when anything else is here."""
     stage = settings.restoring
-    if stage.exists() and not settings.database.exists():
+    if stage.exists() and not _has_database(settings):
         if _placing(stage).exists():
             # the folder was empty when this was written, so these are the restore's own
             for folder in (settings.blobs, settings.live):
@@ -164,11 +164,27 @@ def _require_empty(settings: Settings) -> None:
             fs.sync_folder(settings.data_dir)
         fs.remove_tree(stage)
     found = sorted(path.name for path in settings.data_dir.iterdir() if path.name not in _MAY_BE_THERE)
+    if _has_database(settings) and settings.database_url:
+        raise RestoreError(
+            "The PostgreSQL database holds a clinic already; nothing was changed. Make an empty one and set "
+            "SAGITTAL_DATABASE_URL to it."
+        )
     if found:
         raise RestoreError(
             f"{settings.data_dir} is not empty ({', '.join(found[:5])}). Restore into an empty folder; move "
             "the old one aside first, and keep it."
         )
+
+
+def _has_database(settings: Settings) -> bool:
+    """Whether a clinic is in it already: a file, or rows on the server."""
+    if not settings.database_url:
+        return settings.database.exists()
+    if not exists(settings.database_source):
+        return False
+    upgrade(settings.database_source, backups=settings.backups)
+    with closing(Database(settings.database_source)) as db, db.read() as c:
+        return read_newest(c) is not None or count_patients_and_sessions(c) != (0, 0)
 
 
 def _require_room(archive: Path, folder: Path) -> None:
@@ -298,9 +314,11 @@ def _put_in_place(settings: Settings, stage: Settings) -> None:
         (stage.live, settings.live),
         (stage.mark, settings.mark),
         (stage.second_factor_key, settings.second_factor_key),
-        (stage.database, settings.database),
+        *(() if settings.database_url else ((stage.database, settings.database),)),
     ):
         if source.exists():
             fs.move_file(source, target)
             fs.sync_folder(settings.data_dir)
+    if settings.database_url:
+        copy_database(stage.database, settings.database_source)
     fs.remove_tree(stage.data_dir)

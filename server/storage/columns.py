@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from sqlalchemy import (
     JSON,
+    BigInteger,
     CheckConstraint,
     Column,
     DateTime,
@@ -83,7 +84,7 @@ def owner(name: str, target: str) -> Column[str]:
 def describe_file() -> tuple[Column[int], Column[str], CheckConstraint]:
     """The columns of a file of storage/blobs.py, size in bytes and SHA-256, and their rule."""
     return (
-        Column("size", Integer, nullable=False),
+        Column("size", Integer().with_variant(BigInteger(), "postgresql"), nullable=False),
         Column("sha256", String(64), nullable=False, index=True),
         CheckConstraint("size >= 0", name="size"),
     )

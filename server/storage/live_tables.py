@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from sqlalchemy import DDL, CheckConstraint, Column, Float, Index, Integer, String, Table, event, text
+from sqlalchemy import CheckConstraint, Column, Float, Index, Integer, String, Table, text
 
+from server.storage.append_only import make_append_only
 from server.storage.columns import Json, Utc, id_column, metadata, one_of, reference
 
 TAKE_STATES = ("pairing", "open", "streaming", "finished", "closed")
@@ -59,9 +60,4 @@ live_event = Table(
     sqlite_autoincrement=True,
 )
 
-LIVE_EVENT_TRIGGER = (
-    "CREATE TRIGGER live_event_no_update BEFORE UPDATE ON live_event "
-    "BEGIN SELECT RAISE(ABORT, 'live events are append-only'); END"
-)
-_append_only = DDL(LIVE_EVENT_TRIGGER).execute_if(dialect="sqlite")  # type: ignore[no-untyped-call]
-event.listen(live_event, "after_create", _append_only)
+make_append_only(live_event, ("UPDATE",), "live events are append-only")

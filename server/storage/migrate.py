@@ -1,7 +1,8 @@
 """Bring a database to the schema of this version; never start on one we do not know.
 
-    upgrade(settings.database)          # at start of the server and by `sagittal migrate`
-require_current(settings.database)  # in a worker: refuses instead of migrating
+    upgrade(settings.database_source)       # at start of the server and by `sagittal migrate`
+require_current(settings.database_source)   # in a worker: refuses instead of migrating
+copy_database(source, target)               # a backup's file, or the other engine
 """
 
 from __future__ import annotations
@@ -9,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import io
 import time
-from contextlib import closing
 from pathlib import Path
 
 from alembic import command
@@ -20,18 +20,27 @@ from sqlalchemy.exc import DatabaseError
 
 import server
 from server.storage import fs
-from server.storage.db import Database, migration_engine
+from server.storage.copying import copy_rows
+from server.storage.db import Source, engine_of
+from server.storage.postgres import PostgresServer
 from server.storage.refusal import refusal_of
+from server.storage.sqlite_file import SqliteFile
 
 INSTALLED = Path(server.__file__).parent / "migrations"
 SOURCE = Path(server.__file__).parent.parent / "migrations"
 
 
+NO_DRIVER = (
+    "PostgreSQL needs the library psycopg, which is not installed. Install Sagittal with its extra: "
+    "pip install '.[postgres]'."
+)
+
+
 class MigrationError(RuntimeError):
-    """The database's revision is not one this version can work with; the message says what to do."""
+    """The database is not one this version can work with, or not reached; the message says what to do."""
 
 
-def configuration(database: Path, scripts: Path | None = None) -> Config:
+def configuration(database: Source, scripts: Path | None = None) -> Config:
     """Alembic's configuration for a database; the scripts lie in the wheel or in the source tree."""
     config = Config(stdout=io.StringIO())
     config.set_main_option("path_separator", "os")
@@ -41,28 +50,45 @@ def configuration(database: Path, scripts: Path | None = None) -> Config:
     return config
 
 
-def read_revision(database: Path) -> str | None:
+def read_revision(database: Source) -> str | None:
     """The database's revision; None when there is none yet or it is empty; raises MigrationError."""
-    if not database.exists():
+    if isinstance(database, Path) and not database.exists():
         return None
-    engine = migration_engine(database)
+    try:
+        kind = engine_of(database)
+        engine = kind.reader()
+    except ModuleNotFoundError as error:
+        raise MigrationError(NO_DRIVER) from error
     try:
         with engine.connect() as connection:
             return MigrationContext.configure(connection).get_current_revision()
     except DatabaseError as error:
+        if isinstance(kind, PostgresServer):
+            raise MigrationError(kind.explain(error)) from error
         refusal = refusal_of(error)
         if refusal is not None:  # SQLite needs some room even to read
             raise MigrationError(f"{database} cannot be opened. {refusal.sentence}") from error
         raise MigrationError(
             f"{database} cannot be read as a database ({error.orig}). Restore it from a backup "
-            f"({database.parent / 'backups'} holds those made before upgrades)."
+            f"({kind.path.parent / 'backups'} holds those made before upgrades)."
         ) from error
     finally:
         engine.dispose()
 
 
-def upgrade(database: Path, *, target: str = "head", scripts: Path | None = None) -> Path | None:
+def exists(database: Source) -> bool:
+    """Whether there is a database: a file, or tables on the server; raises MigrationError."""
+    return database.exists() if isinstance(database, Path) else read_revision(database) is not None
+
+
+def upgrade(
+    database: Source, *, target: str = "head", scripts: Path | None = None, backups: Path | None = None
+) -> Path | None:
     """Migrate in one transaction and return the backup made before it (None: there was nothing to keep).
+
+    Parameters
+    ----------
+    backups : folder of the backup, None = beside a file; PostgreSQL needs it when there is something to keep.
 
     Raises
     ------
@@ -70,18 +96,47 @@ def upgrade(database: Path, *, target: str = "head", scripts: Path | None = None
         the database was made by a version that this one does not know.
     """
     config = configuration(database, scripts)
-    fs.make_folder(database.parent)
-    _keep_private(database)
+    if isinstance(database, Path):
+        fs.make_folder(database.parent)
+        _keep_private(database)
+        backups = backups or database.parent / "backups"
     at = _known(config, database)
     wanted = ScriptDirectory.from_config(config).as_revision_number(target)
     if at == wanted:
         return None
-    backup = _backup(database, at) if at else None
+    backup = None
+    if at is not None:
+        if backups is None:
+            raise MigrationError("The database is older. Start the server, or run `sagittal migrate`.")
+        backup = _backup(database, at, backups, scripts)
     command.upgrade(config, target)
     return backup
 
 
-def require_current(database: Path, scripts: Path | None = None) -> None:
+def copy_database(source: Source, target: Source, scripts: Path | None = None) -> None:
+    """Write a consistent copy, while others read and write, where there is nothing yet.
+
+    Raises
+    ------
+    MigrationError
+        `target` holds rows already.
+    """
+    if isinstance(source, Path) and isinstance(target, Path):
+        SqliteFile(source).write_copy(target)
+        return
+    revision = read_revision(source)
+    upgrade(target, target=revision or "base", scripts=scripts)
+    there, here = engine_of(source).reader(), engine_of(target).writer()
+    try:
+        with there.begin() as read, here.begin() as write:
+            if not copy_rows(read, write):
+                raise MigrationError("The target holds rows already, so nothing was copied. Empty it.")
+    finally:
+        there.dispose()
+        here.dispose()
+
+
+def require_current(database: Source, scripts: Path | None = None) -> None:
     """Raise MigrationError unless the schema is exactly this version's."""
     config = configuration(database, scripts)
     head = ScriptDirectory.from_config(config).get_current_head()
@@ -93,7 +148,7 @@ def require_current(database: Path, scripts: Path | None = None) -> None:
         )
 
 
-def _known(config: Config, database: Path) -> str | None:
+def _known(config: Config, database: Source) -> str | None:
     at = read_revision(database)
     known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
     if at is not None and at not in known:
@@ -112,12 +167,10 @@ def _keep_private(database: Path) -> None:
             fs.keep_private(path)
 
 
-def _backup(database: Path, revision: str) -> Path:
-    folder = database.parent / "backups"
+def _backup(database: Source, revision: str, folder: Path, scripts: Path | None) -> Path:
     fs.make_folder(folder)
     target = folder / f"{revision}-{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}-{time.monotonic_ns()}.db"
     fs.keep_private(target)
-    with closing(Database(database)) as db:
-        db.backup(target)
+    copy_database(database, target, scripts)
     fs.sync_file(target)
     return target

@@ -69,7 +69,7 @@ class Readiness:
         except OSError as error:
             checks["files"] = f"The data folder {_WORDS[refusal_of(error)]}"
         try:
-            require_current(settings.database)
+            require_current(settings.database_source)
         except MigrationError as error:
             checks["schema"] = str(error)
         if shutil.disk_usage(settings.data_dir).free < settings.min_free_bytes:

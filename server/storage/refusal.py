@@ -1,4 +1,4 @@
-"""When the disk refuses to be written: one reading of the errors of the system and of SQLite.
+"""When the disk refuses to be written: one reading of the errors of the system, of SQLite and of PostgreSQL.
 
 if refusal_of(error) is not None: ...     # nothing was written; what is stored can still be read
 """
@@ -9,7 +9,7 @@ import errno
 import sqlite3
 from enum import StrEnum
 
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import DBAPIError, OperationalError
 
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 """Error numbers of a file system, a quota or a file that takes no more bytes."""
@@ -43,6 +43,22 @@ _SQLITE = {
 }
 
 
+_POSTGRES = {
+    "53100": Refusal.FULL,  # disk_full
+    "25006": Refusal.NOT_WRITABLE,  # read_only_sql_transaction: a standby
+}
+_WAITED = "55P03"
+"""PostgreSQL's lock_not_available."""
+
+
+def is_busy(error: BaseException) -> bool:
+    """Whether another writer held the database for too long, or PostgreSQL is away: trying again may help."""
+    if not isinstance(error, OperationalError):
+        return False
+    waited = getattr(error.orig, "sqlstate", None) == _WAITED
+    return waited or error.connection_invalidated or "locked" in str(error.orig)
+
+
 def refusal_of(error: BaseException) -> Refusal | None:
     """Tell why the disk refused; None when the error is another one."""
     if isinstance(error, DBAPIError):
@@ -51,6 +67,9 @@ def refusal_of(error: BaseException) -> Refusal | None:
         code = getattr(error, "sqlite_errorcode", None)
         # an extended code is the primary one in its lowest byte
         return None if code is None else _SQLITE.get(code) or _SQLITE.get(code & 0xFF)
+    state = getattr(error, "sqlstate", None)
+    if state is not None:
+        return _POSTGRES.get(state)
     if isinstance(error, OSError):
         if error.errno in FULL:
             return Refusal.FULL

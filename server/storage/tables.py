@@ -22,7 +22,6 @@ Reports, live takes and what opens an account have modules of their own; `metada
 from __future__ import annotations
 
 from sqlalchemy import (
-    DDL,
     Boolean,
     CheckConstraint,
     Column,
@@ -35,12 +34,12 @@ from sqlalchemy import (
     Table,
     Text,
     UniqueConstraint,
-    event,
     false,
     text,
 )
 
 from server.storage import live_tables, person_tables, report_tables  # noqa: F401 - `metadata` has all tables
+from server.storage.append_only import make_append_only
 from server.storage.columns import Json, Utc
 from server.storage.columns import describe_file as _describe_file
 from server.storage.columns import id_column as _id
@@ -363,16 +362,5 @@ audit = Table(
 )
 Index("ix_audit_resource", audit.c.resource, audit.c.resource_id)
 
-AUDIT_TRIGGERS = tuple(
-    f"CREATE TRIGGER audit_no_{verb.lower()} BEFORE {verb} ON audit "
-    "BEGIN SELECT RAISE(ABORT, 'audit rows are append-only'); END"
-    for verb in ("UPDATE", "DELETE")
-)
-for _trigger in AUDIT_TRIGGERS:
-    event.listen(audit, "after_create", DDL(_trigger).execute_if(dialect="sqlite"))  # type: ignore[no-untyped-call]
-
-EDIT_TRIGGER = (
-    "CREATE TRIGGER edit_no_update BEFORE UPDATE ON edit "
-    "BEGIN SELECT RAISE(ABORT, 'edits are append-only'); END"
-)
-event.listen(edit, "after_create", DDL(EDIT_TRIGGER).execute_if(dialect="sqlite"))  # type: ignore[no-untyped-call]
+make_append_only(audit, ("UPDATE", "DELETE"), "audit rows are append-only")
+make_append_only(edit, ("UPDATE",), "edits are append-only")

@@ -48,7 +48,7 @@ class BackupKeeper:
             self._thread.join(timeout=LOOK_S)
 
     def _run(self) -> None:
-        db = Database(self._settings.database)
+        db = Database(self._settings.database_source)
         try:
             while not self._stop.wait(LOOK_S):
                 self._look(db)

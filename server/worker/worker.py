@@ -22,7 +22,7 @@ from server.jobs.queue import Claim, JobQueue, LeaseState
 from server.jobs.table import TableQueue
 from server.log import start_log
 from server.processes.lifeline import call_when_parent_ends
-from server.services import erasure
+from server.services import custody, erasure
 from server.services.sweep import sweep
 from server.settings import Settings, load_settings
 from server.storage.blobs import Blob, BlobStore
@@ -260,15 +260,16 @@ def _order(claim: Claim) -> Order:
 
 def run_worker(settings: Settings, *, with_starter: bool = False) -> None:
     """Be a worker until SIGTERM or SIGINT, or until the starter is gone; the job at hand is given back."""
-    require_current(settings.database)
+    require_current(settings.database_source)
     load(settings.task_modules)
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     if with_starter:
         call_when_parent_ends(stop.set)
-    db = Database(settings.database)
+    db = Database(settings.database_source)
     try:
+        custody.refuse_foreign_folder(db, settings)
         queue = TableQueue(db, settings.lease_s)
         Worker(settings, db, BlobStore(settings.blobs), queue, stop).run()
     finally:

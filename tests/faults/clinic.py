@@ -47,7 +47,7 @@ def alive(pid: int) -> bool:
 class Clinic:
     """One data folder with a patient, a session and a recording."""
 
-    def __init__(self, folder: Path, lease_s: float) -> None:
+    def __init__(self, folder: Path, lease_s: float, database_url: str = "") -> None:
         self.settings = Settings(
             data_dir=folder,
             workers=1,
@@ -55,9 +55,11 @@ class Clinic:
             min_free_bytes=0,
             child_memory_bytes=4_000_000_000,
             task_modules=("tests.faults.tiny_tasks",),
+            database_url=database_url,
         )
-        write_database(self.settings.database)
-        self.db = Database(self.settings.database)
+        if not database_url:
+            write_database(self.settings.database)
+        self.db = Database(self.settings.database_source)
         self.blobs = BlobStore(self.settings.blobs)
         self.queue = TableQueue(self.db, lease_s)
         self.folder = folder

@@ -14,7 +14,7 @@ from server.auth.access import require
 from server.auth.roles import Action
 from server.http.problems import Problem, as_problem
 from server.services.errors import NotFound
-from server.storage import db
+from server.storage import sqlite_file
 from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
@@ -109,7 +109,7 @@ async def test_an_unforeseen_error_tells_neither_client_nor_log_whose_data_it_wa
 async def test_a_busy_database_is_said_and_not_an_internal_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(db, "BUSY_TIMEOUT_MS", 100)
+    monkeypatch.setattr(sqlite_file, "BUSY_TIMEOUT_MS", 100)
     async with open_clinic(tmp_path) as clinic, clinic.client("clinician") as client:
         with contextlib.closing(sqlite3.connect(clinic.settings.database, isolation_level=None)) as other:
             other.execute("BEGIN IMMEDIATE")

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from sqlalchemy import delete
@@ -10,15 +9,13 @@ from sqlalchemy import delete
 from server.jobs.feed import JobFeed
 from server.jobs.queue import JobView
 from server.jobs.table import TableQueue
-from server.storage.db import Database
+from server.storage.db import Database, Source
 from server.storage.tables import job
-from tests.databases import write_database
 
 
 @pytest.fixture
-def db(tmp_path: Path) -> Iterator[Database]:
-    write_database(tmp_path / "a.db")
-    opened = Database(tmp_path / "a.db")
+def db(source: Source) -> Iterator[Database]:
+    opened = Database(source)
     yield opened
     opened.close()
 

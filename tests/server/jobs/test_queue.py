@@ -17,7 +17,7 @@ from sqlalchemy import select
 
 from server.jobs.queue import Claim, JobView, LeaseState, Priority
 from server.jobs.table import MAX_DEATHS, TableQueue
-from server.storage.db import Database
+from server.storage.db import Database, Source
 from server.storage.tables import job
 from tests.databases import write_database
 
@@ -38,9 +38,8 @@ class Clock:
 class Bench:
     """A queue with a hand-driven clock and what has been published through it."""
 
-    def __init__(self, path: Path) -> None:
-        write_database(path)
-        self.db = Database(path)
+    def __init__(self, source: Source) -> None:
+        self.db = Database(source)
         self.clock = Clock()
         self.queue = TableQueue(self.db, LEASE_S, self.clock)
         self.published: list[tuple[str, int]] = []
@@ -73,8 +72,8 @@ class Bench:
 
 
 @pytest.fixture
-def bench(tmp_path: Path) -> Iterator[Bench]:
-    made = Bench(tmp_path / "a.db")
+def bench(source: Source) -> Iterator[Bench]:
+    made = Bench(source)
     yield made
     made.db.close()
 
@@ -253,7 +252,7 @@ class QueueModel(RuleBasedStateMachine):
     @initialize()
     def open(self) -> None:
         self.folder = Path(tempfile.mkdtemp())
-
+        write_database(self.folder / "a.db")
         self.bench = Bench(self.folder / "a.db")
         self.claims: list[Claim] = []
         self.ended: dict[str, str] = {}

@@ -77,11 +77,16 @@ def make(clinic: Clinic, key: ClinicKey | None = None) -> MadeBackup:
 
 def put_back(clinic: Clinic, made: MadeBackup, key: ClinicKey | None = None) -> tuple[RestoredClinic, Clinic]:
     """Restore beside the clinic, and open what came back."""
-    home = replace(clinic.settings, data_dir=clinic.folder.parent / "again")
+    return put_back_into(replace(clinic.settings, data_dir=clinic.folder.parent / "again"), made, key)
+
+
+def put_back_into(
+    home: Settings, made: MadeBackup, key: ClinicKey | None = None
+) -> tuple[RestoredClinic, Clinic]:
     found = restore(made.path, home, key)
     again = object.__new__(Clinic)
     again.settings, again.folder = home, home.data_dir
-    again.db, again.blobs = Database(home.database), BlobStore(home.blobs)
+    again.db, again.blobs = Database(home.database_source), BlobStore(home.blobs)
     return found, again
 
 
@@ -319,3 +324,22 @@ def test_commands_make_prune_try_and_restore(
     assert main(["restore", str(made.path), "--key", key, "--data", str(tmp_path / "new")]) == 0
     with closing(Database(tmp_path / "new" / "sagittal.db")) as db, db.read() as c:
         assert c.execute(select(user.c.name)).scalars().all() == ["ada"]
+
+
+@pytest.mark.postgres
+def test_a_backup_goes_into_postgres_and_one_of_postgres_into_a_file(clinic: Clinic, postgres: str) -> None:
+    folder = clinic.folder.parent
+    home = replace(clinic.settings, data_dir=folder / "on a server", database_url=postgres)
+    found, moved = put_back_into(home, make(clinic))
+    with closing(moved.db):
+        assert (found.patients, found.sessions) == (1, 1)
+        assert not moved.settings.database.exists()
+        assert (defects(moved), contents(moved)) == ([], contents(clinic))
+        (folder / "other disk").mkdir()
+        made = make_backup(moved.db, moved.settings, folder / "other disk", None)
+        other = replace(home, data_dir=folder / "elsewhere")
+        with pytest.raises(RestoreError, match="PostgreSQL database holds a clinic"):
+            restore(made.path, other, None)
+    _, back = put_back_into(replace(home, data_dir=folder / "back", database_url=""), made)
+    with closing(back.db):
+        assert (defects(back), contents(back)) == ([], contents(clinic))

@@ -30,8 +30,14 @@ from server.services.sweep import sweep
 from server.settings import Settings
 from server.storage import tables
 from server.storage.blobs import BlobStore
-from server.storage.db import Database
-from tests.databases import write_database
+from server.storage.db import Database, Source
+
+NO_TRIGGERS = {
+    "sqlite": ("DROP TRIGGER audit_no_update", "DROP TRIGGER audit_no_delete"),
+    "postgresql": ("SET LOCAL session_replication_role = replica",),
+}
+IN_A_FILE = pytest.mark.parametrize("source", ["sqlite"], indirect=True)
+"""Tests that look at the bytes of the database's file."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +47,12 @@ class Person:
 
 
 class Clinic:
-    def __init__(self, folder: Path) -> None:
-        self.settings = Settings(data_dir=folder, min_free_bytes=0, max_file_bytes=1000, max_files=3)
-        write_database(self.settings.database)
-        self.db = Database(self.settings.database)
+    def __init__(self, folder: Path, source: Source) -> None:
+        url = source if isinstance(source, str) else ""
+        self.settings = Settings(
+            data_dir=folder, database_url=url, min_free_bytes=0, max_file_bytes=1000, max_files=3
+        )
+        self.db = Database(source)
         self.blobs = BlobStore(self.settings.blobs)
         self.queue = TableQueue(self.db, 15.0)
         self.who = Person()
@@ -107,8 +115,8 @@ class Clinic:
 
 
 @pytest.fixture
-def clinic(tmp_path: Path) -> Iterator[Clinic]:
-    made = Clinic(tmp_path)
+def clinic(tmp_path: Path, source: Source) -> Iterator[Clinic]:
+    made = Clinic(tmp_path, source)
     yield made
     made.db.close()
 
@@ -359,6 +367,7 @@ def test_erasing_a_patient_needs_the_code_and_leaves_only_the_trail(clinic: Clin
     assert checks.check(clinic.db, clinic.blobs, clinic.settings) == []
 
 
+@IN_A_FILE
 def test_no_byte_of_an_erased_patient_is_left_in_the_data_folder(clinic: Clinic) -> None:
     patient_id = clinic.patient("CANARY-CODE")
     with clinic.db.write() as c:
@@ -384,10 +393,11 @@ def test_no_byte_of_an_erased_patient_is_left_in_the_data_folder(clinic: Clinic)
     assert found() == set()
 
 
+@IN_A_FILE
 def test_no_byte_of_an_erased_session_is_left_and_who_reads_an_older_state_only_delays_it(
     clinic: Clinic, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.storage.db.BUSY_TIMEOUT_MS", 10)
+    monkeypatch.setattr("server.storage.sqlite_file.BUSY_TIMEOUT_MS", 10)
     patient_id = clinic.patient()
     with clinic.db.write() as c:
         session_id = sessions.create(c, clinic.who, patient_id, title="CANARY-TITLE").id
@@ -478,14 +488,15 @@ def test_the_check_finds_what_is_wrong(clinic: Clinic) -> None:
     files[0].path.write_bytes(b"onf")
     files[1].path.unlink()
     with clinic.db.write() as c:
-        c.exec_driver_sql("DROP TRIGGER audit_no_update")
-        c.exec_driver_sql("DROP TRIGGER audit_no_delete")
+        for statement in NO_TRIGGERS[c.dialect.name]:
+            c.exec_driver_sql(statement)
         c.exec_driver_sql("UPDATE audit SET user_name = 'somebody else' WHERE seq = 1")
         c.exec_driver_sql("DELETE FROM audit WHERE seq = 3")
     findings = checks.check(clinic.db, clinic.blobs, clinic.settings)
     assert sorted(f.area for f in findings) == ["audit", "audit", "files", "files"]
 
 
+@IN_A_FILE
 def test_the_check_speaks_of_a_damaged_database_instead_of_failing(clinic: Clinic) -> None:
     for i in range(50):
         clinic.patient(f"P-{i}")

@@ -7,19 +7,18 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import insert, select, update
-from sqlalchemy.exc import IntegrityError, OperationalError, StatementError
+from sqlalchemy.exc import DBAPIError, IntegrityError, StatementError
 
-from server.storage.db import Database
+from server.storage.db import Database, Source
+from server.storage.migrate import copy_database
 from server.storage.tables import new_id, now, patient, session
-from tests.databases import write_database
 
 WRITERS, ROUNDS = 50, 4
 
 
 @pytest.fixture
-def db(tmp_path: Path) -> Iterator[Database]:
-    write_database(tmp_path / "a.db")
-    opened = Database(tmp_path / "a.db")
+def db(source: Source) -> Iterator[Database]:
+    opened = Database(source)
     yield opened
     opened.close()
 
@@ -44,7 +43,7 @@ def test_an_error_rolls_back_everything(db: Database) -> None:
 
 
 def test_the_reading_view_refuses_to_write(db: Database) -> None:
-    with pytest.raises(OperationalError, match="readonly"), db.read() as c:
+    with pytest.raises(DBAPIError, match=r"read-?only"), db.read() as c:
         c.execute(insert(patient).values(id=new_id(), code="a", note="", created_at=now()))
 
 
@@ -73,7 +72,7 @@ def test_clinical_rows_do_not_vanish_with_what_they_refer_to(db: Database) -> No
                 created_at=now(),
             )
         )
-    with pytest.raises(IntegrityError, match="FOREIGN KEY"), db.write() as c:
+    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), db.write() as c:
         c.execute(patient.delete())
 
 
@@ -90,7 +89,7 @@ def test_times_come_back_aware_in_utc_and_naive_ones_are_refused(db: Database) -
 
 def test_values_outside_their_domain_are_refused_by_the_database_itself(db: Database) -> None:
     for wrong in ({"sex": "x"}, {"height_m": 175.0}, {"birth_year": 85}):
-        with pytest.raises(IntegrityError, match="CHECK"), db.write() as c:
+        with pytest.raises(IntegrityError, match=r"(?i)check"), db.write() as c:
             c.execute(insert(patient).values(id=new_id(), code="a", note="", created_at=now(), **wrong))
 
 
@@ -107,7 +106,7 @@ def test_a_backup_under_way_of_writing_is_whole(db: Database, tmp_path: Path) ->
     add_patient(db, "a")
     with db.write() as c:
         c.execute(insert(patient).values(id=new_id(), code="b", note="", created_at=now()))
-        db.backup(tmp_path / "backup.db")
+        copy_database(db.source, tmp_path / "backup.db")
     copy = Database(tmp_path / "backup.db")
     assert copy.problems() == []
     with copy.read() as c:
@@ -115,10 +114,10 @@ def test_a_backup_under_way_of_writing_is_whole(db: Database, tmp_path: Path) ->
     copy.close()
 
 
-def _count_up(path: Path, writers: int) -> None:
+def _count_up(source: Source, writers: int) -> None:
     import threading
 
-    db = Database(path)
+    db = Database(source)
 
     def write() -> None:
         for _ in range(ROUNDS):
@@ -140,7 +139,7 @@ def test_fifty_concurrent_writers_lose_no_update(db: Database) -> None:
     with db.write() as c:
         c.execute(update(patient).values(birth_year=1850))
     context = multiprocessing.get_context("spawn")
-    processes = [context.Process(target=_count_up, args=(db.path, WRITERS // 5)) for _ in range(5)]
+    processes = [context.Process(target=_count_up, args=(db.source, WRITERS // 5)) for _ in range(5)]
     for p in processes:
         p.start()
     for p in processes:

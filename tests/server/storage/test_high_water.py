@@ -21,7 +21,7 @@ from server.storage.high_water import (
     read_newest,
     set_mark,
 )
-from server.storage.migrate import upgrade
+from server.storage.migrate import copy_database, upgrade
 from tests.databases import write_database
 from tests.faults.clinic import until
 from tests.faults.model_disk import ModelDisk
@@ -77,7 +77,7 @@ def test_an_older_database_is_known_also_after_it_has_grown_past_the_mark(
     db: Database, mark: Path, tmp_path: Path
 ) -> None:
     write_rows(db, 2)
-    db.backup(tmp_path / "older.db")
+    copy_database(db.source, tmp_path / "older.db")
     write_rows(db, 3)
     raise_mark(db, mark)
     with closing(Database(tmp_path / "older.db")) as older:

@@ -1,25 +1,26 @@
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import signal
-import sqlite3
 import subprocess
 import sys
 import textwrap
 import time
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 from alembic import command
 from alembic.script import ScriptDirectory
+from sqlalchemy.exc import IntegrityError
 
 from server.storage import migrate
-from server.storage.db import Database
+from server.storage.db import Database, Source
 from server.storage.tables import metadata
 from tests.data import ROOT
+from tests.postgres import run_sql
 
 HANG = """
 import pathlib, time
@@ -50,42 +51,61 @@ def test_nobody_else_may_read_the_database_in_a_folder_that_was_there(tmp_path: 
         assert {(p.name, p.stat().st_mode & 0o777) for p in files} == {
             (path.name + end, 0o600) for end in ("", "-wal", "-shm")
         }
-    backup = migrate._backup(path, "x")
+    backup = migrate._backup(path, "x", tmp_path / "backups", None)
     assert backup.stat().st_mode & 0o777 == 0o600
 
 
-def schema(path: Path) -> set[tuple[str, str, tuple[str, ...]]]:
+TABLES_OF_POSTGRES = """
+SELECT 'column', table_name || '.' || column_name, concat_ws(' ', data_type, character_maximum_length,
+    is_nullable, column_default) FROM information_schema.columns
+    WHERE table_schema = 'public' AND table_name NOT LIKE '%alembic%'
+UNION ALL SELECT 'rule', conname, pg_get_constraintdef(oid) FROM pg_constraint
+    WHERE connamespace = 'public'::regnamespace AND conname NOT LIKE '%alembic%'
+UNION ALL SELECT 'index', indexname, indexdef FROM pg_indexes
+    WHERE schemaname = 'public' AND indexname NOT LIKE '%alembic%'
+UNION ALL SELECT 'trigger', tgname, pg_get_triggerdef(oid) FROM pg_trigger WHERE NOT tgisinternal
+UNION ALL SELECT 'function', proname, prosrc FROM pg_proc WHERE pronamespace = 'public'::regnamespace
+"""
+
+
+def schema(source: Source) -> set[tuple[str, str, tuple[str, ...]]]:
+    if isinstance(source, str):
+        return {(kind, name, (text,)) for kind, name, text in run_sql(TABLES_OF_POSTGRES, source)}
     query = "SELECT type, name, coalesce(sql, '') FROM sqlite_master WHERE name NOT LIKE '%alembic%'"
-    with closing(sqlite3.connect(path)) as c:
-        rows = c.execute(query).fetchall()
     # the order of constraints inside a statement means nothing, nor do quotes around a renamed table
     return {
         (kind, name, tuple(sorted(s.strip().rstrip(",") for s in sql.replace('"', "").splitlines())))
-        for kind, name, sql in rows
+        for kind, name, sql in ask(source, query)
+        if not name.startswith("sqlite_")
     }
 
 
-def fill(path: Path) -> None:
-    with closing(sqlite3.connect(path)) as c:
-        c.execute("PRAGMA foreign_keys=ON")
-        c.execute(
-            "INSERT INTO patient (id, code, note, created_at) VALUES ('p', 'A', '', '2026-01-01 00:00:00')"
-        )
-        for i in range(2):
-            c.execute(
-                "INSERT INTO session (id, patient_id, title, performed_on, protocol, note, created_at) "
-                "VALUES (?, 'p', 't', '2026-01-01', 'walk', '', '2026-01-01 00:00:00.000000')",
-                (f"s{i}",),
-            )
-        c.commit()
+def ask(source: Source, query: str) -> list[tuple[Any, ...]]:
+    with closing(Database(source)) as db, db.read() as c:
+        return [tuple(row) for row in c.exec_driver_sql(query)]
 
 
-def counts(path: Path) -> tuple[int, int]:
-    with closing(sqlite3.connect(path)) as c:
-        return (
-            c.execute("SELECT count(*) FROM patient").fetchone()[0],
-            c.execute("SELECT count(*) FROM session").fetchone()[0],
-        )
+def run(source: Source, *statements: str) -> None:
+    with closing(Database(source)) as db, db.write() as c:
+        for statement in statements:
+            c.exec_driver_sql(statement)
+
+
+def fill(source: Source) -> None:
+    run(
+        source,
+        "INSERT INTO patient (id, code, note, created_at) "
+        "VALUES ('p', 'A', '', '2026-01-01 00:00:00.000000')",
+        "INSERT INTO session (id, patient_id, title, performed_on, protocol, note, created_at) "
+        "VALUES ('s0', 'p', 't', '2026-01-01', 'walk', '', '2026-01-01 00:00:00.000000'),"
+        "('s1', 'p', 't', '2026-01-01', 'walk', '', '2026-01-01 00:00:00.000000')",
+    )
+
+
+def counts(source: Source) -> tuple[int, int]:
+    query = "SELECT (SELECT count(*) FROM patient), (SELECT count(*) FROM session)"
+    [(people, visits)] = ask(source, query)
+    return people, visits
 
 
 @pytest.fixture
@@ -102,109 +122,105 @@ def scripts(tmp_path: Path) -> Path:
     return Path(shutil.copytree(ROOT / "migrations", tmp_path / "migrations"))
 
 
-def test_the_migrated_schema_is_the_one_the_code_declares(tmp_path: Path) -> None:
-    migrate.upgrade(tmp_path / "migrated.db")
-    fresh = Database(tmp_path / "fresh.db")
+def test_the_migrated_schema_is_the_one_the_code_declares(bare_source: Source) -> None:
+    fresh = Database(bare_source)
     with fresh.write() as c:
         metadata.create_all(c)
+    declared = schema(bare_source)
+    with fresh.write() as c:
+        metadata.drop_all(c)
+        if isinstance(bare_source, str):
+            c.exec_driver_sql("DROP FUNCTION refuse_change()")
     fresh.close()
-    assert schema(tmp_path / "migrated.db") == schema(tmp_path / "fresh.db")
-    command.check(migrate.configuration(tmp_path / "migrated.db"))
+    assert schema(bare_source) == set()
+    migrate.upgrade(bare_source)
+    assert schema(bare_source) == declared
+    command.check(migrate.configuration(bare_source))
 
 
-def test_down_and_up_again_leave_the_same_schema(tmp_path: Path) -> None:
-    path = tmp_path / "a.db"
-    migrate.upgrade(path)
-    before = schema(path)
-    command.downgrade(migrate.configuration(path), "base")
-    assert schema(path) <= {row for row in schema(path) if row[1].startswith("sqlite_")}
-    migrate.upgrade(path)
-    assert schema(path) == before
+def test_down_and_up_again_leave_the_same_schema(bare_source: Source) -> None:
+    migrate.upgrade(bare_source)
+    before = schema(bare_source)
+    command.downgrade(migrate.configuration(bare_source), "base")
+    assert schema(bare_source) == set()
+    migrate.upgrade(bare_source)
+    assert schema(bare_source) == before
 
 
 def test_data_survive_up_and_down_and_a_backup_is_made_before(
-    tmp_path: Path, scripts: Path, head: str
+    bare_source: Source, tmp_path: Path, scripts: Path, head: str
 ) -> None:
-    path = tmp_path / "a.db"
-    assert migrate.upgrade(path, target=head, scripts=scripts) is None
-    fill(path)
+    source, kept = bare_source, tmp_path / "kept"
+    assert migrate.upgrade(source, target=head, scripts=scripts, backups=kept) is None
+    fill(source)
     (scripts / "versions" / "next.py").write_text(HANG.format(head=head, then="pass"))
-    backup = migrate.upgrade(path, scripts=scripts)
-    assert migrate.read_revision(path) == "next"
-    assert counts(path) == (1, 2)
+    backup = migrate.upgrade(source, scripts=scripts, backups=kept)
+    assert migrate.read_revision(source) == "next"
+    assert counts(source) == (1, 2)
     assert backup is not None
     assert (counts(backup), migrate.read_revision(backup)) == ((1, 2), head)
-    command.downgrade(migrate.configuration(path, scripts), head)
-    assert counts(path) == (1, 2)
-    assert migrate.upgrade(path, scripts=scripts) is not None
-    assert counts(path) == (1, 2)
+    command.downgrade(migrate.configuration(source, scripts), head)
+    assert counts(source) == (1, 2)
+    assert migrate.upgrade(source, scripts=scripts, backups=kept) is not None
+    assert counts(source) == (1, 2)
 
 
-def test_earlier_sessions_have_no_condition_but_the_feedback_that_was_kept(tmp_path: Path) -> None:
-    path = tmp_path / "a.db"
-    config = migrate.configuration(path)
-    migrate.upgrade(path, target="0005")
-    fill(path)
-    cues = {"s0": {"shown": False, "why_not": "bandwidth"}, "s1": {"shown": False, "why_not": "probe"}}
-    at = "2026-01-01 00:00:00.000000"
-    with closing(sqlite3.connect(path)) as c:
-        for session, cue in cues.items():
-            c.execute(
-                "INSERT INTO recording (id, session_id, created_at) VALUES (?, ?, ?)",
-                (f"r{session}", session, at),
-            )
-            c.execute(
-                "INSERT INTO live_take (id, session_id, state, recording_id, created_at, finished_at) "
-                "VALUES (?, ?, 'finished', ?, ?, ?)",
-                (f"t{session}", session, f"r{session}", at, at),
-            )
-            c.execute(
-                "INSERT INTO live_event (take_id, kind, content, at) VALUES (?, 'cue', ?, ?)",
-                (f"t{session}", json.dumps(cue), at),
-            )
-        c.commit()
-    migrate.upgrade(path)
+def test_earlier_sessions_have_no_condition_but_the_feedback_that_was_kept(
+    bare_source: Source, tmp_path: Path
+) -> None:
+    source = bare_source
+    migrate.upgrade(source, target="0005")
+    fill(source)
+    run(
+        source,
+        "INSERT INTO recording (id, session_id, created_at) SELECT 'r' || id, id, created_at FROM session",
+        "INSERT INTO live_take (id, session_id, state, recording_id, created_at, finished_at) "
+        "SELECT 't' || id, id, 'finished', 'r' || id, created_at, created_at FROM session",
+        "INSERT INTO live_event (take_id, kind, content, at) VALUES "
+        """('ts0', 'cue', '{"shown": false, "why_not": "bandwidth"}', '2026-01-01 00:00:00.000000'),"""
+        """('ts1', 'cue', '{"shown": false, "why_not": "probe"}', '2026-01-01 00:00:00.000000')""",
+    )
+    migrate.upgrade(source, backups=tmp_path / "kept")
     query = "SELECT id, pace, aid, orthosis, shoes, feedback FROM session ORDER BY id"
-    with closing(sqlite3.connect(path)) as c:
-        assert c.execute(query).fetchall() == [("s0", *[None] * 4, 1), ("s1", *[None] * 4, 0)]
-    command.downgrade(config, "0005")
-    assert counts(path) == (1, 2)
+    assert ask(source, query) == [("s0", *[None] * 4, True), ("s1", *[None] * 4, False)]
+    command.downgrade(migrate.configuration(source), "0005")
+    assert counts(source) == (1, 2)
 
 
 def test_a_failing_migration_leaves_exactly_the_old_revision(
-    tmp_path: Path, scripts: Path, head: str
+    bare_source: Source, tmp_path: Path, scripts: Path, head: str
 ) -> None:
-    path = tmp_path / "a.db"
-    migrate.upgrade(path, target=head, scripts=scripts)
-    fill(path)
-    before = schema(path)
+    source, kept = bare_source, tmp_path / "kept"
+    migrate.upgrade(source, target=head, scripts=scripts)
+    fill(source)
+    before = schema(source)
     step = scripts / "versions" / "next.py"
     for wrong in (
         "raise RuntimeError('broken')",
         "op.execute(\"UPDATE session SET patient_id = 'nobody'\")",  # dangling: seen before COMMIT
     ):
         step.write_text(HANG.format(head=head, then=wrong))
-        with pytest.raises(RuntimeError):
-            migrate.upgrade(path, scripts=scripts)
-        assert (schema(path), migrate.read_revision(path), counts(path)) == (before, head, (1, 2))
+        with pytest.raises((RuntimeError, IntegrityError)):
+            migrate.upgrade(source, scripts=scripts, backups=kept)
+        assert (schema(source), migrate.read_revision(source), counts(source)) == (before, head, (1, 2))
     step.write_text(HANG.format(head=head, then="pass"))
-    migrate.upgrade(path, scripts=scripts)
-    assert migrate.read_revision(path) == "next"
+    migrate.upgrade(source, scripts=scripts, backups=kept)
+    assert migrate.read_revision(source) == "next"
 
 
 def test_a_migration_killed_in_the_middle_leaves_exactly_the_old_revision(
-    tmp_path: Path, scripts: Path, head: str
+    bare_source: Source, tmp_path: Path, scripts: Path, head: str
 ) -> None:
-    path, marker = tmp_path / "a.db", tmp_path / "reached"
-    migrate.upgrade(path, target=head, scripts=scripts)
-    fill(path)
-    before = schema(path)
+    source, kept, marker = bare_source, tmp_path / "kept", tmp_path / "reached"
+    migrate.upgrade(source, target=head, scripts=scripts)
+    fill(source)
+    before = schema(source)
     step = scripts / "versions" / "next.py"
     step.write_text(HANG.format(head=head, then=f"pathlib.Path({str(marker)!r}).touch(); time.sleep(600)"))
     script = textwrap.dedent(f"""
-        from pathlib import Path
+        from pathlib import PosixPath
         from server.storage.migrate import upgrade
-        upgrade(Path({str(path)!r}), scripts=Path({str(scripts)!r}))
+        upgrade({source!r}, scripts={scripts!r}, backups={kept!r})
     """)
     process = subprocess.Popen([sys.executable, "-c", script], cwd=ROOT)
     limit = time.monotonic() + 60
@@ -214,21 +230,18 @@ def test_a_migration_killed_in_the_middle_leaves_exactly_the_old_revision(
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    assert (schema(path), migrate.read_revision(path), counts(path)) == (before, head, (1, 2))
+    assert (schema(source), migrate.read_revision(source), counts(source)) == (before, head, (1, 2))
     step.write_text(HANG.format(head=head, then="pass"))
-    migrate.upgrade(path, scripts=scripts)
-    assert (migrate.read_revision(path), counts(path)) == ("next", (1, 2))
+    migrate.upgrade(source, scripts=scripts, backups=kept)
+    assert (migrate.read_revision(source), counts(source)) == ("next", (1, 2))
 
 
-def test_an_unknown_revision_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "a.db"
-    migrate.upgrade(path)
-    with closing(sqlite3.connect(path)) as c:
-        c.execute("UPDATE alembic_version SET version_num = 'f00d'")
-        c.commit()
+def test_an_unknown_revision_is_refused(bare_source: Source) -> None:
+    migrate.upgrade(bare_source)
+    run(bare_source, "UPDATE alembic_version SET version_num = 'f00d'")
     for start in (migrate.upgrade, migrate.require_current):
         with pytest.raises(migrate.MigrationError, match="f00d"):
-            start(path)
+            start(bare_source)
 
 
 def test_a_file_that_is_no_database_is_named(tmp_path: Path) -> None:

@@ -1,0 +1,46 @@
+"""All rows of one database into another of the same revision, whatever the engines: moves and backups.
+
+Tables are those that the databases have, not those of this version: before an upgrade they are older.
+"""
+
+from __future__ import annotations
+
+from sqlalchemy import JSON, Connection, MetaData, Table, func, insert, select
+
+from server.storage.columns import Json
+from server.storage.db import highest_number, raise_number
+
+_AT_ONCE = 500
+"""Rows in memory."""
+_ALEMBIC = "alembic_version"
+
+
+def copy_rows(source: Connection, target: Connection) -> bool:
+    """Copy every row in the transaction of `target`; False, and nothing was copied, when it holds any."""
+    theirs, ours = _reflect(source), _reflect(target)
+    tables = [ours.tables[table.name] for table in theirs.sorted_tables if table.name != _ALEMBIC]
+    if any(target.execute(select(func.count()).select_from(table)).scalar_one() for table in tables):
+        return False
+    for table in tables:
+        _copy_table(source, theirs.tables[table.name], target, table)
+    return True
+
+
+def _copy_table(source: Connection, old: Table, target: Connection, new: Table) -> None:
+    columns = [old.c[column.name] for column in new.columns]
+    query = select(*columns).order_by(*old.primary_key.columns)
+    rows = source.execution_options(yield_per=_AT_ONCE).execute(query)
+    for part in rows.mappings().partitions():
+        target.execute(insert(new), [dict(row) for row in part])
+    if new.primary_key.columns.keys() == ["seq"] and (number := highest_number(source, old.name)):
+        raise_number(target, new.name, number)
+
+
+def _reflect(c: Connection) -> MetaData:
+    found = MetaData()
+    found.reflect(c)
+    for table in found.tables.values():
+        for column in table.columns:
+            if isinstance(column.type, JSON):
+                column.type = Json  # no value is NULL, not the word null
+    return found

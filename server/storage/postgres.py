@@ -1,0 +1,194 @@
+"""A PostgreSQL server as the database: what only PostgreSQL knows (psycopg 3, the extra `postgres`).
+
+Writing transactions take one advisory lock first, as BEGIN IMMEDIATE does on SQLite: who reads before it
+writes sees what the one before it committed, and the audit log cannot fork. Reading ones see one snapshot.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from sqlalchemy import Connection, Engine, create_engine, event, inspect, make_url
+from sqlalchemy.exc import DBAPIError, OperationalError
+
+from server.storage.columns import metadata
+
+MAX_READERS = 45
+"""As on SQLite; PostgreSQL's own limit, 100 in all, is for all programs together."""
+WAIT_MS = 5000
+"""How long a writer waits for another one before it is told that the database is busy."""
+MIGRATION_WAIT_MS = 120_000
+"""How long a program waits for another one that migrates."""
+FORGOTTEN_S = 60
+"""A writing transaction of a frozen or unreachable program is ended after so long without a word."""
+WRITING, SERVING = 0x5A610001, 0x5A610002
+"""Numbers of the advisory locks: whoever writes, and the web server of a database."""
+
+
+class PostgresServer:
+    """A database of a PostgreSQL server.
+
+    Parameters
+    ----------
+    url : postgresql://user:password@host:port/database; what it leaves out is libpq's (PGPASSFILE and so on).
+    """
+
+    def __init__(self, url: str) -> None:
+        self._url = make_url(url).set(drivername="postgresql+psycopg")
+        self.name = self._url.set(drivername="postgresql").render_as_string(hide_password=True)
+
+    def writer(self) -> Engine:
+        """An engine whose transactions hold the write lock from their first statement."""
+        return self._locking(WAIT_MS, forgotten_s=FORGOTTEN_S)
+
+    def reader(self) -> Engine:
+        """An engine whose transactions see one snapshot and cannot write."""
+        return self._engine(
+            WAIT_MS, execution_options={"isolation_level": "REPEATABLE READ", "postgresql_readonly": True}
+        )
+
+    def migrator(self) -> Engine:
+        """An engine for Alembic: a second program that migrates waits for the first, and finds it done."""
+        return self._locking(MIGRATION_WAIT_MS)
+
+    @contextmanager
+    def watch(self) -> Iterator[Callable[[], object]]:
+        """Give a question for a word which every commit that wrote something changes."""
+        engine = self._engine(WAIT_MS, isolation_level="AUTOCOMMIT", pool_size=1)
+
+        def ask() -> object:
+            with engine.connect() as c:
+                return c.exec_driver_sql("SELECT pg_current_snapshot()::text").scalar_one()
+
+        try:
+            yield ask
+        finally:
+            engine.dispose()
+
+    def check(self, c: Connection) -> list[str]:
+        """Read every row; PostgreSQL complains of pages whose checksum is wrong (initdb --data-checksums)."""
+        found = []
+        for name in inspect(c).get_table_names():
+            try:
+                with c.begin_nested():
+                    quoted = c.dialect.identifier_preparer.quote(name)
+                    c.exec_driver_sql(f"SELECT max(length(t::text)) FROM {quoted} AS t")  # noqa: S608
+            except DBAPIError as error:
+                found.append(f"{name} cannot be read ({error.orig})")
+        return found
+
+    def dangling(self, c: Connection) -> list[str]:
+        """Nothing: PostgreSQL enforces references at every statement, of migrations too."""
+        return []
+
+    def probe(self, c: Connection) -> None:
+        """Write into the write-ahead log in this transaction, without touching a table."""
+        c.exec_driver_sql("SELECT pg_logical_emit_message(true, 'sagittal', 'probe')")
+
+    def highest_number(self, c: Connection, table: str) -> int:
+        """See storage/db.py; the sequence has it where PostgreSQL gives the numbers, else the newest row."""
+        quoted = c.dialect.identifier_preparer.quote(table)
+        given = c.exec_driver_sql(
+            "SELECT last_value FROM pg_sequences WHERE schemaname || '.' || sequencename "
+            "= pg_get_serial_sequence(%s, 'seq')",
+            (quoted,),
+        ).scalar()
+        newest = c.exec_driver_sql(f"SELECT max(seq) FROM {quoted}").scalar()  # noqa: S608
+        return max(int(given or 0), int(newest or 0))
+
+    def raise_number(self, c: Connection, table: str, number: int) -> None:
+        """See storage/db.py."""
+        quoted = c.dialect.identifier_preparer.quote(table)
+        c.exec_driver_sql("SELECT setval(pg_get_serial_sequence(%s, 'seq'), %s)", (quoted, number))
+
+    def fold(self) -> bool:
+        """Rewrite the tables, what was deleted is gone from them then (not yet from PostgreSQL's own log).
+
+        False when somebody has been reading an older state all the time, so that it had to stay.
+        """
+        engine = self._engine(WAIT_MS, isolation_level="AUTOCOMMIT", pool_size=1)
+        try:
+            with engine.connect() as c:
+                if not _outlive_readers(c):
+                    return False
+                for table in metadata.sorted_tables:
+                    c.exec_driver_sql(f"VACUUM FULL {c.dialect.identifier_preparer.format_table(table)}")
+        except OperationalError:
+            return False
+        finally:
+            engine.dispose()
+        return True
+
+    @contextmanager
+    def serve_alone(self) -> Iterator[bool]:
+        """Hold the lock of the one web server while the block runs; False = another one has it."""
+        engine = self._engine(WAIT_MS, isolation_level="AUTOCOMMIT", pool_size=1)
+        try:
+            with engine.connect() as c:
+                yield bool(c.exec_driver_sql(f"SELECT pg_try_advisory_lock({SERVING})").scalar_one())
+        finally:
+            engine.dispose()
+
+    def read_clock(self, c: Connection) -> float:
+        """The server's time, seconds since 1970 UTC."""
+        return float(c.exec_driver_sql("SELECT extract(epoch FROM clock_timestamp())").scalar_one())
+
+    def explain(self, error: DBAPIError) -> str:
+        """Why the server cannot be used, and what to do."""
+        said = " ".join(str(error.orig).split())
+        attempt = getattr(error.orig, "pgconn", None)
+        asked = attempt is not None and (attempt.needs_password or attempt.used_password)
+        if asked or "FATAL" in said:
+            return (
+                f"PostgreSQL refused {self.name} ({said}). Check user, password and the database's name in "
+                "SAGITTAL_DATABASE_URL."
+            )
+        return (
+            f"PostgreSQL is not reached at {self.name} ({said}). Check that it runs, and address and port in "
+            "SAGITTAL_DATABASE_URL."
+        )
+
+    def _locking(self, wait_ms: int, forgotten_s: int = 0) -> Engine:
+        engine = self._engine(wait_ms, forgotten_s=forgotten_s)
+
+        @event.listens_for(engine, "begin")
+        def _begin(connection: Connection) -> None:
+            connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({WRITING})")
+
+        return engine
+
+    def _engine(self, wait_ms: int, *, forgotten_s: int = 0, **options: Any) -> Engine:
+        told = {
+            "timezone": "UTC",
+            "synchronous_commit": "on",
+            "lock_timeout": wait_ms,
+            "idle_in_transaction_session_timeout": f"{forgotten_s}s",
+        }
+        # pre-ping: PostgreSQL may have been restarted since a connection was used last
+        return create_engine(
+            self._url,
+            **{"max_overflow": MAX_READERS, "pool_pre_ping": True, "hide_parameters": True} | options,
+            connect_args={
+                "connect_timeout": 10,
+                "application_name": "sagittal",
+                "options": " ".join(f"-c {name}={value}" for name, value in told.items()),
+            },
+        )
+
+
+def _outlive_readers(c: Connection) -> bool:
+    """Wait until every transaction that can still see what was deleted has ended; False when one goes on."""
+    began = c.exec_driver_sql("SELECT clock_timestamp()").scalar_one()
+    older = (
+        "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() "
+        "AND pid <> pg_backend_pid() AND backend_xmin IS NOT NULL AND xact_start <= %s"
+    )
+    until = time.monotonic() + WAIT_MS / 1000
+    while c.exec_driver_sql(older, (began,)).scalar_one():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.05)
+    return True

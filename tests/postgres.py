@@ -1,0 +1,171 @@
+"""A PostgreSQL server for tests: started by the first one that needs it, on loopback, stopped at the end.
+
+It refuses to run as root, so root starts it as another user. Nothing waits for a disk.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import functools
+import itertools
+import os
+import pwd
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from server.storage.migrate import upgrade
+
+USERS: Final = ("postgres", "nobody")
+"""Whom root starts it as: the first there is."""
+PASSWORD: Final = "of the tests"
+FASTER: Final = (
+    "fsync=off",
+    "full_page_writes=off",
+    "unix_socket_directories=",
+    "listen_addresses=127.0.0.1",
+)
+_numbers = itertools.count()
+
+
+class NoPostgresError(Exception):
+    """There is none here; the message says why."""
+
+
+@functools.cache
+def find_programs() -> Path:
+    """The folder of initdb and postgres; raises NoPostgresError."""
+    named = shutil.which("initdb")
+    folders = [Path(named).resolve().parent] if named else []
+    folders += sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)
+    for folder in folders:
+        if all((folder / name).exists() for name in ("initdb", "postgres")):
+            return folder
+    raise NoPostgresError("PostgreSQL's initdb is not installed")
+
+
+@functools.cache
+def start_server() -> str:
+    """The URL of the server's first database; raises NoPostgresError."""
+    try:
+        import psycopg
+    except ModuleNotFoundError as error:
+        raise NoPostgresError("psycopg is not installed (extra postgres)") from error
+
+    programs = find_programs()
+    folder = Path(tempfile.mkdtemp(prefix="sagittal-postgres-"))
+    runs_as = _choose_user(folder)
+    secret = folder / "password"
+    secret.write_text(PASSWORD)
+    secret.chmod(0o644)  # in a folder that is closed to others
+    data = folder / "data"
+    make = [programs / "initdb", "-D", data, "-U", "sagittal", "-A", "scram-sha-256", f"--pwfile={secret}"]
+    subprocess.run(
+        [*make, "-E", "UTF8", "--locale=C", "--no-sync", "--no-instructions"],
+        check=True, capture_output=True, cwd=folder, **runs_as,
+    )  # fmt: skip
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    options = [part for option in FASTER for part in ("-c", option)]
+    with (folder / "log").open("wb") as log:
+        server = subprocess.Popen(
+            [programs / "postgres", "-D", data, "-p", str(port), *options],
+            stdout=log, stderr=log, cwd=folder, **runs_as,
+        )  # fmt: skip
+    atexit.register(_stop, server, folder)
+    url = f"postgresql://sagittal:{PASSWORD.replace(' ', '%20')}@127.0.0.1:{port}/postgres"
+    until = time.monotonic() + 60
+    while True:
+        try:
+            psycopg.connect(url).close()
+        except psycopg.OperationalError as error:
+            if server.poll() is not None or time.monotonic() > until:
+                raise NoPostgresError((folder / "log").read_text()) from error
+            time.sleep(0.05)
+        else:
+            return url
+
+
+def run_sql(statement: str, url: str | None = None) -> list[Any]:
+    """Run one statement outside a transaction, in the server's first database if no other is named."""
+    import psycopg
+
+    with psycopg.connect(url or start_server(), autocommit=True) as connection:
+        found = connection.execute(statement.encode())
+        return found.fetchall() if found.description else []
+
+
+@contextlib.contextmanager
+def make_database(*, migrated: bool = True) -> Iterator[str]:
+    """A database while the block runs: one without tables of its own, or the migrated one without rows.
+
+    To empty that one costs a tenth of making another; who changes its tables takes one of his own.
+    """
+    if migrated:
+        url = _migrate_one()
+        try:
+            yield url
+        finally:
+            run_sql(_EMPTY, url)
+        return
+    name = f"test_{next(_numbers)}"
+    run_sql(f"CREATE DATABASE {name} TEMPLATE template0")
+    try:
+        yield _url_of(name)
+    finally:
+        run_sql(f"DROP DATABASE {name} WITH (FORCE)")
+
+
+_EMPTY: Final = """DO $$
+DECLARE one text;
+BEGIN
+    PERFORM pg_terminate_backend(pid) FROM pg_stat_activity
+        WHERE datname = current_database() AND pid <> pg_backend_pid();
+    SET LOCAL session_replication_role = replica;  -- without triggers and references
+    FOR one IN
+        SELECT tablename FROM pg_tables WHERE schemaname = 'public' AND tablename <> 'alembic_version'
+    LOOP
+        EXECUTE format('DELETE FROM %I', one);
+    END LOOP;
+    PERFORM setval(sequencename::regclass, 1, false) FROM pg_sequences WHERE schemaname = 'public';
+END $$"""
+
+
+@functools.cache
+def _migrate_one() -> str:
+    run_sql("CREATE DATABASE migrated")
+    upgrade(_url_of("migrated"))
+    return _url_of("migrated")
+
+
+def _url_of(name: str) -> str:
+    return start_server().rpartition("/")[0] + f"/{name}"
+
+
+def _choose_user(folder: Path) -> dict[str, Any]:
+    if os.geteuid() != 0:
+        return {}
+    for name in USERS:
+        with contextlib.suppress(KeyError):
+            who = pwd.getpwnam(name)
+            os.chown(folder, who.pw_uid, who.pw_gid)
+            return {"user": who.pw_uid, "group": who.pw_gid, "extra_groups": []}
+    raise NoPostgresError(f"PostgreSQL does not run as root, and there is no user {' or '.join(USERS)}")
+
+
+def _stop(server: subprocess.Popen[bytes], folder: Path) -> None:
+    server.send_signal(signal.SIGINT)
+    try:
+        server.wait(30)
+    except subprocess.TimeoutExpired:
+        server.kill()
+        server.wait()
+    shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,206 @@
+"""What is said when PostgreSQL cannot be used, copies between the engines, and who is alone on it."""
+
+from __future__ import annotations
+
+import datetime as dt
+import sys
+import threading
+import time
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from sqlalchemy import insert, select
+from sqlalchemy.exc import OperationalError
+
+from server import audit
+from server.main import main
+from server.services import patients
+from server.services.custody import StrangersError, refuse_foreign_folder
+from server.settings import Settings, SettingsError
+from server.storage import migrate
+from server.storage.db import Database, highest_number
+from server.storage.high_water import set_mark
+from server.storage.person_tables import api_token
+from server.storage.refusal import is_busy
+from server.storage.tables import metadata, new_id, now, patient, user
+from tests.databases import write_database
+from tests.engines import require_postgres
+from tests.postgres import PASSWORD, run_sql
+
+pytestmark = pytest.mark.postgres
+
+
+def test_every_reason_why_it_cannot_be_used_is_a_sentence(
+    postgres: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server, _, _ = postgres.rpartition("/")
+    known = PASSWORD.replace(" ", "%20")
+    for url, said in (
+        (postgres.replace(known, "SECRET"), r"refused postgresql://sagittal:\*\*\*@.*Check user, password"),
+        (postgres.replace(f":{known}", ""), "refused .*Check user, password"),
+        (f"{server}/nowhere", "refused .*nowhere.* does not exist"),
+        (f"postgresql://a:{known}@127.0.0.1:1/b", "is not reached at .*Check that it runs"),
+    ):
+        with pytest.raises(migrate.MigrationError, match=said) as refused:
+            migrate.upgrade(url)
+        assert "SECRET" not in str(refused.value)
+        assert PASSWORD not in str(refused.value)
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "psycopg", None)
+        with pytest.raises(migrate.MigrationError, match=r"pip install '.\[postgres\]'"):
+            migrate.upgrade(postgres)
+
+
+def test_a_wrong_setting_is_named_without_what_may_be_a_password(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="database_url") as refused:
+        Settings(data_dir=tmp_path, database_url="mysql://a:SECRET@b/c")
+    assert "SECRET" not in str(refused.value)
+    assert "SECRET" not in repr(Settings(data_dir=tmp_path, database_url="postgresql://a:SECRET@b/c"))
+
+
+def test_two_programs_that_migrate_at_once_do_it_once() -> None:
+    with require_postgres(migrated=False) as url:
+        failed: list[BaseException] = []
+
+        def upgrade() -> None:
+            try:
+                migrate.upgrade(url)
+            except BaseException as error:  # noqa: BLE001 - whatever it is, the test shows it
+                failed.append(error)
+
+        # Alembic's own context is one per process, so the other program is what holds the lock first
+        with closing(Database(url)) as other, other.write():
+            thread = threading.Thread(target=upgrade)
+            thread.start()
+            until = time.monotonic() + 30
+            waiting = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted"
+            while run_sql(waiting) == [(0,)] and thread.is_alive():
+                assert time.monotonic() < until
+                time.sleep(0.02)
+            assert thread.is_alive()
+        thread.join()
+        assert failed == []
+        migrate.require_current(url)
+        assert migrate.upgrade(url) is None
+
+
+def test_a_clinic_moves_to_postgres_and_back_unchanged(
+    tmp_path: Path, postgres: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    origin, back = tmp_path / "sagittal.db", tmp_path / "back.db"
+    write_database(origin)
+    with closing(Database(origin)) as db, db.write() as c:
+        one = new_id()
+        patients.create(c, None, code="Ä-1", height_m=1.755)
+        c.execute(
+            insert(user).values(
+                id=one, name="ada", role="admin", active=True, created_at=now(), display_name="A"
+            )
+        )
+        c.execute(
+            insert(api_token).values(
+                id=new_id(),
+                user_id=one,
+                name="t",
+                token_sha256="0" * 64,
+                scopes=["a", {"ü": [1.5, None]}],
+                created_at=now(),
+                expires_at=now() + dt.timedelta(days=1),
+            )
+        )
+    assert main(["move-database", "--data", str(tmp_path)]) == 1
+    assert "Set SAGITTAL_DATABASE_URL" in capsys.readouterr().err
+    monkeypatch.setenv("SAGITTAL_DATABASE_URL", postgres)
+    assert main(["move-database", "--data", str(tmp_path)]) == 0
+    assert not origin.exists()
+    origin = tmp_path / "backups" / "before-postgresql.db"
+    migrate.copy_database(postgres, back)
+    rows = []
+    for source in (origin, postgres, back):
+        with closing(Database(source)) as db, db.read() as c:
+            rows.append({t.name: c.execute(select(t)).all() for t in metadata.sorted_tables})
+            assert audit.find_problems(c) == []
+    assert rows[0]["api_token"]
+    assert rows[0] == rows[1] == rows[2]
+    with pytest.raises(migrate.MigrationError, match="holds rows already"):
+        migrate.copy_database(origin, postgres)
+    with closing(Database(postgres)) as db, db.write() as c:
+        audit.record(c, None, "x", "database", None)
+        assert highest_number(c, "audit") == 2
+        assert highest_number(c, "edit") == highest_number(c, "job") == 0
+
+
+def test_a_writer_that_waits_too_long_is_told_that_the_database_is_busy(
+    postgres: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.storage.postgres.WAIT_MS", 50)
+    with closing(Database(postgres)) as one, closing(Database(postgres)) as two, one.write():
+        with pytest.raises(OperationalError) as busy, two.write():
+            pass
+        assert is_busy(busy.value)
+
+
+def test_a_frozen_writer_is_forgotten(postgres: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.storage.postgres.FORGOTTEN_S", 1)
+    with closing(Database(postgres)) as frozen, closing(Database(postgres)) as other:
+
+        def hold() -> None:
+            with frozen.write(), other.write() as c:
+                assert c.closed is False
+
+        # whoever was forgotten cannot commit any more
+        with pytest.raises(Exception, match="idle-in-transaction"):
+            hold()
+
+
+def test_only_one_web_server_is_on_a_database(postgres: str) -> None:
+    with closing(Database(postgres)) as one, closing(Database(postgres)) as two:
+        with one.serve_alone() as first, two.serve_alone() as second:
+            assert (first, second) == (True, False)
+        with two.serve_alone() as again:
+            assert again
+
+
+def test_a_worker_elsewhere_needs_the_servers_folder_and_its_time(
+    tmp_path: Path, postgres: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here, elsewhere = tmp_path / "shared", tmp_path / "elsewhere"
+    here.mkdir()
+    elsewhere.mkdir()
+    settings = Settings(data_dir=here, database_url=postgres)
+    with closing(Database(postgres)) as db:
+        with db.write() as c:
+            patients.create(c, None, code="P-1")
+        set_mark(db, settings.mark)
+        refuse_foreign_folder(db, settings)
+        with pytest.raises(StrangersError, match="Share that folder"):
+            refuse_foreign_folder(db, Settings(data_dir=elsewhere, database_url=postgres), patience_s=0.0)
+        monkeypatch.setattr("time.time", lambda: 0.0)
+        with pytest.raises(StrangersError, match="clock"):
+            refuse_foreign_folder(db, settings)
+
+
+def test_what_was_erased_is_in_no_table_of_the_disk_and_who_reads_only_delays_it(
+    postgres: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.storage.postgres.WAIT_MS", 50)
+
+    def found() -> bool:
+        run_sql("CHECKPOINT")
+        [[folder]] = run_sql("SHOW data_directory")
+        return any(b"CANARY" in p.read_bytes() for p in (Path(folder) / "base").rglob("*") if p.is_file())
+
+    with closing(Database(postgres)) as db:
+        with db.write() as c:
+            c.execute(insert(patient).values(id=new_id(), code="CANARY", note="", created_at=now()))
+        assert found()
+        with db.read() as c:
+            c.execute(select(patient)).all()
+            with db.write() as other:
+                other.execute(patient.delete())
+            assert not db.fold()
+        assert db.fold()
+        assert not found()
+        db.probe()
+        assert db.problems() == []
