@@ -43,7 +43,9 @@ def visit(
         {name: store.put(SPACE, data) for name, data in results.items()},
     )  # fmt: skip
     out = io.BytesIO()
-    archives.write_archive(out, store, recording, found, EditHistory(), {"parameters.csv": b"name\n"}, signed(store))
+    archives.write_archive(
+        out, store, recording, found, EditHistory(), {"parameters.csv": b"name\n"}, signed(store)
+    )
     return out.getvalue()
 
 
