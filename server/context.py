@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, cast
 
-from fastapi import Depends, Path
+from fastapi import Depends, Path, Query
 from starlette.requests import HTTPConnection
 
 from server.auth.sessions import Logins
@@ -14,6 +14,7 @@ from server.jobs.queue import JobQueue
 from server.live.hub import Hub
 from server.services.films import FilmIntake
 from server.services.reviewed import ReviewedAnalyses
+from server.services.studies import StudyChoice, read_choice
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -80,6 +81,23 @@ HEX_ID = r"^[0-9a-f]{32}$"
 """How an identifier looks."""
 Id = Annotated[str, Path(pattern=HEX_ID, description="32 hex digits")]
 DeviceId = Annotated[str, Path(pattern=r"^[0-9A-Za-z:-]{2,32}$", description="serial number of a sensor")]
+
+
+def _study_choice(
+    q: Annotated[str, Query(max_length=200, description="part of a patient's code or note")] = "",
+    protocol: Annotated[str, Query(max_length=40, description="of the visits; empty = any")] = "",
+    since: Annotated[str, Query(max_length=10, description="first day; empty = open")] = "",
+    until: Annotated[str, Query(max_length=10, description="last day; empty = open")] = "",
+    visit: Annotated[
+        list[Annotated[str, Query(pattern=HEX_ID)]] | None,
+        Query(max_length=100, description="only these; none = all"),
+    ] = None,
+) -> StudyChoice:
+    return read_choice(q, protocol, since, until, visit or ())
+
+
+StudyVisits = Annotated[StudyChoice, Depends(_study_choice)]
+"""The visits of a study, as its form and its address say them."""
 
 
 def address_of(connection: HTTPConnection) -> str:

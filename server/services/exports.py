@@ -181,9 +181,9 @@ def _collect_params(
 def _describe_visit(patient: Patient, analysed: AnalysedSession) -> VisitFacts:
     session = analysed.session
     return VisitFacts(
-        subject=_digest(patient.id),
+        subject=make_pseudonym(patient.id),
         code=patient.code,
-        visit=_digest(session.id),
+        visit=make_pseudonym(session.id),
         day=session.performed_on.isoformat(),
         protocol=session.protocol,
         sex=patient.sex,
@@ -195,6 +195,6 @@ def _describe_visit(patient: Patient, analysed: AnalysedSession) -> VisitFacts:
     )
 
 
-def _digest(identity: str) -> str:
+def make_pseudonym(identity: str) -> str:
     """A stable name that leads back to nobody without the database: 12 hex digits."""
     return hashlib.sha256(identity.encode()).hexdigest()[:12]
