@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, cast
+import datetime as dt
+from typing import Annotated, Literal, cast
 
 from fastapi import Depends, Path, Query
 from starlette.requests import HTTPConnection
 
+from core.frames import Protocol
 from server.auth.sessions import Logins
 from server.auth.throttle import Throttle
 from server.jobs.feed import JobFeed
@@ -14,7 +16,7 @@ from server.jobs.queue import JobQueue
 from server.live.hub import Hub
 from server.services.films import FilmIntake
 from server.services.reviewed import ReviewedAnalyses
-from server.services.studies import StudyChoice, read_choice
+from server.services.studies import StudyChoice
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -85,15 +87,16 @@ DeviceId = Annotated[str, Path(pattern=r"^[0-9A-Za-z:-]{2,32}$", description="se
 
 def _study_choice(
     q: Annotated[str, Query(max_length=200, description="part of a patient's code or note")] = "",
-    protocol: Annotated[str, Query(max_length=40, description="of the visits; empty = any")] = "",
-    since: Annotated[str, Query(max_length=10, description="first day; empty = open")] = "",
-    until: Annotated[str, Query(max_length=10, description="last day; empty = open")] = "",
+    protocol: Annotated[Protocol | Literal[""], Query(description="of the visits; empty = any")] = "",
+    since: Annotated[dt.date | Literal[""], Query(description="first day; empty = open")] = "",
+    until: Annotated[dt.date | Literal[""], Query(description="last day; empty = open")] = "",
     visit: Annotated[
         list[Annotated[str, Query(pattern=HEX_ID)]] | None,
         Query(max_length=100, description="only these; none = all"),
     ] = None,
 ) -> StudyChoice:
-    return read_choice(q, protocol, since, until, visit or ())
+    # a form sends what was left open as empty
+    return StudyChoice(q, protocol or None, since or None, until or None, frozenset(visit or ()))
 
 
 StudyVisits = Annotated[StudyChoice, Depends(_study_choice)]

@@ -20,7 +20,7 @@ router = APIRouter(tags=["exports"])
 _ZIP = {200: {"description": "The tables", "content": {"application/zip": {"schema": BINARY}}}}
 
 
-@router.get("/study.zip", response_class=Response, responses={**_ZIP, **refusals(422)})
+@router.get("/study.zip", response_class=Response, responses={**_ZIP, **refusals(409)})
 def make_study(
     db: Db,
     reviewed: Reviewed,

@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import datetime as dt
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final, cast
+from typing import Any, Final
 
 from sqlalchemy import Connection
 
 from core.errors import SagittalError
-from core.frames import PROTOCOLS, Protocol
+from core.frames import Protocol
 from server.report.analysis_json import parameter_row
 from server.report.exports import strides_csv
 from server.report.study_tables import StudyTables, StudyTake, write_study
 from server.services import analyses, edit_log, patients, recordings, sessions
-from server.services.errors import ServiceError
+from server.services.errors import Conflict
 from server.services.exports import make_pseudonym
 from server.services.histories import AnalysedSession
 from server.services.patients import Patient
@@ -54,17 +54,6 @@ class StudyChoice:
     visits: frozenset[str] = field(default_factory=frozenset)
 
 
-def read_choice(search: str, protocol: str, since: str, until: str, visits: Collection[str]) -> StudyChoice:
-    """A choice as a form or an address says it, empty = open; raises ServiceError bad_value."""
-    if protocol not in ("", *PROTOCOLS):
-        raise ServiceError("bad_value", f"The protocol is one of {', '.join(PROTOCOLS)}.")
-    try:
-        days = [dt.date.fromisoformat(day) if day else None for day in (since, until)]
-    except ValueError as error:
-        raise ServiceError("bad_value", "Expected days as 2026-03-31.") from error
-    return StudyChoice(search, cast("Protocol", protocol) or None, *days, frozenset(visits))
-
-
 def list_visits(c: Connection, choice: StudyChoice) -> list[Session]:
     """The visits of a choice, by patient and day."""
     return sessions.search(
@@ -84,15 +73,15 @@ def make_study(
 
     Raises
     ------
-    ServiceError
+    Conflict
         no_visits, too_many_visits.
     """
     with db.read() as c:
         chosen = list_visits(c, choice)
         if not chosen:
-            raise ServiceError("no_visits", "No visit fits this choice. Choose another period or protocol.")
+            raise Conflict("no_visits", "No visit fits this choice. Choose another period or protocol.")
         if len(chosen) > MOST_VISITS:
-            raise ServiceError(
+            raise Conflict(
                 "too_many_visits",
                 f"{len(chosen)} visits fit this choice, at most {MOST_VISITS} go into one study. "
                 "Choose a shorter period and put the tables together.",
