@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, cast
+import datetime as dt
+from typing import Annotated, Literal, cast
 
-from fastapi import Depends, Path
+from fastapi import Depends, Path, Query
 from starlette.requests import HTTPConnection
 
+from core.frames import Protocol
 from server.auth.sessions import Logins
 from server.auth.throttle import Throttle
 from server.jobs.feed import JobFeed
@@ -14,6 +16,7 @@ from server.jobs.queue import JobQueue
 from server.live.hub import Hub
 from server.services.films import FilmIntake
 from server.services.reviewed import ReviewedAnalyses
+from server.services.studies import StudyChoice
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -80,6 +83,24 @@ HEX_ID = r"^[0-9a-f]{32}$"
 """How an identifier looks."""
 Id = Annotated[str, Path(pattern=HEX_ID, description="32 hex digits")]
 DeviceId = Annotated[str, Path(pattern=r"^[0-9A-Za-z:-]{2,32}$", description="serial number of a sensor")]
+
+
+def _study_choice(
+    q: Annotated[str, Query(max_length=200, description="part of a patient's code or note")] = "",
+    protocol: Annotated[Protocol | Literal[""], Query(description="of the visits; empty = any")] = "",
+    since: Annotated[dt.date | Literal[""], Query(description="first day; empty = open")] = "",
+    until: Annotated[dt.date | Literal[""], Query(description="last day; empty = open")] = "",
+    visit: Annotated[
+        list[Annotated[str, Query(pattern=HEX_ID)]] | None,
+        Query(max_length=100, description="only these; none = all"),
+    ] = None,
+) -> StudyChoice:
+    # a form sends what was left open as empty
+    return StudyChoice(q, protocol or None, since or None, until or None, frozenset(visit or ()))
+
+
+StudyVisits = Annotated[StudyChoice, Depends(_study_choice)]
+"""The visits of a study, as its form and its address say them."""
 
 
 def address_of(connection: HTTPConnection) -> str:

@@ -15,7 +15,17 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Blobs, Db, Id, OpenTrail, Reviewed
 from server.report.tables import curves_csv, parameters_csv
-from server.services import analyses, archives, controls, edit_log, patients, recordings, reports, sessions
+from server.services import (
+    analyses,
+    archives,
+    controls,
+    edit_log,
+    patients,
+    recordings,
+    reports,
+    sessions,
+    signed_reports,
+)
 
 router = APIRouter(prefix="/sessions/{session_id}", tags=["report"])
 _PIECE = 1 << 20
@@ -35,7 +45,7 @@ def read_archive(
     trail: OpenTrail,
     who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> StreamingResponse:
-    """Recording, manifest, settings, results and tables of the analysis that the pages show, in one zip."""
+    """Recording, manifest, settings, results, tables and the signed report of what the pages show."""
     with db.read() as c:
         session = sessions.get(c, session_id)
         patient = patients.get(c, session.patient_id)
@@ -43,11 +53,12 @@ def read_archive(
         recording = recordings.get(c, found.recording_id)
         edits = edit_log.edits_of(c, found.id)
         known = controls.list_visits(c, patient, session)
+        signed = signed_reports.find_documents(c, session_id)
     model = reports.read(reviewed, found, edits, patient, session, control_visits=known)[1]
     tables = {"parameters.csv": parameters_csv(model), "curves.csv": curves_csv(model)}
     out = tempfile.TemporaryFile()  # noqa: SIM115 - the answer closes it
     try:
-        archives.write_archive(out, blobs, recording, found, edits, tables)
+        archives.write_archive(out, blobs, recording, found, edits, tables, signed)
     except BaseException:
         out.close()
         raise

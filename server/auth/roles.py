@@ -31,6 +31,8 @@ class Action(StrEnum):
     DELETE_PATIENT = "delete_patient"
     EXPORT_PATIENT = "export_patient"
     """Takes everything that is stored of a patient along."""
+    EXPORT_STUDY = "export_study"
+    """Takes the numbers of many patients along, by pseudonyms."""
     READ_SESSION = "read_session"
     CREATE_SESSION = "create_session"
     WRITE_SESSION = "write_session"
@@ -87,6 +89,7 @@ POLICY: dict[Action, frozenset[Role]] = {
     Action.WRITE_PATIENT: _CLINICAL,
     Action.DELETE_PATIENT: _CLINICAL,
     Action.EXPORT_PATIENT: _CLINICAL,
+    Action.EXPORT_STUDY: _CLINICAL,
     Action.READ_SESSION: _ALL,
     Action.CREATE_SESSION: _UPLOADERS,
     Action.WRITE_SESSION: _CLINICAL,

@@ -63,6 +63,25 @@ class VisitFacts:
         return cls(**{k: v for k, v in values.items() if k in known})
 
 
+@dataclass(frozen=True, eq=False)
+class SignedForm:
+    """The signed report of a visit as an export hands it on.
+
+    Parameters
+    ----------
+    version : of the report, from 1. language : of its text. signed_at : ISO date and time.
+    of_these_numbers : False where something was analysed or changed after it was signed.
+    documents : media type and bytes, the printable one first.
+    """
+
+    version: int
+    language: str
+    signed_by: str | None
+    signed_at: str
+    of_these_numbers: bool
+    documents: tuple[tuple[str, bytes], ...]
+
+
 @dataclass(frozen=True)
 class CycleRow:
     """A stride, or a squat, with its parameters.
@@ -91,6 +110,7 @@ class ExportContent:
     ----------
     files : of `server.report.exports`, name → reader of its bytes. bundle : with the edits applied.
     columns : parameters of every stride of the list. edits : of a person, that count.
+    signed : the report in force, None where none is or the format does not hand it on.
     """
 
     visit: VisitFacts
@@ -98,6 +118,7 @@ class ExportContent:
     bundle: Bundle
     columns: Mapping[str, Column] = field(default_factory=dict)
     edits: tuple[Edit, ...] = ()
+    signed: SignedForm | None = None
 
     @cached_property
     def poses(self) -> Poses:

@@ -1,11 +1,13 @@
 """A FHIR R4 bundle: a report with one observation per value, units by UCUM, codes of our own catalogue.
 
-Observations and report are "preliminary": nobody has signed them. There is no LOINC code for most gait
-parameters; `LOINC` has the one whose meaning is the same.
+Observations and report are "preliminary" until somebody signed these numbers; the signed report is attached.
+There is no LOINC code for most gait parameters; `LOINC` has the one whose meaning is the same.
 """
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 import uuid
 from collections.abc import Sequence
@@ -14,7 +16,7 @@ from typing import Any, Final
 from core.frames import Side
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.result import Parameter
-from server.export.content import ExportContent
+from server.export.content import ExportContent, SignedForm
 from server.report.wording import reason_words
 
 CODES: Final = "urn:sagittal:gait-parameters"
@@ -58,15 +60,16 @@ SPREAD: Final = {
 """Components of an observation → words, and their UCUM unit where it is not the value's."""
 
 REPORT: Final = ("gait_analysis", "Gait analysis by body-worn inertial sensors")
+EARLIER: Final = "The attached report was signed before these numbers were changed."
 PANEL: Final = ("gait_parameters", "Gait parameters of one take")
 
 
 def write_fhir(content: ExportContent) -> bytes:
     """Write the bundle as JSON."""
-    v = content.visit
+    v, signed = content.visit, content.signed
     patient, device, panel = (_address(content, name) for name in ("patient", "device", "panel"))
     shared = {
-        "status": "preliminary",
+        "status": "final" if signed is not None and signed.of_these_numbers else "preliminary",
         "subject": {"reference": patient},
         **({} if v.day is None else {"effectiveDateTime": v.day}),
     }
@@ -92,6 +95,7 @@ def write_fhir(content: ExportContent) -> bytes:
             "resourceType": "DiagnosticReport",
             "code": _code(*REPORT),
             **shared,
+            **({} if signed is None else _attach(signed)),
             "result": [{"reference": panel}],
             "conclusion": " ".join(
                 text
@@ -101,6 +105,7 @@ def write_fhir(content: ExportContent) -> bytes:
                     f"{len(content.cycles) - left_out} of {len(content.cycles)} strides count.",
                     f"{len(content.edits)} changes by hand.",
                     f"Data: {content.verdict}.",
+                    "" if signed is None or signed.of_these_numbers else EARLIER,
                     "Research and documentation software, not a medical device, not for diagnosis.",
                 )
                 if text
@@ -113,6 +118,26 @@ def write_fhir(content: ExportContent) -> bytes:
         "entry": [{"fullUrl": url, "resource": resource} for url, resource in resources.items()],
     }
     return json.dumps(bundle, ensure_ascii=False, allow_nan=False, indent=1).encode()
+
+
+def _attach(signed: SignedForm) -> dict[str, Any]:
+    """Who signed, when, and the documents of it. FHIR's hash of an attachment is SHA-1."""
+    return {
+        "issued": signed.signed_at,
+        "resultsInterpreter": [{"display": signed.signed_by or "unknown"}],
+        "presentedForm": [
+            {
+                "contentType": media_type,
+                "language": signed.language,
+                "data": base64.b64encode(content).decode(),
+                "size": len(content),
+                "hash": base64.b64encode(hashlib.sha1(content, usedforsecurity=False).digest()).decode(),
+                "title": f"Signed report, version {signed.version}",
+                "creation": signed.signed_at,
+            }
+            for media_type, content in signed.documents
+        ],
+    }
 
 
 def _address(content: ExportContent, name: str) -> str:

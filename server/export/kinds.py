@@ -20,7 +20,7 @@ class ExportKind:
     Parameters
     ----------
     ending : of its file. label : what it is called. what : what is in it, for whom.
-    needs : result files without which it cannot be written.
+    needs : result files without which it cannot be written. hands_on_signed : it holds the signed report.
     """
 
     name: ExportName
@@ -28,6 +28,7 @@ class ExportKind:
     label: str
     what: str
     needs: tuple[str, ...] = ()
+    hands_on_signed: bool = False
 
 
 KINDS: Final[tuple[ExportKind, ...]] = (
@@ -58,7 +59,11 @@ KINDS: Final[tuple[ExportKind, ...]] = (
         (signals.NAME,),
     ),
     ExportKind(
-        "fhir", "json", "FHIR bundle", "Every value for a hospital's system, FHIR R4, marked preliminary"
+        "fhir",
+        "json",
+        "FHIR bundle",
+        "Every value and the signed report for a hospital's system, FHIR R4; preliminary until signed",
+        hands_on_signed=True,
     ),
     ExportKind(
         "walk", "html", "3D walk", "The moving figure as one page that opens without a server", (POSES,)

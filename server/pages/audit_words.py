@@ -68,6 +68,7 @@ DEEDS: Final[Mapping[str, str]] = {
     "report_link.revoked": "revoked a link to the signed report",
     "report_link.refused": "opened an address that leads to no report",
     "report_link.opened": "read the signed report by a link",
+    "study.exported": "took the numbers of the visit along in the tables of a study",
     "archive.opened": "downloaded the archive of a visit",
     "numbers.opened": "looked at the values",
     "parameter.opened": "looked at the strides behind a value",

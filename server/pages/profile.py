@@ -15,7 +15,7 @@ from server.services.reviewed import ReviewedAnalyses
 
 
 def view_profile(
-    reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any]
+    reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any], bar_height: int
 ) -> tuple[dict[str, Any] | None, list[dict[str, Any]]]:
     """The sagittal score and the bars of its curves, both with the visit before; None, [] without curves."""
     if model.profile is None or model.quality.kind == "bad":
@@ -26,7 +26,7 @@ def view_profile(
         earlier = old.profile
     found = {} if earlier is None else {b.title: b for b in earlier.bars}
     bars = [
-        {"title": b.title, "svg": bar_svg(b, found.get(b.title)), **_print_sides(b)}
+        {"title": b.title, "svg": bar_svg(b, found.get(b.title), bar_height), **_print_sides(b)}
         for b in model.profile.bars
     ]
     score = model.profile.score

@@ -24,6 +24,7 @@ from server.pages.charts import (
     PAPER_HEIGHTS,
     draw_chart,
 )
+from server.pages.first_sheet import has_room_for_profile
 from server.pages.profile import view_profile
 from server.pages.report_rows import (
     FIRST_ROWS,
@@ -40,6 +41,7 @@ from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
 from server.report.bundle import read_poses
 from server.report.curves import GLANCE_STRIDES, strip_svg
 from server.report.model import ReportModel
+from server.report.profile import BAR_HEIGHT, PAPER_BAR_HEIGHT
 from server.report.wording import speak_places
 from server.services import (
     analyses,
@@ -206,6 +208,10 @@ def gather_report(
     if this is not None:
         context["report"] = view_report(reviewed, this, context, page=template)
         context["analysis"] = this.found
+        if paper:
+            context["profile_first"] = has_room_for_profile(
+                context["report"], context["assessment"], context["session"].note
+            )
         if template == OVERVIEW:
             context["takes"] = view_takes(reviewed, done, sid, context["report"]["first"])
         context["feedback"] = feedback.view(reviewed, trained)
@@ -241,7 +247,8 @@ def _draw_report(
         reviewed, found, this.edits, patient, session, context.get("before"), context["controls"]
     )
     used, total = sum(model.used.values()), len(model.strides)
-    score, bars = view_profile(reviewed, model, context) if overview or paper else (None, [])
+    height = PAPER_BAR_HEIGHT if paper else BAR_HEIGHT
+    score, bars = view_profile(reviewed, model, context, height) if overview or paper else (None, [])
     return {
         **{name: getattr(model, name) for name in SHOWN},
         "daily": daily.draw_daily(model.daily),

@@ -18,7 +18,7 @@ SVG: Final = "{http://www.w3.org/2000/svg}"
 
 SHEET_PX: Final = 703
 """Width of a sheet between its margins (web/static/css/pdf.css): 210 mm without 2 × 12 mm."""
-WIDTHS_PX: Final = {"r-glance": 197, "r-kin": 230, "r-map": 250, "r-trends": 342, "dayrow": 627}
+WIDTHS_PX: Final = {"r-glance": 197, "r-bot": 120, "r-kin": 230, "r-map": 250, "r-trends": 342, "dayrow": 627}
 """Width of a chart by what it stands in."""
 
 LABEL_PX: Final = 12

@@ -16,6 +16,9 @@ from server.report.paper_charts import prepare_figures, read_chart_styles
 
 STYLES: Final = Path(__file__).parents[2] / "web" / "static" / "css" / "pdf.css"
 
+BLOCKS: Final = frozenset({"p", "li", "td", "th", "dt", "dd", "h1", "h2", "h3", "figcaption"})
+"""What holds lines of text."""
+
 MISSING: Final = (
     "This server makes no PDF: WeasyPrint or the system library Pango is missing. Install 'sagittal[pdf]' "
     "and libpango-1.0-0, libpangoft2-1.0-0; or print the page and choose PDF as the printer."
@@ -52,10 +55,21 @@ def render_pdf(html: str) -> bytes:
     styles = "".join(style.text or "" for style in page.iter("style"))
     prepare_figures(page, read_chart_styles(styles))
     _move_foot(page)
+    _trim_ends(page)
     # the last one, so that it goes before those of the document
     SubElement(next(page.iter("head")), "style").text = STYLES.read_text("utf-8")
     content: bytes = document.write_pdf()
     return content
+
+
+def _trim_ends(page: Element) -> None:
+    """Take the space off the end of each block: a line that fits but for it breaks after its first word."""
+    for block in page.iter():
+        if block.tag in BLOCKS:
+            if len(block):
+                block[-1].tail = (block[-1].tail or "").rstrip()
+            else:
+                block.text = (block.text or "").rstrip()
 
 
 def _move_foot(page: Element) -> None:

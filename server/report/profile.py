@@ -19,6 +19,9 @@ SCALE_DEG: Final = 24.0
 WIDTH: Final = 150
 
 BARS_DEG: Final = 16.0
+BAR_HEIGHT: Final = 31
+PAPER_BAR_HEIGHT: Final = 16
+"""Of a curve's bar in px."""
 """Right end of the bars on the session page."""
 
 LABELS: Final = {v.name: v.label for v in VARIABLES} | {"foot_progression": "Foot progression"}
@@ -132,28 +135,32 @@ def _total(scores: Scores) -> ProfileBar | None:
     return total if total.values else None
 
 
-def bar_svg(bar: ProfileBar, before: ProfileBar | None) -> str:
+def bar_svg(bar: ProfileBar, before: ProfileBar | None, height: int = BAR_HEIGHT) -> str:
     """Draw both sides of a bar over each other, left filled, right outlined; a tick at the visit before.
 
     Solid line: the middle of healthy people; dashed: 95 of 100 are below. A longer bar is cut at BARS_DEG.
+    `height` in px.
     """
 
     def x(value: float) -> str:
         return f"{format_coordinate(100 * min(value, BARS_DEG) / BARS_DEG)}%"
 
+    thick = 0.29 * height
     shapes = []
-    for side, css, y in (("left", "mapl", 4), ("right", "mapr", 18)):
+    for side, css, y in (("left", "mapl", 0.15 * height), ("right", "mapr", 0.58 * height)):
         value = bar.values.get(cast("Side", side))
         if value is not None:
-            shapes.append(f'<rect class="{css}" x="0" y="{y}" width="{x(value)}" height="9"/>')
+            shapes.append(f'<rect class="{css}" x="0" y="{y:.1f}" width="{x(value)}" height="{thick:.1f}"/>')
         earlier = None if before is None else before.values.get(cast("Side", side))
         if earlier is not None:
             at = x(earlier)
-            shapes.append(f'<line class="mapb" x1="{at}" x2="{at}" y1="{y - 2}" y2="{y + 11}"/>')
+            ends = f'y1="{y - 0.07 * height:.1f}" y2="{y + 0.36 * height:.1f}"'
+            shapes.append(f'<line class="mapb" x1="{at}" x2="{at}" {ends}/>')
     for css, end in (("mapm", bar.median), ("map95", bar.p95)):
         if end is not None:
-            shapes.append(f'<line class="{css}" x1="{x(end)}" x2="{x(end)}" y1="0" y2="31"/>')
-    return f'<svg class="chart mapbar" width="100%" height="31" aria-hidden="true">{"".join(shapes)}</svg>'
+            shapes.append(f'<line class="{css}" x1="{x(end)}" x2="{x(end)}" y1="0" y2="{height}"/>')
+    drawn = "".join(shapes)
+    return f'<svg class="chart mapbar" width="100%" height="{height}" aria-hidden="true">{drawn}</svg>'
 
 
 def _numbers(title: str, found: Mapping[Side, Score]) -> ProfileBar:

@@ -5,7 +5,8 @@
     sagittal-manifest.json    the manifest of the analysis
     config.json               its settings where they differ from the defaults
     results/…                 result files as they were stored
-    report/…                  parameters and curves as the report shows them, after a person's changes
+    report/…                  parameters and curves as the report shows them, after a person's changes; the
+                              signed report in force, with its PDF where one was made
 
 Uploaded to another Sagittal, or given to `sagittal analyse`, the recording is read with that manifest and
 those settings, so the same version gives the same numbers.
@@ -25,10 +26,11 @@ from server.services.analyses import AnalysisRecord
 from server.services.edit_log import EditHistory
 from server.services.provenance import CODE_VERSION
 from server.services.recordings import StoredRecording
+from server.services.signed_reports import SignedDocuments
 from server.storage.blobs import BlobStore
 
 SCHEMA: Final = 1
-_PACKED: Final = (".parquet", ".gz", ".h5")
+_PACKED: Final = (".parquet", ".gz", ".h5", ".pdf")
 _LEVEL: Final = 1
 """Of deflate: text packs four to one at once, and no better for ten times as long."""
 
@@ -40,12 +42,13 @@ def write_archive(
     found: AnalysisRecord,
     edits: EditHistory,
     report: Mapping[str, bytes],
+    signed: SignedDocuments | None,
 ) -> None:
     """Write the archive of an analysis.
 
     Parameters
     ----------
-    recording : what was analysed. report : files of the report by name.
+    recording : what was analysed. report : files of the report by name. signed : the version in force.
 
     Raises
     ------
@@ -71,6 +74,9 @@ def write_archive(
             add(f"results/{name}", blobs.read(found.patient_id, blob.sha256))
         for name, content in report.items():
             add(f"report/{name}", content)
+        if signed is not None:
+            for name, blob in signed.files.items():
+                add(f"report/{name}", blobs.read(found.patient_id, blob.sha256))
         mark = {
             "schema": SCHEMA,
             "written_by": CODE_VERSION,
@@ -78,6 +84,7 @@ def write_archive(
             "analysed_at": found.created_at.isoformat(timespec="seconds"),
             "config_sha256": found.config_sha256,
             "edits": [m.edit.to_json() for m in edits.made],
+            "signed_report": None if signed is None else signed.describe(found, edits),
             "sha256": dict(sha256),
         }
         add(EPISODE_MARK, _json(mark))

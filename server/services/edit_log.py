@@ -34,15 +34,21 @@ class EditHistory:
     Parameters
     ----------
     version : number of the last row, undone ones included; 0 = nothing was ever changed.
+    changed_at : of that row, None = nothing was ever changed.
     """
 
     version: int = 0
     made: tuple[MadeEdit, ...] = ()
+    changed_at: dt.datetime | None = None
 
     @property
     def edits(self) -> tuple[Edit, ...]:
         """What was changed."""
         return tuple(m.edit for m in self.made)
+
+    def changed_after(self, moment: dt.datetime) -> bool:
+        """Whether something was changed, or taken back, after a moment."""
+        return self.changed_at is not None and self.changed_at > moment
 
     @property
     def key(self) -> tuple[int, ...]:
@@ -65,10 +71,13 @@ def edits_of_all(c: Connection, analysis_ids: Collection[str]) -> dict[str, Edit
     )
     made: dict[str, list[MadeEdit]] = {found: [] for found in analysis_ids}
     version = dict.fromkeys(made, 0)
+    changed_at: dict[str, dt.datetime] = {}
     for row in c.execute(query) if made else ():
-        version[row.analysis_id] = row.seq
+        version[row.analysis_id], changed_at[row.analysis_id] = row.seq, row.at
         if row.kind == UNDO:
             made[row.analysis_id].pop()
         else:
             made[row.analysis_id].append(MadeEdit(row.seq, read_edit(row.content), row.display_name, row.at))
-    return {found: EditHistory(version[found], tuple(live)) for found, live in made.items()}
+    return {
+        found: EditHistory(version[found], tuple(live), changed_at.get(found)) for found, live in made.items()
+    }

@@ -7,18 +7,18 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
 
 from sqlalchemy import Connection, insert, select
 
 from core.events.edits import read_edit
 from server import audit
 from server.export import kinds
-from server.export.content import VisitFacts, open_content
+from server.export.content import SignedForm, VisitFacts, open_content
 from server.export.kinds import EXPORTED, ExportKind, name_file
 from server.jobs.queue import EXPORT, VIEW_COLUMNS, Claim, JobQueue, JobView, job_view
-from server.services import analyses, edit_log, patients, sessions
+from server.services import analyses, edit_log, patients, sessions, signed_reports
 from server.services.errors import Conflict
 from server.services.histories import AnalysedSession
 from server.services.patients import Patient
@@ -30,6 +30,12 @@ from server.storage.tables import analysis_file, job
 
 if TYPE_CHECKING:
     from core.formats.source import SourceFile
+
+SIGNED: Final = "signed-"
+"""Begin of the names of the signed report's documents among the files of a job."""
+
+MEDIA_TYPES: Final = {signed_reports.PDF: "application/pdf", signed_reports.DOCUMENT: "text/html"}
+"""Of the documents of a signed report, the printable one first."""
 
 
 @dataclass(frozen=True)
@@ -55,11 +61,12 @@ def list_offers(
 ) -> list[ExportOffer]:
     """Every format that an analysis of a session can be written in, and how far it is.
 
-    What was written before the last edit, or before person or visit were corrected, is offered anew.
+    What was written before the last edit, or before person or visit were corrected, is offered anew; what
+    hands on the signed report also after it was signed, reopened or printed.
     """
     possible = kinds.list_possible(found.files)
-    params = _collect_params(c, patient, session, found)
-    keys = {kind.name: make_key(found, EXPORT, {**params, "kind": kind.name}) for kind in possible}
+    params = _collect_params(c, patient, session, found, possible)
+    keys = {name: make_key(found, EXPORT, own) for name, own in params.items()}
     query = select(*VIEW_COLUMNS, job.c.key).where(job.c.key.in_(keys.values())).order_by(job.c.seq)
     rows: list[Any] = list(c.execute(query))
     newest = {row.key: job_view(row) for row in rows}
@@ -91,8 +98,8 @@ def submit(
             "export_not_possible", f"This analysis has no {lacking}, which “{chosen.label}” is made from."
         )
     session, patient = sessions.get(c, session_id), patients.get(c, found.patient_id)
-    params = {**_collect_params(c, patient, session, found), "kind": kind}
-    return submit_for(c, queue, actor, found, EXPORT, "export.requested", params)
+    params = _collect_params(c, patient, session, found, [chosen])
+    return submit_for(c, queue, actor, found, EXPORT, "export.requested", params[kind])
 
 
 def run(files: Sequence[SourceFile], params: Mapping[str, Any]) -> dict[str, bytes]:
@@ -100,16 +107,18 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any]) -> dict[str, byt
 
     Parameters
     ----------
-    files : result files of the analysis.
+    files : result files of the analysis, and documents of the signed report where the format hands it on.
 
     Raises
     ------
     SagittalError
         it cannot be written; the code and the sentence say why.
     """
-    readers = {file.name: file.read for file in files}
+    readers = {file.name: file.read for file in files if not file.name.startswith(SIGNED)}
     edits = [read_edit(e) for e in params["edits"]]
     content = open_content(readers, VisitFacts.of_json(params["visit"]), edits)
+    if params.get("signed") is not None:
+        content = replace(content, signed=_read_signed(files, params["signed"]))
     return {params["kind"]: kinds.write_export(params["kind"], content)}
 
 
@@ -121,12 +130,28 @@ def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob]) -> None:
         c.execute(insert(analysis_file).values(analysis_id=claim.params["analysis_id"], **row))
 
 
+def _read_signed(files: Sequence[SourceFile], told: Mapping[str, Any]) -> SignedForm:
+    """The signed report of a job, as `_collect_params` has given it."""
+    readers = {file.name: file.read for file in files}
+    documents = tuple(
+        (media_type, readers[SIGNED + name]())
+        for name, media_type in MEDIA_TYPES.items()
+        if SIGNED + name in readers
+    )
+    known = ("version", "language", "signed_by", "signed_at", "of_these_numbers")
+    return SignedForm(**{name: told[name] for name in known}, documents=documents)
+
+
 def _collect_params(
-    c: Connection, patient: Patient, session: Session, found: analyses.AnalysisRecord
-) -> dict[str, Any]:
-    """What an export is written from, fixed at submission."""
+    c: Connection,
+    patient: Patient,
+    session: Session,
+    found: analyses.AnalysisRecord,
+    wanted: Sequence[ExportKind],
+) -> dict[str, dict[str, Any]]:
+    """What each format is written from, fixed at submission, by its name."""
     edits = edit_log.edits_of(c, found.id)
-    return {
+    shared: dict[str, Any] = {
         "space": found.patient_id,
         "files": [
             {"name": name, "size": blob.size, "sha256": blob.sha256}
@@ -137,14 +162,28 @@ def _collect_params(
         "edits": [e.to_json() for e in edits.edits],
         "visit": _describe_visit(patient, AnalysedSession(session, found, edits)).to_json(),
     }
+    params = {kind.name: {**shared, "kind": kind.name} for kind in wanted}
+    handed_on = [kind.name for kind in wanted if kind.hands_on_signed]
+    signed = signed_reports.find_documents(c, session.id) if handed_on else None
+    if signed is not None:
+        documents = [
+            {"name": SIGNED + name, "size": blob.size, "sha256": blob.sha256}
+            for name, blob in signed.files.items()
+        ]
+        for name in handed_on:
+            params[name] |= {
+                "files": shared["files"] + documents,
+                "signed": signed.describe(found, edits),
+            }
+    return params
 
 
 def _describe_visit(patient: Patient, analysed: AnalysedSession) -> VisitFacts:
     session = analysed.session
     return VisitFacts(
-        subject=_digest(patient.id),
+        subject=make_pseudonym(patient.id),
         code=patient.code,
-        visit=_digest(session.id),
+        visit=make_pseudonym(session.id),
         day=session.performed_on.isoformat(),
         protocol=session.protocol,
         sex=patient.sex,
@@ -156,6 +195,6 @@ def _describe_visit(patient: Patient, analysed: AnalysedSession) -> VisitFacts:
     )
 
 
-def _digest(identity: str) -> str:
+def make_pseudonym(identity: str) -> str:
     """A stable name that leads back to nobody without the database: 12 hex digits."""
     return hashlib.sha256(identity.encode()).hexdigest()[:12]

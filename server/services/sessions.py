@@ -148,6 +148,37 @@ def of_patient(c: Connection, patient_id: str) -> list[Session]:
     return [Session(**row._asdict()) for row in c.execute(query)]
 
 
+def search(
+    c: Connection,
+    *,
+    search: str = "",
+    protocol: Protocol | None = None,
+    since: dt.date | None = None,
+    until: dt.date | None = None,
+    ids: Collection[str] = (),
+) -> list[Session]:
+    """Sessions of all patients whose code or note contains `search`, by patient and day.
+
+    Parameters
+    ----------
+    since, until : days, both included, None = open. ids : only these of them; empty = all.
+    """
+    query = _QUERY.order_by(patient.c.code, session.c.performed_on, session.c.created_at, session.c.id)
+    if text := search.strip():
+        query = query.where(
+            patient.c.code.icontains(text, autoescape=True) | patient.c.note.icontains(text, autoescape=True)
+        )
+    if protocol is not None:
+        query = query.where(session.c.protocol == protocol)
+    if since is not None:
+        query = query.where(session.c.performed_on >= since)
+    if until is not None:
+        query = query.where(session.c.performed_on <= until)
+    if ids:
+        query = query.where(session.c.id.in_(ids))
+    return [Session(**row._asdict()) for row in c.execute(query)]
+
+
 def newest_of(c: Connection, patient_ids: Collection[str]) -> dict[str, Session]:
     """The newest session of each of these patients by patient id; who has none is left out."""
     place = func.row_number().over(partition_by=session.c.patient_id, order_by=_NEWEST)

@@ -15,6 +15,8 @@ from sqlalchemy import Connection, delete, func, insert, select, update
 
 from server import audit
 from server.services import sessions
+from server.services.analyses import AnalysisRecord
+from server.services.edit_log import EditHistory
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.storage.blobs import Blob, BlobStore
 from server.storage.report_tables import assessment, report_file, signed_report
@@ -54,6 +56,34 @@ class SignedReport:
     def in_force(self) -> bool:
         """Nobody has reopened it."""
         return self.reopened_at is None
+
+
+@dataclass(frozen=True)
+class SignedDocuments:
+    """A signed report with what it is handed on in.
+
+    Parameters
+    ----------
+    files : its document, and its PDF where one was made, by name.
+    """
+
+    report: SignedReport
+    files: Mapping[str, Blob]
+
+    def describe(self, found: AnalysisRecord, edits: EditHistory) -> dict[str, Any]:
+        """What an archive or export of this analysis with these edits says of it, as JSON.
+
+        `of_these_numbers` is False where another analysis was signed, or something was changed afterwards.
+        """
+        signed = self.report
+        return {
+            "version": signed.number,
+            "language": signed.language,
+            "signed_by": signed.signed_by,
+            "signed_at": signed.signed_at.isoformat(timespec="seconds"),
+            "sha256": signed.sha256,
+            "of_these_numbers": signed.analysis_id == found.id and not edits.changed_after(signed.signed_at),
+        }
 
 
 @dataclass(frozen=True)
@@ -178,6 +208,18 @@ def of_session(c: Connection, session_id: str) -> list[SignedReport]:
 def find_in_force(c: Connection, session_id: str) -> SignedReport | None:
     """The version that counts, None where nothing is signed or the last one was reopened."""
     return next((r for r in of_session(c, session_id) if r.in_force), None)
+
+
+def find_documents(c: Connection, session_id: str) -> SignedDocuments | None:
+    """The version in force with its document and PDF; None where nothing is signed."""
+    found = find_in_force(c, session_id)
+    if found is None:
+        return None
+    query = select(report_file).where(
+        report_file.c.report_id == found.id, report_file.c.name.in_((DOCUMENT, PDF))
+    )
+    rows = c.execute(query.order_by(report_file.c.name))
+    return SignedDocuments(found, {row.name: Blob(row.sha256, row.size) for row in rows})
 
 
 def find_file(c: Connection, report_id: str, name: str) -> tuple[str, str | None]:

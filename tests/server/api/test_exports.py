@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 import io
 import zipfile
@@ -84,6 +85,37 @@ async def test_an_export_is_written_once_and_anew_after_an_edit(clinic: Clinic) 
 
     async with clinic.client("assistant") as client:
         assert (await client.post(f"{path}/exports", json={"kind": "csv"})).status_code == 403
+
+
+async def test_the_signed_report_goes_into_the_bundle_and_only_there(clinic: Clinic) -> None:
+    session = await visit(clinic, "handed-on")
+    path = f"{API}/sessions/{session}"
+    async with clinic.client("clinician") as client:
+
+        async def offered(kind: str) -> dict[str, Any]:
+            offers = (await client.get(f"{path}/exports")).json()
+            return next(offer for offer in offers if offer["kind"] == kind)
+
+        for kind in ("fhir", "xlsx"):
+            await client.post(f"{path}/exports", json={"kind": kind})
+            work(clinic, session)
+        signed = (await client.post(f"/sessions/{session}/report/sign", json={})).json()
+        assert (await offered("xlsx"))["file"] is not None
+        assert (await offered("fhir"))["job"] is None, "the one before the signature is not offered"
+        await client.post(f"{path}/exports", json={"kind": "fhir"})
+        work(clinic, session)
+        offer = await offered("fhir")
+        bundle = (await client.get(f"{API}/analyses/{offer['analysis_id']}/files/{offer['file']}")).json()
+        document = (await client.get(f"/signed-reports/{signed['id']}")).content
+    report = next(
+        entry["resource"]
+        for entry in bundle["entry"]
+        if entry["resource"]["resourceType"] == "DiagnosticReport"
+    )
+    assert report["status"] == "final"
+    (form,) = report["presentedForm"]
+    assert form["contentType"] == "text/html"
+    assert base64.b64decode(form["data"]) == document
 
 
 async def test_what_cannot_be_exported_is_refused(clinic: Clinic) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 from dataclasses import replace
 from typing import Any
@@ -10,8 +12,8 @@ import pytest
 
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.result import Parameter
-from server.export.content import ExportContent
-from server.export.fhir import CODES, LOINC, UCUM, write_fhir
+from server.export.content import ExportContent, SignedForm
+from server.export.fhir import CODES, EARLIER, LOINC, UCUM, write_fhir
 from tests.server.export.opened import open_walk
 
 models = pytest.importorskip("fhir.resources.R4B.bundle")
@@ -70,6 +72,26 @@ def test_it_tells_a_pseudonym_a_day_and_that_nobody_signed() -> None:
     for r in found:
         if r["resourceType"] in ("Observation", "DiagnosticReport"):
             assert (r["status"], r["effectiveDateTime"]) == ("preliminary", "2026-03-02")
+
+
+def test_the_signed_report_is_attached_and_makes_its_own_numbers_final() -> None:
+    page, paper = "<p>Unterschrieben: Gänge</p>".encode(), b"%PDF-1.7"
+    documents = (("application/pdf", paper), ("text/html", page))
+    signed = SignedForm(2, "de", "Therapist 1", "2026-03-03T10:00:00+00:00", True, documents)
+    found = resources(replace(open_walk(), signed=signed)).values()
+    (report,) = [r for r in found if r["resourceType"] == "DiagnosticReport"]
+    assert {r["status"] for r in found if "status" in r and "subject" in r} == {"final"}
+    assert report["resultsInterpreter"] == [{"display": "Therapist 1"}]
+    for form, (media_type, content) in zip(report["presentedForm"], documents, strict=True):
+        assert (form["contentType"], form["size"], form["language"]) == (media_type, len(content), "de")
+        assert base64.b64decode(form["data"]) == content
+        assert base64.b64decode(form["hash"]) == hashlib.sha1(content, usedforsecurity=False).digest()
+    assert EARLIER not in report["conclusion"]
+    later = resources(replace(open_walk(), signed=replace(signed, of_these_numbers=False))).values()
+    (report,) = [r for r in later if r["resourceType"] == "DiagnosticReport"]
+    assert report["status"] == "preliminary"
+    assert EARLIER in report["conclusion"]
+    assert len(report["presentedForm"]) == 2
 
 
 def test_every_unit_of_the_catalogue_has_its_ucum_code_and_loinc_stands_beside_ours() -> None:

@@ -11,6 +11,7 @@ import re
 import select
 import socket
 import sys
+import zipfile
 from pathlib import Path
 
 import pypdfium2
@@ -36,6 +37,15 @@ async def sign(clinic: Clinic, session: str, role: str = "clinician") -> str:
     return found
 
 
+async def archived(clinic: Clinic, session: str) -> tuple[bytes, bool] | None:
+    """The signed report in the archive of a visit, and whether its numbers are the archive's."""
+    async with clinic.client("viewer") as client:
+        answer = await client.get(f"/api/v1/sessions/{session}/archive.zip")
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as opened:
+        told = json.loads(opened.read("sagittal-episode.json"))["signed_report"]
+        return None if told is None else (opened.read("report/report.html"), told["of_these_numbers"])
+
+
 async def write(clinic: Clinic, session: str, text: str) -> int:
     async with clinic.client("clinician") as client:
         answer = await client.put(f"/api/v1/sessions/{session}/assessment", json={"content": text})
@@ -57,6 +67,7 @@ async def test_a_signed_report_keeps_its_bytes_while_the_page_follows(clinic: Cl
     assert "Signed, version 1" in before
     assert "Walks faster." in before
     assert not re.search(r"<script|<link|href=\"/", before)
+    assert await archived(clinic, session) == (before.encode(), True)
     # locked: neither its text nor another signature, until somebody says why
     assert await write(clinic, session, "Something else") == 409
     async with clinic.client("clinician") as client:
@@ -70,12 +81,14 @@ async def test_a_signed_report_keeps_its_bytes_while_the_page_follows(clinic: Cl
         (await client.post(f"/api/v1/sessions/{session}/analyses", json=asked)).raise_for_status()
     analysed.publish_next(clinic, session, analysed.files(14.0))
     assert await page(clinic, f"/signed-reports/{report}") == before
+    assert await archived(clinic, session) == (before.encode(), False)
     assert "Another" in await page(clinic, f"/sessions/{session}/print")
     async with clinic.client("clinician") as client:
         empty = await client.post(f"/api/v1/signed-reports/{report}/reopen", json={"reason": " "})
         opened = await client.post(f"/api/v1/signed-reports/{report}/reopen", json={"reason": "Typing error"})
         twice = await client.post(f"/api/v1/signed-reports/{report}/reopen", json={"reason": "Typing error"})
     assert (empty.status_code, opened.status_code, twice.status_code) == (422, 200, 409)
+    assert await archived(clinic, session) is None
     assert await write(clinic, session, "Walks slower.") == 204
     await sign(clinic, session)
     desk = await page(clinic, f"/sessions/{session}/report")

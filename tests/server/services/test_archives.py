@@ -20,6 +20,7 @@ from server.services import analysing, archives
 from server.services.analyses import AnalysisRecord
 from server.services.edit_log import EditHistory
 from server.services.recordings import RecordedFile, StoredRecording
+from server.services.signed_reports import SignedDocuments, SignedReport
 from server.storage.blobs import BlobStore
 from tests.core.formats.making import zipped
 
@@ -42,8 +43,18 @@ def visit(
         {name: store.put(SPACE, data) for name, data in results.items()},
     )  # fmt: skip
     out = io.BytesIO()
-    archives.write_archive(out, store, recording, found, EditHistory(), {"parameters.csv": b"name\n"})
+    archives.write_archive(
+        out, store, recording, found, EditHistory(), {"parameters.csv": b"name\n"}, signed(store)
+    )
     return out.getvalue()
+
+
+def signed(store: BlobStore) -> SignedDocuments:
+    """A signed report of that analysis with its PDF."""
+    at = dt.datetime(2026, 1, 3, tzinfo=dt.UTC)
+    html, pdf = (store.put(SPACE, text) for text in (b"<p>Signed</p>", b"%PDF-1.7"))
+    report = SignedReport("p", "s", 1, "a", "en", "Therapist 1", at, None, None, None, html.sha256)
+    return SignedDocuments(report, {"report.html": html, "report.pdf": pdf})
 
 
 @pytest.mark.slow
@@ -90,6 +101,11 @@ def test_results_in_an_archive_are_not_read_as_recordings(tmp_path: Path) -> Non
     assert (
         visit(store, {"a.csv": table}, manifest, {"angles.parquet": b"PAR1", "strides.csv": table}) == archive
     )
+    with zipfile.ZipFile(io.BytesIO(archive)) as opened:
+        assert opened.read("report/report.html") == b"<p>Signed</p>"
+        assert opened.read("report/report.pdf") == b"%PDF-1.7"
+        told = json.loads(opened.read("sagittal-episode.json"))["signed_report"]
+    assert (told["version"], told["signed_by"], told["of_these_numbers"]) == (1, "Therapist 1", True)
 
 
 def test_an_archive_of_an_archive_has_its_settings_and_the_newest_manifest(tmp_path: Path) -> None:

@@ -1,0 +1,49 @@
+"""What has room on the first sheet of paper beside what always stands there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import ceil
+from typing import Any, Final
+
+MOST_CHARACTERS: Final = 420
+"""Of the therapist's text beside the profile; a longer one has the width of the sheet."""
+
+MOST_PARAGRAPHS: Final = 3
+MOST_BARS: Final = 6
+MOST_LINES: Final = 13
+"""Of note and headline, where ten rows, three curves and the profile stand below them."""
+
+MOST_LINES_COMPARED: Final = 10
+"""The same where a column of changes makes the other columns narrow, so that rows need two lines."""
+
+HALF: Final = 48
+"""English characters of a line of half a sheet; the same in German, which is longer, has room too."""
+
+
+def has_room_for_profile(report: Mapping[str, Any], assessment: str, note: str) -> bool:
+    """Whether the profile stands on the first sheet, beside the therapist's text.
+
+    Counted in lines, as the widest of the fonts and the longest of the languages fill them.
+    """
+    headline = report["headline"]
+    if headline is None or report["score"] is None or len(report["bars"]) > MOST_BARS:
+        return False
+    standing = [s.marked for s in headline.shown]
+    changed = [s.marked for s in headline.shown_changes] if report["since"] else []
+    left_out = ["; ".join(headline.standouts_left)]
+    left_changes = ["; ".join(f"{c.title} {c.side or ''} {c.size}" for c in headline.changes_left)]
+    columns = (
+        _count_lines(standing) + _count_lines(left_out),
+        _count_lines(changed) + (_count_lines(left_changes) + 1 if report["since"] else 0),
+    )
+    noted = ceil(len(note) / (2 * HALF))
+    return (
+        len(assessment) <= MOST_CHARACTERS
+        and assessment.strip().count("\n") < 2 * MOST_PARAGRAPHS
+        and max(columns) + noted <= (MOST_LINES_COMPARED if report["since"] else MOST_LINES)
+    )
+
+
+def _count_lines(texts: Sequence[str]) -> int:
+    return sum(ceil(len(text) / HALF) for text in texts)

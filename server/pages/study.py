@@ -1,0 +1,51 @@
+"""Which visits go into the tables of a study."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+from starlette.responses import Response
+
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db, StudyVisits
+from server.pages.shell import record_listing, render_page
+from server.pages.words import PROTOCOL_NAMES
+from server.services import studies
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+TICKED_AT_MOST: Final = 100
+"""So many visits can be left out one by one; of more the choice above the list decides."""
+
+
+@router.get("/study")
+def show_study(
+    request: Request, db: Db, choice: StudyVisits, who: Annotated[Identity, require(Action.EXPORT_STUDY)]
+) -> Response:
+    """The visits that fit a choice, and their tables to download."""
+    with db.read() as c:
+        found = studies.list_visits(c, choice)
+    asked = {
+        "q": choice.search,
+        "protocol": choice.protocol or "",
+        "since": choice.since.isoformat() if choice.since else "",
+        "until": choice.until.isoformat() if choice.until else "",
+    }
+    record_listing(request, who, "patient")
+    return render_page(
+        request, db, who, "study.html", "patients",
+        visits=found[: studies.MOST_VISITS],
+        count=len(found),
+        people=len({s.patient_id for s in found}),
+        most=studies.MOST_VISITS,
+        ticked=len(found) <= TICKED_AT_MOST,
+        asked=asked,
+        all=f"/api/v1/study.zip?{urlencode(asked)}",
+        protocols=[("", "Any"), *PROTOCOL_NAMES.items()],
+        names=PROTOCOL_NAMES,
+    )  # fmt: skip

@@ -1,0 +1,145 @@
+"""Tables over many takes: one of all strides, one of all takes, those that failed with their sentence.
+
+`sagittal study` makes them of a folder, the service of the visits that somebody chose.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import platform
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any, Final
+
+from core.errors import SagittalError
+from server.report.columns import write_csv
+from server.report.estimator import list_estimated_angles
+
+PROVENANCE: Final = "provenance.json"
+FAILURES: Final = "failures.csv"
+_LIBRARIES: Final = ("numpy", "scipy", "numba", "pyarrow")
+
+
+@dataclass(frozen=True, eq=False)
+class StudyTake:
+    """A take of a study.
+
+    Parameters
+    ----------
+    name : unique in the study. labels : what else is known of it, in every row of its strides too.
+    files : how many were recorded. sha256 : of each by name.
+    error : why there is no result, None where there is one.
+    read_analysis : its analysis.json. read_strides : its strides.csv, None without strides.
+    """
+
+    name: str
+    labels: Mapping[str, object]
+    files: int
+    sha256: Mapping[str, str]
+    error: SagittalError | None
+    read_analysis: Callable[[], Mapping[str, Any]]
+    read_strides: Callable[[], bytes | None]
+
+
+@dataclass(frozen=True, eq=False)
+class StudyTables:
+    """Files by name, the number of strides in them, and of takes that failed."""
+
+    files: Mapping[str, bytes]
+    strides: int
+    failed: int
+
+
+def write_study(takes: Sequence[StudyTake], about: Mapping[str, object]) -> StudyTables:
+    """Write strides and takes as CSV and Parquet, failures as CSV, and where all of it comes from as JSON.
+
+    Parameters
+    ----------
+    about : what provenance.json says beside versions and takes.
+    """
+    strides = [row for take in takes for row in _list_strides(take)]
+    failed = [
+        {"take": t.name, "code": t.error.code, "message": t.error.message}
+        for t in takes
+        if t.error is not None
+    ]
+    provenance = {
+        "python": platform.python_version(),
+        "libraries": {name: version(name) for name in _LIBRARIES},
+        **about,
+        "takes": {
+            t.name: {"sha256": dict(t.sha256), "error": None if t.error is None else t.error.code}
+            for t in takes
+        },
+    }
+    files = {
+        **_write_table("strides", strides),
+        **_write_table("takes", [_summarise(take) for take in takes]),
+        FAILURES: _write_rows(failed, ("take", "code", "message")),
+        PROVENANCE: json.dumps(provenance, ensure_ascii=False, indent=1).encode(),
+    }
+    return StudyTables(files, len(strides), len(failed))
+
+
+def _list_strides(take: StudyTake) -> Iterator[dict[str, object]]:
+    written = None if take.error is not None else take.read_strides()
+    if written is None:
+        return
+    modelled = _list_estimated(take.read_analysis())
+    for row in csv.DictReader(io.StringIO(written.decode())):
+        own = [a for a in modelled if a.endswith(f"_{row['side'][0]}")]
+        values = {name: _value(cell) for name, cell in row.items()}
+        yield {"take": take.name, **take.labels, **values, "estimated_angles": " ".join(own) or None}
+
+
+def _summarise(take: StudyTake) -> dict[str, object]:
+    """One row of the table of takes: what it is, how it went, the mean of every parameter."""
+    code = None if take.error is None else take.error.code
+    row: dict[str, object] = {"take": take.name, **take.labels, "files": take.files, "error": code}
+    if code is not None:
+        return row
+    found = take.read_analysis()
+    estimator = (found["estimator"] or {}).get("name")
+    row |= {"quality": found["quality"]["level"], "estimator": estimator, "warnings": len(found["warnings"])}
+    row["estimated_angles"] = " ".join(_list_estimated(found)) or None
+    for p in found["parameters"]:
+        row["_".join(part for part in (p["name"], p["side"]) if part)] = p["mean"]
+    return row
+
+
+def _list_estimated(found: Mapping[str, Any]) -> list[str]:
+    """Angles with their side that a model of the leg gives, and no two sensors measure."""
+    return sorted(list_estimated_angles(found["estimator"]))
+
+
+def _value(cell: str) -> object:
+    if cell == "":
+        return None
+    try:
+        return float(cell)
+    except ValueError:
+        return cell
+
+
+def _write_table(stem: str, rows: Sequence[Mapping[str, object]]) -> dict[str, bytes]:
+    """The same table as CSV and as Parquet; a column that some rows lack is null there."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    names = tuple(dict.fromkeys(name for row in rows for name in row))
+    columns = {}
+    for name in names:
+        values: list[Any] = [row.get(name) for row in rows]
+        if any(isinstance(v, str) for v in values):
+            values = [None if v is None else str(v) for v in values]
+        columns[name] = pa.array(values)
+    out = io.BytesIO()
+    pq.write_table(pa.table(columns), out, compression="zstd")
+    return {f"{stem}.csv": _write_rows(rows, names), f"{stem}.parquet": out.getvalue()}
+
+
+def _write_rows(rows: Sequence[Mapping[str, object]], names: Sequence[str]) -> bytes:
+    return write_csv(names, ([row.get(name) for name in names] for row in rows))

@@ -1,0 +1,166 @@
+"""The visits of a study as two tables: which ones are chosen, and their analyses as they count.
+
+Nothing is analysed anew and nothing is kept: the tables are made of the stored analyses with the persons'
+edits. Persons and visits stand in them by pseudonyms, those of the other exports; no date, no note.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from sqlalchemy import Connection
+
+from core.errors import SagittalError
+from core.frames import Protocol
+from server.report.analysis_json import parameter_row
+from server.report.exports import strides_csv
+from server.report.study_tables import StudyTables, StudyTake, write_study
+from server.services import analyses, edit_log, patients, recordings, sessions
+from server.services.errors import Conflict
+from server.services.exports import make_pseudonym
+from server.services.histories import AnalysedSession
+from server.services.patients import Patient
+from server.services.provenance import CODE_VERSION
+from server.services.reviewed import ReviewedAnalyses
+from server.services.sessions import Session
+from server.storage.db import Database
+from server.storage.tables import now
+
+MOST_VISITS: Final = 300
+"""Of one study; more are asked for in parts."""
+
+OLDEST_TOLD: Final = 89
+"""Who is as old or older is not told apart: there are few of them."""
+
+
+@dataclass(frozen=True)
+class StudyChoice:
+    """Which visits are wanted.
+
+    Parameters
+    ----------
+    search : part of a patient's code or note. protocol : None = any. since, until : days, both included.
+    visits : only these of them; empty = all.
+    """
+
+    search: str = ""
+    protocol: Protocol | None = None
+    since: dt.date | None = None
+    until: dt.date | None = None
+    visits: frozenset[str] = field(default_factory=frozenset)
+
+
+def list_visits(c: Connection, choice: StudyChoice) -> list[Session]:
+    """The visits of a choice, by patient and day."""
+    return sessions.search(
+        c,
+        search=choice.search,
+        protocol=choice.protocol,
+        since=choice.since,
+        until=choice.until,
+        ids=choice.visits,
+    )
+
+
+def make_study(
+    db: Database, reviewed: ReviewedAnalyses, choice: StudyChoice
+) -> tuple[StudyTables, list[str]]:
+    """Write the tables of a choice, and say which visits are in them.
+
+    Raises
+    ------
+    Conflict
+        no_visits, too_many_visits.
+    """
+    with db.read() as c:
+        chosen = list_visits(c, choice)
+        if not chosen:
+            raise Conflict("no_visits", "No visit fits this choice. Choose another period or protocol.")
+        if len(chosen) > MOST_VISITS:
+            raise Conflict(
+                "too_many_visits",
+                f"{len(chosen)} visits fit this choice, at most {MOST_VISITS} go into one study. "
+                "Choose a shorter period and put the tables together.",
+            )
+        people = {p: patients.get(c, p) for p in dict.fromkeys(s.patient_id for s in chosen)}
+        shown = analyses.latest_of(c, [s.id for s in chosen])
+        edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
+        recorded = {s: recordings.get(c, found.recording_id) for s, found in shown.items()}
+    first: dict[str, dt.date] = {}
+    for s in chosen:
+        first[s.patient_id] = min(s.performed_on, first.get(s.patient_id, s.performed_on))
+    takes = []
+    for s in chosen:
+        person, name = people[s.patient_id], _name(s)
+        found = shown.get(s.id)
+        labels = _label(person, s, first[s.patient_id])
+        if found is None:
+            lacking = SagittalError("no_analysis", "This visit has no analysis. Analyse it, or leave it out.")
+            takes.append(StudyTake(name, labels, 0, {}, lacking, dict, lambda: None))
+        else:
+            done = AnalysedSession(s, found, edits[found.id])
+            labels |= {"condition": done.condition.words, "edits": len(done.edits.made)}
+            files = {f.name: f.sha256 for f in recorded[s.id].files}
+            takes.append(_open_take(reviewed, name, labels, files, done))
+    about = {
+        "written_by": CODE_VERSION,
+        "written_at": now().isoformat(timespec="seconds"),
+        "analyses": {
+            _name(s): {"analysed_by": found.code_version, "config": dict(found.config)}
+            for s in chosen
+            if (found := shown.get(s.id)) is not None
+        },
+    }
+    return write_study(takes, about), [s.id for s in chosen]
+
+
+def _open_take(
+    reviewed: ReviewedAnalyses,
+    name: str,
+    labels: Mapping[str, object],
+    files: Mapping[str, str],
+    done: AnalysedSession,
+) -> StudyTake:
+    """The result of a visit as it counts; what cannot be read is told, and the others go on."""
+    found, edits = done.found, done.edits
+    error, strides, analysis = None, None, {}
+    try:
+        analysis = json.loads(analyses.file_bytes(reviewed.blobs, found, "analysis.json"))
+        result = reviewed.measure(found, edits)
+        if result is not None:
+            strides = strides_csv(result.strides, result.columns)
+            bundle = reviewed.read_bundle(found, edits)
+            analysis["parameters"] = [parameter_row(p) for p in bundle.parameters]
+        elif "strides.csv" in found.files:
+            strides = analyses.file_bytes(reviewed.blobs, found, "strides.csv")
+    except SagittalError as refused:
+        error = refused
+    return StudyTake(name, labels, len(files), _hide_names(files), error, lambda: analysis, lambda: strides)
+
+
+def _hide_names(files: Mapping[str, str]) -> dict[str, str]:
+    """Hashes by number: a file may be called after a person."""
+    return {f"file-{number}": sha256 for number, sha256 in enumerate(files.values(), 1)}
+
+
+def _name(session: Session) -> str:
+    return f"sub-{make_pseudonym(session.patient_id)}/ses-{make_pseudonym(session.id)}"
+
+
+def _label(person: Patient, session: Session, first: dt.date) -> dict[str, Any]:
+    age = person.find_age(session.performed_on)
+    return {
+        "sub": make_pseudonym(person.id),
+        "ses": make_pseudonym(session.id),
+        "days_since_first": (session.performed_on - first).days,
+        "protocol": session.protocol,
+        "sex": person.sex,
+        "age_years": None if age is None else min(age, OLDEST_TOLD),
+        "height_m": person.find_height(session),
+        "affected_side": person.affected_side,
+        "is_control": person.is_control,
+    }
