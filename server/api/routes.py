@@ -38,6 +38,7 @@ from server.api import (
     tokens,
     trends,
     tunings,
+    uploads,
     users,
     videos,
 )
@@ -65,6 +66,7 @@ def build_api(app: FastAPI) -> APIRouter:
         programmes,
         sessions,
         files,
+        uploads,
         tables,
         videos,
         analyses,
