@@ -2,13 +2,21 @@
 # Run: docker run -p 127.0.0.1:8000:8000 -v sagittal:/data -e SAGITTAL_BEHIND_TLS=1 sagittal  (behind a TLS proxy)
 FROM python:3.13-slim AS build
 WORKDIR /src
-COPY pyproject.toml README.md LICENSE ./
+COPY pyproject.toml README.md LICENSE requirements.lock requirements-image.lock ./
+# every file by its hash (.ci/lock writes the lists)
+RUN python -m venv /opt/sagittal && python -m venv /opt/build \
+    && /opt/sagittal/bin/pip install --no-cache-dir --require-hashes -r requirements.lock \
+    && /opt/build/bin/pip install --no-cache-dir --require-hashes -r requirements-image.lock
 COPY core core
 COPY sagittal sagittal
 COPY server server
 COPY web web
 COPY migrations migrations
-RUN python -m venv /opt/sagittal && /opt/sagittal/bin/pip install --no-cache-dir '.[apdm,c3d,pdf,postgres]'
+RUN /opt/build/bin/pip wheel --no-deps --no-build-isolation --wheel-dir /opt/wheel . \
+    && /opt/sagittal/bin/pip install --no-deps --no-index /opt/wheel/*.whl
+# what is in the image, as CycloneDX
+RUN /opt/build/bin/cyclonedx-py environment --output-reproducible --pyproject pyproject.toml --output-format JSON \
+    --output-file /opt/sagittal/sbom.json /opt/sagittal/bin/python
 
 FROM python:3.13-slim
 # Pango lays out the text of PDFs

@@ -5,6 +5,12 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from importlib import metadata
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 from tests.data import ROOT
 
@@ -45,3 +51,49 @@ def test_container_copies_every_package_of_the_wheel() -> None:
     assert set(wheel["packages"]) | set(wheel["force-include"]) <= copied
     assert project["project"]["license"] == "MIT"
     assert (ROOT / "LICENSE").read_text("utf-8").startswith("MIT License")
+
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+EXTRAS = PROJECT["project"]["optional-dependencies"]
+LOCKS = {
+    "requirements.lock": [
+        *PROJECT["project"]["dependencies"],
+        *(one for extra in ("apdm", "c3d", "pdf") for one in EXTRAS[extra]),
+    ],
+    "requirements-image.lock": PROJECT["dependency-groups"]["image"],
+}
+
+
+@pytest.mark.parametrize("name", LOCKS)
+def test_the_lock_covers_what_is_declared_and_every_version_has_hashes(name: str) -> None:
+    text = (ROOT / name).read_text("utf-8")
+    entries = re.findall(r"^([\w.-]+)==(\S+)(.*(?:\\\n.*)*)", text, re.MULTILINE)
+    locked: dict[str, list[Version]] = {}
+    for package, version, rest in entries:
+        locked.setdefault(canonicalize_name(package), []).append(Version(version))
+        assert re.search(r"--hash=sha256:[0-9a-f]{64}", rest), f"{package} has no hash; run .ci/lock"
+    assert sum(map(len, locked.values())) == len(re.findall(r"^\w", text, re.MULTILINE)), "an unknown line"
+    declared = [Requirement(one) for one in LOCKS[name]]
+    for one in declared:
+        versions = locked.get(canonicalize_name(one.name), [])
+        assert versions, f"{one.name} is not in {name}; run .ci/lock"
+        assert all(v in one.specifier for v in versions), f"{one}: {name} has another version; run .ci/lock"
+    # and what these need in their turn, as far as it is installed here
+    for package in locked:
+        try:
+            needs = metadata.requires(package) or []
+        except metadata.PackageNotFoundError:
+            continue
+        for need in map(Requirement, needs):
+            if need.marker is None or need.marker.evaluate({"extra": ""}):
+                assert canonicalize_name(need.name) in locked, f"{package} needs {need.name}; run .ci/lock"
+
+
+def test_the_image_installs_nothing_without_its_hash_and_lists_what_is_in_it() -> None:
+    installs = re.findall(r"pip install ([^&\n]*)", DOCKERFILE)
+    assert len(installs) == 3
+    for one in installs:
+        assert "--require-hashes" in one or {"--no-deps", "--no-index"} <= set(one.split()), one
+    for name in LOCKS:
+        assert f"--require-hashes -r {name}" in DOCKERFILE
+    assert "cyclonedx-py environment" in DOCKERFILE

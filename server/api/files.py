@@ -151,7 +151,7 @@ async def receive_body(request: Request, upload: recordings.receive) -> recordin
     """Keep the raw body of a request as a file."""
     with upload:
         try:
-            async for chunk in _megabytes(request):
+            async for chunk in read_megabytes(request):
                 await run_in_threadpool(upload.write, chunk)
         except ClientDisconnect:
             raise _cut() from None
@@ -171,7 +171,8 @@ def read_size(request: Request, limit: int) -> int:
     return int(declared)
 
 
-async def _megabytes(request: Request) -> AsyncIterator[bytes]:
+async def read_megabytes(request: Request) -> AsyncIterator[bytes]:
+    """Yield the raw body of a request in pieces of a megabyte; raises ClientDisconnect."""
     pending = bytearray()
     async for piece in request.stream():
         pending += piece

@@ -39,6 +39,7 @@ from server.api import (
     tokens,
     trends,
     tunings,
+    uploads,
     users,
     videos,
 )
@@ -66,6 +67,7 @@ def build_api(app: FastAPI) -> APIRouter:
         programmes,
         sessions,
         files,
+        uploads,
         tables,
         videos,
         analyses,

@@ -11,7 +11,9 @@ from server.http.problems import Problem, send_problem
 
 MAX_BODY_BYTES = 1_000_000
 """A manifest of eight sensors has some 4 kB."""
-_UPLOAD = re.compile(r"/api/v1/sessions/[^/]+/(files|references|video)(/|$)")
+_UPLOAD = re.compile(
+    r"(PUT|POST) /api/v1/sessions/[^/]+/(files|references|video)(/|$)|PATCH /api/v1/sessions/[^/]+/uploads/"
+)
 
 
 class BodyLimit:
@@ -22,7 +24,7 @@ class BodyLimit:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request, or refuse its body with 413."""
-        if scope["type"] != "http" or (scope["method"] in {"PUT", "POST"} and _UPLOAD.match(scope["path"])):
+        if scope["type"] != "http" or _UPLOAD.match(f"{scope['method']} {scope['path']}"):
             await self.app(scope, receive, send)
             return
         problem = Problem(

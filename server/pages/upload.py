@@ -16,12 +16,12 @@ from core.frames import SEGMENTS
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Db, Id
+from server.context import Blobs, Db, Id
 from server.pages.job_views import view_job
 from server.pages.shell import record_opening, render_page
 from server.pages.words import PROTOCOLS, SEGMENT_NAMES, TEST_PROTOCOLS
 from server.report.bundle import ABOUT_FILES
-from server.services import histories, patients, recordings, sessions
+from server.services import histories, patients, recordings, sessions, uploads
 from server.services.devices import NO_PLACES, LastPlaces, recall_places
 from server.services.patients import Patient
 from server.services.recordings import StoredRecording
@@ -81,6 +81,7 @@ DUPLICATE: Final = "duplicate_stream"
 def show_upload(
     request: Request,
     db: Db,
+    blobs: Blobs,
     sid: Id,
     who: Annotated[Identity, require(Action.READ_SESSION)],
     lengths: Annotated[bool, Query(description="show the lengths of the body at once")] = False,
@@ -90,6 +91,11 @@ def show_upload(
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
         view = view_upload(c, recordings.current(c, sid), session, patient)
+        coming = uploads.list_coming(c, blobs, sid)
+    view["coming"] = [
+        {"name": f.name, "size": f.size, "offset": f.offset, "href": f"/api/v1/sessions/{sid}/uploads/{f.id}"}
+        for f in coming
+    ]
     view["lengths_open"] = lengths or view["lengths_said"]
     record_opening(request, who, "session", sid)
     return render_page(request, db, who, "upload.html", "patients", session=session, patient=patient, **view)

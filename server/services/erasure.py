@@ -36,6 +36,7 @@ from server.storage.tables import (
     analysis_file,
     device_check,
     edit,
+    file_upload,
     filter_run,
     filter_run_file,
     job,
@@ -79,6 +80,7 @@ def erase_patient(
                 "not_confirmed", f"To delete this patient for good, repeat the code '{found.code}'."
             )
         mine = select(session.c.id).where(session.c.patient_id == patient_id)
+        parts = list(c.execute(select(file_upload.c.id).where(file_upload.c.session_id.in_(mine))).scalars())
         takes = [
             take
             for session_id in c.execute(mine).scalars().all()
@@ -92,7 +94,7 @@ def erase_patient(
         c.execute(delete(consent).where(consent.c.patient_id == patient_id))
         c.execute(delete(patient).where(patient.c.id == patient_id))
         audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": found.sessions})
-        _note(settings, spaces=[patient_id], takes=takes)
+        _note(settings, spaces=[patient_id], takes=takes, parts=parts)
     reviewed.forget()
     finish(db, reviewed.blobs, settings)
 
@@ -104,9 +106,11 @@ def erase_session(
     with db.write() as c:
         found = sessions.get(c, session_id)
         own = _files_of(c, session_id, found.patient_id)
+        mine = select(file_upload.c.id).where(file_upload.c.session_id == session_id)
+        parts = list(c.execute(mine).scalars())
         takes = _erase_session_rows(c, session_id)
         audit.record(c, actor, SESSION_ERASED, "session", session_id, {"patient_id": found.patient_id})
-        _note(settings, files=sorted(own), takes=takes)
+        _note(settings, files=sorted(own), takes=takes, parts=parts)
     reviewed.forget()
     finish(db, reviewed.blobs, settings)
 
@@ -122,6 +126,7 @@ def _erase_session_rows(c: Connection, session_id: str) -> list[str]:
     c.execute(delete(filter_run_file).where(filter_run_file.c.filter_run_id.in_(runs)))
     c.execute(delete(filter_run).where(filter_run.c.analysis_id.in_(analyses)))
     c.execute(delete(reference_file).where(reference_file.c.session_id == session_id))
+    c.execute(delete(file_upload).where(file_upload.c.session_id == session_id))
     c.execute(delete(session_video).where(session_video.c.session_id == session_id))
     signed = select(signed_report.c.id).where(signed_report.c.session_id == session_id).scalar_subquery()
     c.execute(delete(report_link).where(report_link.c.report_id.in_(signed)))
@@ -201,25 +206,27 @@ def _note(
     spaces: Iterable[str] = (),
     files: Iterable[tuple[str, str]] = (),
     takes: Iterable[str] = (),
+    parts: Iterable[str] = (),
 ) -> None:
     """Write durably what is about to be erased: ids and hashes only."""
     fs.make_folder(settings.erasing)
-    content = {"spaces": list(spaces), "files": list(files), "takes": list(takes)}
+    content = {"spaces": list(spaces), "files": list(files), "takes": list(takes), "parts": list(parts)}
     fs.write_file(settings.erasing / f"{new_id()}.json", json.dumps(content).encode())
 
 
 def _read(path: Path) -> dict[str, Any] | None:
     try:
         note: Any = read_json(path.read_bytes())
-        spaces, takes = [str(x) for x in note["spaces"]], [str(x) for x in note["takes"]]
+        # earlier versions knew no parts
+        spaces, takes, parts = ([str(x) for x in note.get(key, [])] for key in ("spaces", "takes", "parts"))
         files = [(str(space), str(name)) for space, name in note["files"]]
-        if not all(map(_ID.fullmatch, [*spaces, *takes, *(space for space, _ in files)])):
+        if not all(map(_ID.fullmatch, [*spaces, *takes, *parts, *(space for space, _ in files)])):
             return None
     except FileNotFoundError:  # another process has just finished it
-        return {"spaces": [], "files": [], "takes": []}
-    except (ValueError, TypeError, KeyError):
+        return {"spaces": [], "files": [], "takes": [], "parts": []}
+    except (ValueError, TypeError, KeyError, AttributeError):
         return None
-    return {"spaces": spaces, "files": files, "takes": takes}
+    return {"spaces": spaces, "files": files, "takes": takes, "parts": parts}
 
 
 def _remove(c: Connection, blobs: BlobStore, settings: Settings, note: dict[str, Any]) -> None:
@@ -238,7 +245,11 @@ def _remove(c: Connection, blobs: BlobStore, settings: Settings, note: dict[str,
     for take in set(note["takes"]) - takes:
         for path in settings.live.glob(f"{take}.*"):
             fs.remove_file(path)
-    for folder in (blobs.root, settings.live, *(blobs.root / space for space, _ in note["files"])):
+    coming = set(c.execute(select(file_upload.c.id).where(file_upload.c.id.in_(note["parts"]))).scalars())
+    for part in set(note["parts"]) - coming:
+        fs.remove_file(blobs.part(part))
+    spaces = [blobs.root / space for space, _ in note["files"]]
+    for folder in (blobs.root, blobs.incoming, settings.live, *spaces):
         if folder.is_dir():
             fs.sync_folder(folder)
     trash.tidy()

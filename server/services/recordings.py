@@ -84,7 +84,7 @@ def current(c: Connection, session_id: str) -> StoredRecording | None:
     """The session's newest recording, None before the first file; raises NotFound for the session."""
     row = c.execute(_QUERY.where(session.c.id == session_id).order_by(*_NEWEST).limit(1)).first()
     if row is None:
-        _patient_of(c, session_id)
+        patient_of(c, session_id)
         return None
     return _recording(c, row)
 
@@ -209,8 +209,8 @@ class receive:  # noqa: N801 - a verb: with receive(...) as upload
         self._session_id = session_id
         self._name = check_name(name)
         with db.read() as c:
-            self._space = _patient_of(c, session_id)
-            self._check_set(current(c, session_id), 0)
+            self._space = patient_of(c, session_id)
+            self._check_set(c, 0)
         require_room(blobs, settings, size)
         self._receiver = blobs.receive(self._space, settings.max_file_bytes)
 
@@ -220,52 +220,69 @@ class receive:  # noqa: N801 - a verb: with receive(...) as upload
         try:
             self._receiver.write(data)
         except SizeLimitError as error:
-            raise TooLarge(
-                "file_too_large",
-                f"'{self._name}' is larger than {error.limit / 1e6:g} MB, the limit of this installation. "
-                "Split the recording or ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
-            ) from None
+            raise make_too_large(self._name, error.limit) from None
 
     def keep(self) -> RecordedFile:
         """Store the file and its row; a file of the same name in the set is replaced."""
         blob = self._receiver.keep()
         with self._db.write() as c:
-            _patient_of(c, self._session_id)
-            self._blobs.require(self._space, blob.sha256)
-            self._check_set(current(c, self._session_id), blob.size)
+            self._blobs.require(patient_of(c, self._session_id), blob.sha256)
+            self._check_set(c, blob.size)
             return self._add(c, blob)
 
-    def _add(self, c: Connection, blob: Blob) -> RecordedFile:
-        this = current(c, self._session_id)
-        for f in this.files if this else ():
-            if (f.name, f.sha256) == (self._name, blob.sha256):
-                return f
-        target = _editable(c, self._session_id)
-        key = {"recording_id": target, "name": self._name}
-        c.execute(delete(recording_file).filter_by(**key))
-        row = {"size": blob.size, "sha256": blob.sha256, "added_at": now()}
-        c.execute(insert(recording_file).values(**key, **row))
-        detail = {"session_id": self._session_id, "sha256": blob.sha256, "size": blob.size}
-        audit.record(c, self._actor, "recording.file_added", "recording", target, detail)
-        return RecordedFile(self._name, blob.size, blob.sha256)
+    def _check_set(self, c: Connection, size: int) -> None:
+        check_set(c, self._settings, self._session_id, self._name, size)
 
-    def _check_set(self, this: StoredRecording | None, size: int) -> None:
-        others = [f for f in this.files if f.name != self._name] if this else []
-        if len(others) + 1 > self._settings.max_files:
-            raise TooLarge("too_many_files", f"A recording has at most {self._settings.max_files} files.")
-        total = sum(f.size for f in others) + size
-        if total > self._settings.max_set_bytes:
-            raise TooLarge(
-                "set_too_large",
-                f"With '{self._name}' the recording has {total / 1e6:.0f} MB, "
-                f"at most {self._settings.max_set_bytes / 1e6:g} MB are allowed. Remove files first.",
-            )
+    def _add(self, c: Connection, blob: Blob) -> RecordedFile:
+        return add_file(c, self._actor, self._session_id, self._name, blob)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *error: object) -> None:
         self._receiver.__exit__(*error)
+
+
+def check_set(c: Connection, settings: Settings, session_id: str, name: str, size: int) -> None:
+    """Raise TooLarge set_too_large, too_many_files unless a file of this size has room beside the others."""
+    this = current(c, session_id)
+    others = [f for f in this.files if f.name != name] if this else []
+    if len(others) + 1 > settings.max_files:
+        raise TooLarge("too_many_files", f"A recording has at most {settings.max_files} files.")
+    total = sum(f.size for f in others) + size
+    if total > settings.max_set_bytes:
+        raise TooLarge(
+            "set_too_large",
+            f"With '{name}' the recording has {total / 1e6:.0f} MB, "
+            f"at most {settings.max_set_bytes / 1e6:g} MB are allowed. Remove files first.",
+        )
+
+
+def add_file(
+    c: Connection, actor: audit.Actor | None, session_id: str, name: str, blob: Blob
+) -> RecordedFile:
+    """Refer to a stored file from the current set, in place of one of its name."""
+    this = current(c, session_id)
+    for f in this.files if this else ():
+        if (f.name, f.sha256) == (name, blob.sha256):
+            return f
+    target = _editable(c, session_id)
+    key = {"recording_id": target, "name": name}
+    c.execute(delete(recording_file).filter_by(**key))
+    row = {"size": blob.size, "sha256": blob.sha256, "added_at": now()}
+    c.execute(insert(recording_file).values(**key, **row))
+    detail = {"session_id": session_id, "sha256": blob.sha256, "size": blob.size}
+    audit.record(c, actor, "recording.file_added", "recording", target, detail)
+    return RecordedFile(name, blob.size, blob.sha256)
+
+
+def make_too_large(name: str, limit: int) -> TooLarge:
+    """What is answered to a file beyond the limit of one file, in bytes."""
+    return TooLarge(
+        "file_too_large",
+        f"'{name}' is larger than {limit / 1e6:g} MB, the limit of this installation. "
+        "Split the recording or ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
+    )
 
 
 class DiskFull(ServiceError):  # noqa: N818 - the name of the HTTP status
@@ -341,7 +358,8 @@ def _recording(c: Connection, row: Any) -> StoredRecording:
     )
 
 
-def _patient_of(c: Connection, session_id: str) -> str:
+def patient_of(c: Connection, session_id: str) -> str:
+    """Id of the patient of a session; raises NotFound for the session."""
     found = c.execute(
         select(patient.c.id)
         .join(session, session.c.patient_id == patient.c.id)

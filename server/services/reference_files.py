@@ -12,7 +12,7 @@ from sqlalchemy import Connection, delete, func, insert, select
 from server import audit
 from server.services import sessions
 from server.services.errors import NotFound, TooLarge
-from server.services.recordings import RecordedFile, StoredRecording, receive
+from server.services.recordings import RecordedFile, receive
 from server.storage.blobs import Blob, BlobStore
 from server.storage.tables import now, reference_file
 
@@ -51,7 +51,7 @@ def remove(c: Connection, actor: audit.Actor | None, session_id: str, name: str)
 class receive_reference(receive):  # noqa: N801 - as `receive`
     """A reference on its way in; as `receive`."""
 
-    def _check_set(self, this: StoredRecording | None, size: int) -> None:
+    def _check_set(self, c: Connection, size: int) -> None:
         """The recording's set is not touched."""
 
     def _add(self, c: Connection, blob: Blob) -> RecordedFile:

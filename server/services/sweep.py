@@ -13,7 +13,9 @@ from __future__ import annotations
 
 import logging
 
-from server.services import custody, erasure, films
+from sqlalchemy import Connection
+
+from server.services import custody, erasure, films, uploads
 from server.services.references import list_referenced
 from server.settings import Settings
 from server.storage import fs
@@ -39,17 +41,20 @@ def sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
     old = [f for f in blobs.files() if f.age_s >= settings.sweep_grace_s]
     with db.read() as c:
         doubted = custody.find_doubt(c, settings)
-        used, erased = list_referenced(c), erasure.list_erased_spaces(c)
+        erased = erasure.list_erased_spaces(c)
     if doubted is not None:
         log.warning("no stored file is taken away: %s See `sagittal check`.", doubted)
         return 0
     films.settle_abandoned(db, blobs, settings)
+    uploads.drop_abandoned(db, blobs)
+    with db.read() as c:
+        used = _list_used(c)
     trash, at, taken = Trash(settings.trash), now(), 0
     idle = [f for f in old if (f.space, f.name) not in used]
     for group in (idle[i : i + AT_ONCE] for i in range(0, len(idle), AT_ONCE)):
         kept = []
         with db.write() as c:
-            used = list_referenced(c)
+            used = _list_used(c)
             for stored in group:
                 if (stored.space, stored.name) in used or not stored.is_older(settings.sweep_grace_s):
                     continue
@@ -64,6 +69,11 @@ def sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
             log.warning("%d stored files that nothing refers to are in %s now", len(kept), trash.root)
     trash.expire(now())
     return taken
+
+
+def _list_used(c: Connection) -> set[tuple[str, str]]:
+    """(space, name) of every file that a row refers to, of those that are still coming too."""
+    return list_referenced(c) | {(INCOMING, name) for name in uploads.list_parts(c)}
 
 
 def put_back(db: Database, blobs: BlobStore, settings: Settings) -> int:

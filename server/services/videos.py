@@ -17,7 +17,7 @@ from sqlalchemy import Connection, delete, insert, select, update
 from server import audit
 from server.services import sessions
 from server.services.errors import NotFound, ServiceError
-from server.services.recordings import RecordedFile, StoredRecording, receive
+from server.services.recordings import RecordedFile, receive
 from server.storage.blobs import Blob, BlobStore
 from server.storage.tables import now, session_video
 
@@ -126,7 +126,7 @@ class receive_video(receive):  # noqa: N801 - as `receive`
             )
         return super().keep()
 
-    def _check_set(self, this: StoredRecording | None, size: int) -> None:
+    def _check_set(self, c: Connection, size: int) -> None:
         """The recording's set is not touched."""
 
     def _add(self, c: Connection, blob: Blob) -> RecordedFile:

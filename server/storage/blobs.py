@@ -68,18 +68,36 @@ class BlobStore:
 
     def __init__(self, root: Path) -> None:
         self.root = root
-        self._incoming = root / INCOMING
-        fs.make_folder(self._incoming)
+        self.incoming = root / INCOMING
+        fs.make_folder(self.incoming)
 
     def receive(self, space: str, limit: int | None = None) -> Receiver:
         """Take a file in chunks: `with store.receive(pid, limit) as r: r.write(chunk); blob = r.keep()`."""
-        return Receiver(self.path(space, "0" * 64).parent, self._incoming, limit)
+        return Receiver(self.path(space, "0" * 64).parent, self.incoming, limit)
 
     def put(self, space: str, content: bytes) -> Blob:
         """Store bytes; when this returns they survive a power cut."""
         with self.receive(space) as receiver:
             receiver.write(content)
             return receiver.keep()
+
+    def part(self, upload_id: str) -> Path:
+        """Where a file that comes in parts waits to be whole (services/uploads.py)."""
+        return self.incoming / self.name_part(upload_id)
+
+    @staticmethod
+    def name_part(upload_id: str) -> str:
+        """Name of that file."""
+        if not _HEX32.fullmatch(upload_id):
+            raise ValueError(f"'{upload_id}' is not the id of an upload.")
+        return f"{upload_id}.part"
+
+    def adopt(self, space: str, path: Path, sha256: str) -> None:
+        """Give a synced file of the store, with this content, its name; it survives a power cut under it."""
+        target = self.path(space, sha256)
+        fs.move_file(path, target)
+        for folder in {target.parent, path.parent}:
+            fs.sync_folder(folder)
 
     def probe(self) -> None:
         """Write a page into the folder and remove it again; raises OSError."""

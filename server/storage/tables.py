@@ -7,7 +7,7 @@ patient ─< session ─< recording ─< recording_file          user ─< login
         │          │      ├──< job ─── analysis ─< edit (append-only, undo is a row too)
         │          │      │               └──< filter_run ─< filter_run_file
         │          │      └──< device_check (of the session's last published analysis)
-        │          ├──< reference_file, session_video (at most one), assessment (at most one)
+        │          ├──< reference_file, file_upload, session_video (at most one), assessment (at most one)
         │          └──< signed_report ─< report_file
         │                             └──< report_link
         ├──< patient_note
@@ -127,6 +127,18 @@ recording_file = Table(
     Column("name", String(500), primary_key=True),  # as uploaded, with its folders; any Unicode
     *_describe_file(),
     Column("added_at", Utc, nullable=False),
+)
+
+file_upload = Table(
+    "file_upload",  # a file that comes in parts (services/uploads.py)
+    metadata,
+    _id(),
+    _ref("session_id", "session"),
+    Column("name", String(500), nullable=False),
+    Column("size", Integer, nullable=False),  # of the whole file, as announced
+    Column("finished_sha256", String(64)),  # None: it is still coming
+    Column("created_at", Utc, nullable=False),
+    CheckConstraint("size >= 1", name="size"),
 )
 
 user = Table(

@@ -8,11 +8,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.browser.conftest import NAME, PASSWORD, Opener, RunningServer
 from tests.browser.filling import add, add_session
+from tests.browser.network import Network
 from tests.data import ROOT, data_folder
 
 pytestmark = pytest.mark.usefixtures("unknown_sensors")
@@ -222,4 +224,50 @@ def test_a_file_that_breaks_off_can_be_tried_again(
     page.get_by_role("button", name="Try two.txt again").click()
     # both are there: the server looks into them and the page shows what it thinks of them
     expect(page.locator("details .files li")).to_have_count(2, timeout=30_000)
+    context.close()
+
+
+def test_a_large_file_goes_on_after_a_lost_connection_and_after_a_reload(
+    flat: Browser, running: RunningServer, tmp_path: Path
+) -> None:
+    large = tmp_path / "large.txt"
+    large.write_bytes(np.random.default_rng(19).bytes(17_000_000))
+    with running.client() as client:
+        session = add_session(client, add(client, "/patients", code="LARGE")["id"], "Walk")
+    network = Network(running.url)
+    context = flat.new_context(base_url=network.url)
+    page = context.new_page()
+    _sign_in(page)
+    page.goto(f"/sessions/{session}/upload")
+    parts, cuts = list[int](), [4_000_000, 12_000_000]
+
+    def watch(route: Route) -> None:
+        if route.request.method == "PATCH":
+            parts.append(int(route.request.headers["upload-offset"]))
+            if cuts and parts[-1] == cuts[0]:
+                cuts.pop(0)
+                network.cut()
+        route.continue_()
+
+    page.route("**/uploads/*", watch)
+    page.locator("[data-files]").set_input_files(str(large))
+    say = page.locator("[data-sending] [data-say]")
+    expect(say).to_contain_text("Goes on by itself when it is back")
+    # the page finds how far the server is, and goes on there without anybody
+    with page.expect_request(lambda r: r.headers.get("upload-offset") == "12000000", timeout=30_000):
+        network.mend()
+    expect(say).to_contain_text("Goes on by itself when it is back", timeout=30_000)
+    page.on("dialog", lambda dialog: dialog.accept())
+    page.goto("about:blank")
+    network.mend()
+    page.goto(f"/sessions/{session}/upload")
+    expect(page.locator("[data-part]")).to_contain_text("Choose the file again to go on")
+    parts.clear()
+    page.locator("[data-files]").set_input_files(str(large))
+    expect(page.locator("details .files")).to_contain_text("large.txt", timeout=30_000)
+    assert min(parts) == 12_000_000, "nothing that was there was sent again"
+    with running.client() as client:
+        stored = client.get(f"/api/v1/sessions/{session}/files/large.txt").content
+    assert stored == large.read_bytes()
+    network.close()
     context.close()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import datetime as dt
+import hashlib
 import os
 import re
 import signal
@@ -10,10 +12,18 @@ import sys
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
+import httpx
+import numpy as np
 import pytest
 
+from server.auth import accounts
+from server.auth.passwords import hash_password
+from server.auth.roles import Role
+from server.auth.sessions import Logins
 from server.processes.environment import make_environment
+from server.services import recordings
 from tests.data import ROOT
 from tests.faults.clinic import Clinic, alive, until
 
@@ -95,3 +105,47 @@ def test_a_stopped_server_gives_its_job_back_within_ten_seconds(clinic: Clinic, 
     row = clinic.row(view)
     assert (row.state, row.deaths) == ("queued", 0)
     assert not alive(int(reached.read_text()))
+
+
+def test_an_upload_in_parts_goes_on_after_kills_with_the_same_bytes(clinic: Clinic) -> None:
+    content = np.random.default_rng(19).bytes(12_000_000)
+    with clinic.db.write() as c:
+        user = accounts.create(c, "grace", None, Role.CLINICIAN, hash_password("a few unrelated words")).id
+        hour = dt.timedelta(hours=1)
+        token = Logins(clinic.db, hour, hour).start(c, user, None)
+    path = f"/api/v1/sessions/{clinic.session.id}/uploads"
+    reached = 0
+    for kill_at in (2_000_000, 7_000_000, None):
+        with (
+            serving(clinic) as (server, address),
+            httpx.Client(base_url=address, cookies={"sid": token}, timeout=60) as client,
+        ):
+            announced = {"name": "large.csv", "size": len(content)}
+            upload = client.post(path, json=announced).raise_for_status().json()
+            assert upload["offset"] >= reached, "what was there is there again"
+            mine = f"{path}/{upload['id']}"
+            body = _dying(server, content, upload["offset"], kill_at, clinic.blobs.part(upload["id"]))
+            headers = {"Upload-Offset": str(upload["offset"])}
+            if kill_at is not None:
+                with pytest.raises(httpx.TransportError):
+                    client.patch(mine, content=body, headers=headers)
+                reached = kill_at - 1_000_000
+                continue
+            assert client.patch(mine, content=body, headers=headers).json()["offset"] == len(content)
+            end = {"sha256": hashlib.sha256(content).hexdigest()}
+            client.post(f"{mine}/finish", json=end).raise_for_status()
+    with clinic.db.read() as c:
+        stored = {f.name: f for f in recordings.require_current(c, clinic.session.id).files}
+    assert clinic.blobs.read(clinic.patient.id, stored["large.csv"].sha256) == content
+
+
+def _dying(
+    server: subprocess.Popen[str], content: bytes, start: int, kill_at: int | None, part: Path
+) -> Iterator[bytes]:
+    """The bytes from a place on; the server is killed in the midst once what came before is there."""
+    for at in range(start, len(content), 250_000):
+        if kill_at and at >= kill_at:
+            until(lambda: part.exists() and part.stat().st_size >= kill_at - 1_000_000)
+            server.kill()
+            server.wait()
+        yield content[at : at + 250_000]

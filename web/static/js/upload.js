@@ -1,8 +1,10 @@
 // <upload-area>: files, folders and zips to the session, two at a time, each with its own progress; then the inspection.
 import { request, showProblem, Problem } from "./common/api.js";
 import { localise, speak } from "./common/words.js";
+import { sendInParts } from "./upload-parts.js";
 
 const PARALLEL = 2;
+const LARGE_BYTES = 8e6; // a smaller file is sent at once, and again where that breaks
 const mb = (n) => localise(`${(n / 1e6).toFixed(n < 1e7 ? 1 : 0)} MB`);
 
 // A dropped folder arrives as entries, 100 at a time; the path inside it becomes part of the file's name.
@@ -59,6 +61,7 @@ class UploadArea extends HTMLElement {
   }
 
   add(files) {
+    for (const row of this.querySelectorAll("[data-part]")) if (files.some((f) => f.name === row.dataset.part && String(f.file.size) === row.dataset.size)) row.remove();
     const hidden = /(^|\/)(\.|Thumbs\.db$|desktop\.ini$|__MACOSX\/)/; // system litter of folders, never a recording
     for (const f of files.filter((file) => !hidden.test(file.name))) {
       const row = document.createElement("li");
@@ -89,7 +92,6 @@ class UploadArea extends HTMLElement {
     const say = (t) => (item.row.querySelector("[data-say]").textContent = t);
     const bar = item.row.querySelector("progress");
     const button = item.row.querySelector("button");
-    const xhr = new XMLHttpRequest();
     const over = (ok, text) => {
       this.active -= 1;
       if (ok) { this.sent += 1; bar.value = 1; button.remove(); } else { this.failed += 1; }
@@ -99,7 +101,21 @@ class UploadArea extends HTMLElement {
       if (ok) item.row.querySelector("use").setAttribute("href", "#i-check");
       this.pump();
     };
-    xhr.upload.onprogress = (e) => { bar.value = e.loaded / e.total; say(speak`${mb(e.loaded)} of ${mb(e.total)}`); };
+    const show = (sent, total) => { bar.value = sent / total; say(speak`${mb(sent)} of ${mb(total)}`); };
+    const leave = () => { item.row.remove(); this.active -= 1; this.pump(); };
+    if (item.file.size > LARGE_BYTES) {
+      const stop = new AbortController();
+      button.onclick = () => stop.abort();
+      const how = { signal: stop.signal, onSent: (n) => show(n, item.file.size), onWait: () => say(speak`No connection. Goes on by itself when it is back.`) };
+      sendInParts(this.base, item, how).then(() => over(true, mb(item.file.size)), (problem) => {
+        if (stop.signal.aborted) return leave();
+        this.retry(item, button);
+        over(false, problem.message);
+      });
+      return;
+    }
+    const xhr = new XMLHttpRequest();
+    xhr.upload.onprogress = (e) => show(e.loaded, e.total);
     xhr.onload = () => {
       if (xhr.status < 300) return over(true, mb(item.file.size));
       let body = {};
@@ -108,7 +124,7 @@ class UploadArea extends HTMLElement {
       over(false, new Problem(xhr.status, body).message);
     };
     xhr.onerror = () => { this.retry(item, button); over(false, speak`The connection broke. Try again.`); };
-    xhr.onabort = () => { item.row.remove(); this.active -= 1; this.pump(); };
+    xhr.onabort = leave;
     button.onclick = () => xhr.abort();
     const path = item.name.split("/").map(encodeURIComponent).join("/");
     xhr.open("PUT", `${this.base}/files/${path}`);
