@@ -67,6 +67,7 @@ class PipelineStage:
     results : fields of Analysis that it sets. reads : fields of PipelineConfig that it takes.
     runs_after_problem : also when an earlier stage could not go on; it takes what was reached.
     tells_share : `run` takes a third argument, a function that it tells the share of its own work, 0 to 1.
+    let_go : an Analysis without what no stage behind this one reads; None = all of it is read.
     """
 
     name: str
@@ -76,6 +77,7 @@ class PipelineStage:
     reads: tuple[str, ...] = ()
     runs_after_problem: bool = False
     tells_share: bool = False
+    let_go: Callable[[TakeAnalysis], TakeAnalysis] | None = None
 
 
 def lay_on_one_axis(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -194,6 +196,18 @@ def build_figure(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
         side: body.contact_mask(t_s, events.times(side, "ic"), events.times(side, "tc")) for side in SIDES
     }
     return replace(analysis, posed=withhold_distances(estimate_poses(mounted, contacts, config.poses)))
+
+
+def keep_feet_alone(analysis: TakeAnalysis) -> TakeAnalysis:
+    """Of the orientations before mounting only the feet's, which `measure_walk` falls back on."""
+    fused = require_stage(analysis.fused, "orientation")
+    return replace(analysis, fused=replace(fused, q={s: q for s, q in fused.q.items() if s in FOOT.values()}))
+
+
+def keep_refined_alone(analysis: TakeAnalysis) -> TakeAnalysis:
+    """No orientations from before the estimator."""
+    mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
+    return replace(analysis, mounted=replace(mounted, orientations=posed.orientations))
 
 
 def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -334,8 +348,10 @@ EVENTS: Final = PipelineStage(
     runs_after_problem=True,
 )
 TRUNK_EVENTS: Final = PipelineStage("events", 0.14, detect_trunk_steps, ("contacts",), ("lumbar", "turns"))
-MOUNTING: Final = PipelineStage("mounting", 0.15, mount_on_segments, ("mounted",), ("poses", "calibration"))
-POSES: Final = PipelineStage("poses", 0.4, build_figure, ("posed",), ("poses",))
+MOUNTING: Final = PipelineStage(
+    "mounting", 0.15, mount_on_segments, ("mounted",), ("poses", "calibration"), let_go=keep_feet_alone
+)
+POSES: Final = PipelineStage("poses", 0.4, build_figure, ("posed",), ("poses",), let_go=keep_refined_alone)
 ANGLES: Final = PipelineStage("angles", 0.95, compute_angles, ("angles",))
 PARAMETERS: Final = PipelineStage(
     "parameters", 0.98, measure_walk, ("tracks", "measured"), ("strides", "bouts"), runs_after_problem=True
