@@ -17,7 +17,7 @@ from core.agreement import Agreement, check_agreement
 from core.agreement.joints import LEG_JOINTS
 from core.angles.measure import measure_angles
 from core.body.estimate import estimate_poses
-from core.body.l7s.inputs import free_acceleration
+from core.body.l7s.inputs import remove_gravity
 from core.body.mounting import mount_sensors
 from core.body.walking_frame import in_walking_frame
 from core.calibration.declared import propose_mountings
@@ -317,12 +317,16 @@ def _trunk_acceleration(analysis: TakeAnalysis, config: PipelineConfig) -> dict[
     if mounted is None or posed is None:
         return {}
     orientations = posed.orientations
-    acceleration = free_acceleration(mounted.calibrated, orientations)
+    worn, mounts = mounted.calibrated.recording.sensors, mounted.calibrated.calibration.segments
     uniform = drop_stuck_sensors(analysis.recording)
     return {
         s: np.where(
             orientations.valid[s][:, None],
-            in_walking_frame(acceleration[s], orientations.q[s], analysis.recording.rate_hz),
+            in_walking_frame(
+                remove_gravity(worn[s].acc, worn[s].valid, orientations.q[s], mounts[s]),
+                orientations.q[s],
+                analysis.recording.rate_hz,
+            ),
             np.nan,
         )
         if s in orientations.q
