@@ -129,6 +129,6 @@ def mean_angles(angles: Floats) -> Floats:
     return np.asarray(np.arctan2((np.sin(finite) * n).sum(axis=0), (np.cos(finite) * n).sum(axis=0)))
 
 
-def subtract_zero(angles: Floats, zero: Floats) -> Floats:
-    """Angles (T, k) in rad over those of a zero (k,), −π to π."""
+def subtract_zero(angles: Floats, zero: Floats | float) -> Floats:
+    """Angles (T, k) in rad over those of a zero (k,), or (T,) over one, −π to π."""
     return wrap_angle(np.asarray(angles - zero))

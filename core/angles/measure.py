@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from core.body.poses import Poses
     from core.fusion.orientations import Orientations
 
+STACKED: Final = 1 << 14
+"""Samples whose orientations are laid side by side at a time."""
+
 GIMBAL_LIMIT: Final = radians(80.0)
 """|b| beyond which a and c cannot be told apart (docs/science/joint-angles.md, "Joints")."""
 
@@ -48,7 +51,10 @@ def measure_angles(
     passes 80° a notice `gimbal`, one without signal while standing is left out with `no_standing_zero`.
     """
     kernel = AngleKernel.between(tuple(orientations.q), () if poses is None else tuple(poses.q))
-    raw = kernel.measure(*_stack(orientations, poses))
+    raw = np.empty((len(orientations.t_s), len(kernel.names)))
+    for first in range(0, len(raw), STACKED):
+        part = slice(first, first + STACKED)
+        raw[part] = kernel.measure(*_stack(orientations, poses, part))
     notices = _find_missing_joints(orientations, kernel) + _find_gimbal(raw, kernel, orientations.t_s)
     standing = raw[index_window(zero, orientations.rate_hz)]
     known = [bool(x.any()) for x in np.isfinite(standing).T]
@@ -60,11 +66,10 @@ def measure_angles(
         )
         notices.append(Notice("no_standing_zero", message, t_s=zero[0]))
     offset = mean_angles(standing)
-    values = subtract_zero(raw, offset)
     kept = [i for i, x in enumerate(known) if x]
     return JointAngles(
         orientations.t_s,
-        {kernel.names[i]: np.ascontiguousarray(values[:, i]) for i in kept},
+        {kernel.names[i]: subtract_zero(raw[:, i], offset[i]) for i in kept},
         {kernel.names[i]: float(offset[i]) for i in kept},
         notices=tuple(notices),
         diagnostics={"estimated": tuple(kernel.names[i] for i in kept if kernel.estimated[i])},
@@ -74,11 +79,13 @@ def measure_angles(
     )
 
 
-def _stack(orientations: Orientations, poses: Poses | None) -> tuple[Floats, Bools]:
-    """Orientations (n, S, 4) of the sensors' segments, then the figure's, and where known (n, S)."""
-    q, known = list(orientations.q.values()), [orientations.valid[s] for s in orientations.q]
+def _stack(orientations: Orientations, poses: Poses | None, part: slice) -> tuple[Floats, Bools]:
+    """Orientations (n, S, 4) of the sensors' segments, then the figure's, and where known (n, S); a part."""
+    q = [x[part] for x in orientations.q.values()]
+    known = [orientations.valid[s][part] for s in orientations.q]
     if poses is not None:
-        q, known = q + list(poses.q.values()), known + [poses.valid] * len(poses.q)
+        q += [x[part] for x in poses.q.values()]
+        known += [poses.valid[part]] * len(poses.q)
     return np.stack(q, axis=1), np.stack(known, axis=1)
 
 

@@ -312,8 +312,7 @@ def _view_sides(
     part = slice(max(0, first - margin), past + margin)
     walked = walked[part]
     thin = find_thinning(rate, params.joints)
-    acc, gyr, valid = correct_signals(calibrated, segments)
-    acc, gyr, valid = acc[part], gyr[part], valid[part]
+    acc, gyr, valid = correct_signals(calibrated, segments, part)
     turned = {s: orientations.q[s][part] for s in segments}
     bends = [joint for joint in LEG_JOINTS if set(joint) <= set(segments)]
     # what is faster than the band is the sensors' own shaking, which no skin follows

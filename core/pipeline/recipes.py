@@ -71,6 +71,8 @@ def analyse(
     config: PipelineConfig | None = None,
     progress: Progress = say_nothing,
     version: str = "",
+    *,
+    resumable: bool = True,
 ) -> TakeAnalysis:
     """Run all stages on one recording.
 
@@ -80,6 +82,8 @@ def analyse(
     config : parameters of the stages; None = the defaults.
     progress : called before each stage.
     version : of the code, kept in the provenance.
+    resumable : False lets go of what only earlier stages read, which `resume` and a comparison of filters
+        would need; results are the same.
 
     Raises
     ------
@@ -87,7 +91,8 @@ def analyse(
         When not even a common time axis can be made. Later stages never raise: what stops them is
         `TakeAnalysis.problem`.
     """
-    return _run_from(TakeAnalysis(recording, config or PipelineConfig(), version), 0, progress)
+    begun = TakeAnalysis(recording, config or PipelineConfig(), version)
+    return _run_from(begun, 0, progress, resumable=resumable)
 
 
 def choose_recipe(analysis: TakeAnalysis) -> tuple[PipelineStage, ...]:
@@ -103,7 +108,9 @@ def choose_recipe(analysis: TakeAnalysis) -> tuple[PipelineStage, ...]:
     return (*walk, WALK_TEST) if analysis.source.protocol in WALK_TESTS else walk
 
 
-def run_stages(analysis: TakeAnalysis, stages: Sequence[PipelineStage], progress: Progress) -> TakeAnalysis:
+def run_stages(
+    analysis: TakeAnalysis, stages: Sequence[PipelineStage], progress: Progress, *, resumable: bool = True
+) -> TakeAnalysis:
     """Run stages in order; after a problem only what measures what is there.
 
     Raises
@@ -121,6 +128,8 @@ def run_stages(analysis: TakeAnalysis, stages: Sequence[PipelineStage], progress
                 analysis = stage.run(analysis, analysis.config, _tell_within(stage, end, progress))
             else:
                 analysis = stage.run(analysis, analysis.config)
+            if stage.let_go is not None and not resumable:
+                analysis = stage.let_go(analysis)
         except SagittalError as error:
             if analysis.uniform is None and analysis.report is None:
                 raise
@@ -185,12 +194,15 @@ def resume(
     return _run_from(replace(analysis, config=config, **forgotten), first, progress)
 
 
-def _run_from(analysis: TakeAnalysis, first: int, progress: Progress) -> TakeAnalysis:
+def _run_from(
+    analysis: TakeAnalysis, first: int, progress: Progress, *, resumable: bool = True
+) -> TakeAnalysis:
     """Run the stages from this place in the recipe on; which recipe it is, the signals' stages decide."""
     if analysis.source.protocol == "activity":
         analysis = run_stages(analysis, ACTIVITY[first:], progress)
     else:
         analysis = run_stages(analysis, SIGNALS[first:], progress)
-        analysis = run_stages(analysis, choose_recipe(analysis)[max(first, len(SIGNALS)) :], progress)
+        rest = choose_recipe(analysis)[max(first, len(SIGNALS)) :]
+        analysis = run_stages(analysis, rest, progress, resumable=resumable)
     progress("done", 1.0)
     return analysis

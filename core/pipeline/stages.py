@@ -17,7 +17,7 @@ from core.agreement import Agreement, check_agreement
 from core.agreement.joints import LEG_JOINTS
 from core.angles.measure import measure_angles
 from core.body.estimate import estimate_poses
-from core.body.l7s.inputs import free_acceleration
+from core.body.l7s.inputs import remove_gravity
 from core.body.mounting import mount_sensors
 from core.body.walking_frame import in_walking_frame
 from core.calibration.declared import propose_mountings
@@ -67,6 +67,7 @@ class PipelineStage:
     results : fields of Analysis that it sets. reads : fields of PipelineConfig that it takes.
     runs_after_problem : also when an earlier stage could not go on; it takes what was reached.
     tells_share : `run` takes a third argument, a function that it tells the share of its own work, 0 to 1.
+    let_go : an Analysis without what no stage behind this one reads; None = all of it is read.
     """
 
     name: str
@@ -76,6 +77,7 @@ class PipelineStage:
     reads: tuple[str, ...] = ()
     runs_after_problem: bool = False
     tells_share: bool = False
+    let_go: Callable[[TakeAnalysis], TakeAnalysis] | None = None
 
 
 def lay_on_one_axis(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -196,6 +198,18 @@ def build_figure(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
     return replace(analysis, posed=withhold_distances(estimate_poses(mounted, contacts, config.poses)))
 
 
+def keep_feet_alone(analysis: TakeAnalysis) -> TakeAnalysis:
+    """Of the orientations before mounting only the feet's, which `measure_walk` falls back on."""
+    fused = require_stage(analysis.fused, "orientation")
+    return replace(analysis, fused=replace(fused, q={s: q for s, q in fused.q.items() if s in FOOT.values()}))
+
+
+def keep_refined_alone(analysis: TakeAnalysis) -> TakeAnalysis:
+    """No orientations from before the estimator."""
+    mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
+    return replace(analysis, mounted=replace(mounted, orientations=posed.orientations))
+
+
 def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Joint angles; those that the estimator cannot stand behind are withheld."""
     posed, mounted = require_stage(analysis.posed, "poses"), require_stage(analysis.mounted, "mounting")
@@ -303,12 +317,16 @@ def _trunk_acceleration(analysis: TakeAnalysis, config: PipelineConfig) -> dict[
     if mounted is None or posed is None:
         return {}
     orientations = posed.orientations
-    acceleration = free_acceleration(mounted.calibrated, orientations)
+    worn, mounts = mounted.calibrated.recording.sensors, mounted.calibrated.calibration.segments
     uniform = drop_stuck_sensors(analysis.recording)
     return {
         s: np.where(
             orientations.valid[s][:, None],
-            in_walking_frame(acceleration[s], orientations.q[s], analysis.recording.rate_hz),
+            in_walking_frame(
+                remove_gravity(worn[s].acc, worn[s].valid, orientations.q[s], mounts[s]),
+                orientations.q[s],
+                analysis.recording.rate_hz,
+            ),
             np.nan,
         )
         if s in orientations.q
@@ -334,8 +352,10 @@ EVENTS: Final = PipelineStage(
     runs_after_problem=True,
 )
 TRUNK_EVENTS: Final = PipelineStage("events", 0.14, detect_trunk_steps, ("contacts",), ("lumbar", "turns"))
-MOUNTING: Final = PipelineStage("mounting", 0.15, mount_on_segments, ("mounted",), ("poses", "calibration"))
-POSES: Final = PipelineStage("poses", 0.4, build_figure, ("posed",), ("poses",))
+MOUNTING: Final = PipelineStage(
+    "mounting", 0.15, mount_on_segments, ("mounted",), ("poses", "calibration"), let_go=keep_feet_alone
+)
+POSES: Final = PipelineStage("poses", 0.4, build_figure, ("posed",), ("poses",), let_go=keep_refined_alone)
 ANGLES: Final = PipelineStage("angles", 0.95, compute_angles, ("angles",))
 PARAMETERS: Final = PipelineStage(
     "parameters", 0.98, measure_walk, ("tracks", "measured"), ("strides", "bouts"), runs_after_problem=True

@@ -17,11 +17,12 @@ def signals_parquet(recording: UniformRecording) -> bytes:
     """Write the signals as they entered calibration: nothing filtered, nothing turned."""
     columns: dict[str, np.ndarray] = {}
     for segment, s in recording.sensors.items():
-        lost = ~s.valid[:, None]
-        for name, values in (("acc", s.acc), ("gyr", np.degrees(s.gyr))):
-            kept = np.where(lost, np.nan, values).astype(np.float32)
-            unit = "_dps" if name == "gyr" else ""
-            columns |= {f"{segment}_{name}_{c}{unit}": kept[:, i] for i, c in enumerate("xyz")}
+        # one axis at a time: whole signals would be held twice, and once more by Arrow
+        for i, c in enumerate("xyz"):
+            columns[f"{segment}_acc_{c}"] = np.where(s.valid, s.acc[:, i], np.nan).astype(np.float32)
+        for i, c in enumerate("xyz"):
+            rate = np.where(s.valid, np.degrees(s.gyr[:, i]), np.nan)
+            columns[f"{segment}_gyr_{c}_dps"] = rate.astype(np.float32)
     meta = {
         "schema": SCHEMA,
         "rate_hz": recording.rate_hz,

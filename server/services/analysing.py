@@ -28,7 +28,7 @@ def run(
     from core.formats.json_tree import read_json
     from server.report.exports import analysis_files
 
-    result = analyse_files(files, manifest, config, progress)
+    result = analyse_files(files, manifest, config, progress, resumable=False)
     found = analysis_files(result)
     if result.setup is not None and result.setup.can_be_applied:
         declared = read_json(manifest) if manifest is not None else {}
@@ -43,6 +43,8 @@ def analyse_files(
     manifest: bytes | None,
     config: Mapping[str, Any] | None,
     progress: Progress,
+    *,
+    resumable: bool = True,
 ) -> TakeAnalysis:
     """Files of one take through the whole chain; pure but for `progress`.
 
@@ -51,6 +53,7 @@ def analyse_files(
     manifest : JSON text, None = nothing declared.
     config : overrides of PipelineConfig by stage, {"fusion": {"k_acc": 1.0}}; without any those of an archive
         of a visit among the files, else the defaults.
+    resumable : as `core.pipeline.analyse`.
 
     Raises
     ------
@@ -69,7 +72,7 @@ def analyse_files(
     tell("reading", 0.0)
     chosen = override_config(PipelineConfig(), choose_config(files, config))
     take = read_recording(files, parse_manifest(manifest) if manifest is not None else None)
-    return analyse(take, chosen, tell, CODE_VERSION)
+    return analyse(take, chosen, tell, CODE_VERSION, resumable=resumable)
 
 
 def choose_config(files: Sequence[SourceFile], config: Mapping[str, Any] | None) -> Mapping[str, Any]:

@@ -106,7 +106,7 @@ class ErkfTrack:
 
     Parameters
     ----------
-    nominal : (T, n, 16) as in `ErkfState`, of the smoother (T, n, 10) without biases.
+    nominal : (T, n, 16) as in `ErkfState`, of the smoother (T, n, 7) p (3) and q (4).
     heading_sd : (T, n) rad, of the filter, about the vertical.
     joint_residual : (T, joints) distance of the two ends of each joint, m.
     refused : (T, n) zero velocities that the gate refused.
@@ -123,14 +123,9 @@ class ErkfTrack:
         return self.nominal[..., 0:3]
 
     @property
-    def v(self) -> Floats:
-        """Sensor velocities (T, n, 3) in W, m/s."""
-        return self.nominal[..., 3:6]
-
-    @property
     def q(self) -> Floats:
         """Sensor orientations (T, n, 4)."""
-        return self.nominal[..., 6:10]
+        return self.nominal[..., 6:10] if self.nominal.shape[-1] == 16 else self.nominal[..., 3:7]
 
 
 def erkf_inputs(
@@ -220,16 +215,17 @@ def prepare_run(
     T, n = inputs.valid.shape
     _check(state, inputs, tree, params)
     rate = 1.0 / np.median(inputs.step_s[inputs.step_s > 0.0]) if np.any(inputs.step_s > 0.0) else 1.0
-    flags = (INVALID * ~inputs.valid + CONTACT * inputs.contact + STILL * inputs.still).astype(np.int64)
-    if inputs.patched is not None:
-        flags += PATCHED * inputs.patched
+    flags = np.zeros((T, n), np.uint8)
+    patched = () if inputs.patched is None else ((PATCHED, inputs.patched),)
+    for bit, told in ((INVALID, ~inputs.valid), (CONTACT, inputs.contact), (STILL, inputs.still), *patched):
+        flags[told] |= bit
     samples = ErkfSamples(
         np.ascontiguousarray(inputs.step_s),
         np.ascontiguousarray(inputs.acc),
         np.ascontiguousarray(inputs.gyr),
         flags,
         np.empty((0, n)) if inputs.heading is None else np.ascontiguousarray(inputs.heading),
-        np.empty((0, n)) if inputs.rolling is None else params.roll_m * inputs.rolling,
+        np.empty((0, n)) if inputs.rolling is None else np.ascontiguousarray(inputs.rolling),
     )
     return ErkfPass(
         memory_of(state),
@@ -269,7 +265,7 @@ def new_output(tree: ImuTree, samples: int, segment: int | None = None) -> ErkfO
         heading_sd=np.empty((samples, n)),
         residual=np.empty((samples, len(tree.joints))),
         refused=np.empty((samples, n), np.bool_),
-        smoothed=np.empty((0 if segment is None else samples, n, 10)),
+        smoothed=np.empty((0 if segment is None else samples, n, 7)),
     )
 
 
@@ -319,6 +315,7 @@ def noise_of(params: ErkfParams, rate_hz: float) -> Noise:
         gap_gyr=float(params.gap_gyr_sd),
         patch_acc=float(params.patch_acc_sd),
         patch_gyr=float(params.patch_gyr_sd),
+        roll_m=float(params.roll_m),
     )
 
 

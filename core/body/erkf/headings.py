@@ -129,8 +129,7 @@ def heading_errors(
     part = slice(first, min(n, first + length))
     mounts = {s: calibrated.calibration.segments[s].R_segment_sensor for s in segments}
     tree = person_tree(body, mounts, segments)
-    acc, gyr, valid = correct_signals(calibrated, segments)
-    inputs = erkf_inputs(tree, acc[part], gyr[part], valid[part], rate)
+    inputs = erkf_inputs(tree, *correct_signals(calibrated, segments, part), rate)
     q = np.stack([multiply(orientations.q[s][first], from_matrix(mounts[s])) for s in segments])
     rest = (0, zero.stop - first) if zero.start == first else None
     coarse = replace(params, states=9)

@@ -70,19 +70,19 @@ class ErkfMemory(NamedTuple):
 
 class ErkfSamples(NamedTuple):
     """A block: step (T,) s · acc, gyr (T, n, 3) · flags (T, n) · heading (T, n), or (0, n) for none ·
-    rolling (T, n) speed in m/s that a foot in contact may have beyond σ_v, or (0, n) for none."""
+    rolling (T, n) rad/s with which a foot in contact turns, or (0, n) for none."""
 
     step: Floats
     acc: Floats
     gyr: Floats
-    flags: NDArray[np.int64]
+    flags: NDArray[np.uint8]
     heading: Floats
     rolling: Floats
 
 
 class ErkfOutput(NamedTuple):
     """What a block gives: nominal (T, n, 16), of one segment where states are kept · heading_sd (T, n) ·
-    residual (T, J) · refused (T, n) · smoothed (T, n, 10) without biases, or (0, n, 10)."""
+    residual (T, J) · refused (T, n) · smoothed (T, n, 7) positions and orientations, or (0, n, 7)."""
 
     nominal: Floats
     heading_sd: Floats
@@ -131,6 +131,7 @@ class Noise(NamedTuple):
     gap_gyr: float
     patch_acc: float
     patch_gyr: float
+    roll_m: float
 
 
 class Links(NamedTuple):
@@ -213,7 +214,7 @@ def judge_contacts(memory, samples, k, noise, scratch, Q, refused):  # type: ign
         b, v = i * noise.m, x[i, 3:6]
         sd[i] = noise.zero_velocity
         if samples.rolling.shape[0] > 0:
-            sd[i] = np.sqrt(sd[i] ** 2 + samples.rolling[k, i] ** 2)
+            sd[i] = np.sqrt(sd[i] ** 2 + (noise.roll_m * samples.rolling[k, i]) ** 2)
         taken[i] = noise.gate < 0.0 or is_within_gate(P, b, v, sd[i], noise.gate)
         refused[i] = not taken[i]
         count[i] = 0 if taken[i] else count[i] + 1
@@ -436,7 +437,8 @@ def filter_segments(  # type: ignore[no-untyped-def]
             measure_smoothed(nominal, links, scratch, output.residual[a:b])
             for k in range(a, b):
                 for j in range(n):
-                    copy_row(nominal[k - a, j, : output.smoothed.shape[2]], output.smoothed[k, j])
+                    copy_row(nominal[k - a, j, 0:3], output.smoothed[k, j, 0:3])
+                    copy_row(nominal[k - a, j, 6:10], output.smoothed[k, j, 3:7])
     for r in range(N):
         for c in range(r):
             memory.P[c, r] = memory.P[r, c]

@@ -130,7 +130,7 @@ class LiveErkf:
         step = np.full(T, self._dt)
         if self._first and T:
             step[0], self._first = 0.0, False
-        flags = np.empty((T, n), np.int64)
+        flags = np.empty((T, n), np.uint8)
         _flag(signals.valid, signals.still, self._foot, flags)
         adrift = np.zeros((T, n), np.bool_)
         begins = list(self._settles(signals, adrift))

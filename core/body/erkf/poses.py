@@ -134,12 +134,13 @@ def place_figure(
     for side in legs:
         place |= _hang_together(run, orientations, place, side, body)
     floor = _floor({s: place[FOOT[s]][:, 2] - body.ankle_height for s in legs}, still)
-    lift = np.stack((np.zeros_like(floor), np.zeros_like(floor), floor), axis=1)
+    for p in place.values():
+        p[:, 2] -= floor
     return Poses(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
         q={s: orientations.q[s] for s in shown},
-        p={s: place[s] - lift for s in shown},
+        p=place,
         valid=np.logical_and.reduce([orientations.valid[s] for s in shown]),
         contact={FOOT[s]: contacts.get(s, still[s]) for s in legs},
         body=body,

@@ -61,6 +61,19 @@ def test_resumed_at_any_stage_is_the_whole(stage: str) -> None:
     assert same(resume(whole(*worn), stage), whole(*worn))
 
 
+def test_an_analysis_that_nobody_resumes_lets_go_of_earlier_orientations_and_finds_the_same() -> None:
+    worn: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
+    found, kept = analyse(take(*worn), resumable=False), whole(*worn)
+    for name in ("posed", "angles", "tracks", "measured", "calibration", "notices"):
+        assert same(getattr(found, name), getattr(kept, name)), name
+    assert kept.fused is not None
+    assert found.fused is not None
+    assert set(found.fused.q) == {"foot_l", "foot_r"} < set(kept.fused.q)
+    assert found.mounted is not None
+    assert found.posed is not None
+    assert found.mounted.orientations is found.posed.orientations
+
+
 @pytest.mark.slow
 def test_seven_sensors_resumed_where_their_mountings_are_found_are_the_whole() -> None:
     assert same(resume(whole(), "mounting"), whole())
