@@ -6,12 +6,13 @@ import datetime as dt
 import sys
 import threading
 import time
+import traceback
 from contextlib import closing
 from pathlib import Path
 
 import pytest
 from sqlalchemy import insert, select
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import IntegrityError, OperationalError
 
 from server import audit
 from server.main import main
@@ -139,6 +140,15 @@ def test_a_writer_that_waits_too_long_is_told_that_the_database_is_busy(
         with pytest.raises(OperationalError) as busy, two.write():
             pass
         assert is_busy(busy.value)
+
+
+def test_no_value_of_a_row_is_in_the_text_of_an_error(postgres: str) -> None:
+    with closing(Database(postgres)) as db:
+        for wrong in ({"code": "CANARY", "birth_year": 85}, {"code": "CANARY", "note": None}):
+            row = {"id": new_id(), "note": "", "created_at": now()} | wrong
+            with pytest.raises(IntegrityError, match="violates") as refused, db.write() as c:
+                c.execute(insert(patient).values(row))
+            assert "CANARY" not in "".join(traceback.format_exception(refused.value))
 
 
 def test_a_frozen_writer_is_forgotten(postgres: str, monkeypatch: pytest.MonkeyPatch) -> None:
