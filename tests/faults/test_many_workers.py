@@ -34,7 +34,7 @@ def test_every_job_ends_once_on_four_workers_that_are_killed_at_random(
         workers = Workers(replace(clinic.settings, workers=WORKERS))
         workers.start()
         try:
-            killed = kill_some(clinic, workers, random.Random(1))
+            killed = kill_some(clinic, workers, random.Random(1))  # noqa: S311 - repeatable
             ended = [clinic.ended(view) for view in views]
         finally:
             workers.stop()
