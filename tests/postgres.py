@@ -66,7 +66,16 @@ def start_server() -> str:
     secret.write_text(PASSWORD)
     secret.chmod(0o644)  # in a folder that is closed to others
     data = folder / "data"
-    make = [programs / "initdb", "-D", data, "-U", "sagittal", "-A", "scram-sha-256", f"--pwfile={secret}"]
+    make: list[str | Path] = [
+        programs / "initdb",
+        "-D",
+        data,
+        "-U",
+        "sagittal",
+        "-A",
+        "scram-sha-256",
+        f"--pwfile={secret}",
+    ]
     subprocess.run(
         [*make, "-E", "UTF8", "--locale=C", "--no-sync", "--no-instructions"],
         check=True, capture_output=True, cwd=folder, **runs_as,

@@ -16,7 +16,7 @@ from sqlalchemy import func, select
 from server.commands.serve import run, say
 from server.processes.compile_cache import has_compiled_filters
 from server.settings import load_settings
-from server.storage.db import Database
+from server.storage.db import Database, Source
 
 DEMO_WORKERS = 2
 
@@ -67,7 +67,7 @@ def demo(port: int | None) -> int:
                 process.wait()
 
 
-def _report(database: Path) -> None:
+def _report(database: Source) -> None:
     """Say on the console what is being waited for, until every session is analysed."""
     from server.demo.clinic import VISITS
     from server.services.recordings import ANALYSE

@@ -56,13 +56,12 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
             f"Another server ({error.holder}) is running on {settings.data_dir}; stop it first.\n"
         )
         return 1
+    served = contextlib.ExitStack()
     try:
         refuse_strangers(settings)
         upgrade(settings.database_source, backups=settings.backups)
-        served = contextlib.ExitStack()
         db = served.enter_context(closing(Database(settings.database_source)))
         if not served.enter_context(db.serve_alone()):
-            served.close()
             raise StrangersError(
                 "Another server is running on this PostgreSQL database; stop it first. To share its work, "
                 "start `sagittal worker` here instead."
@@ -70,6 +69,7 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
         listener = open_listener(settings.host, settings.port)
     except (StrangersError, MigrationError, OSError) as error:
         sys.stderr.write(f"{error}\n")
+        served.close()
         lock.release()
         return 1
     workers, keeper = Workers(settings), BackupKeeper(settings)

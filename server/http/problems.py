@@ -12,7 +12,7 @@ from urllib.parse import quote
 from fastapi import FastAPI
 from fastapi.exceptions import HTTPException, RequestValidationError
 from jinja2 import TemplateNotFound
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import DataError, OperationalError
 from starlette.exceptions import HTTPException as AnyHttpException
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
@@ -95,6 +95,8 @@ def as_problem(error: Exception) -> Problem:
         return Problem(507, refusal.value, refusal.sentence)
     if is_busy(error):
         return Problem(503, "database_busy", SENTENCES["database_busy"], headers={"Retry-After": "5"})
+    if isinstance(error, DataError):  # PostgreSQL is stricter than SQLite
+        return Problem(422, "not_storable", SENTENCES["not_storable"])
     return Problem(500, "internal_error", SENTENCES["internal_error"])
 
 
@@ -167,6 +169,7 @@ def install(app: FastAPI) -> None:
         SagittalError,
         RequestValidationError,
         OperationalError,
+        DataError,
         Exception,
     )
     for kind in all_kinds:
@@ -210,5 +213,6 @@ SENTENCES = {
     "not_found": "There is nothing at this address, or it has been deleted.",
     "method_not_allowed": "This address does not offer that method; see /api/v1/openapi.json.",
     "database_busy": "Another change takes unusually long. Try again in some seconds.",
+    "not_storable": "A text is too long or has a character that cannot be stored. Change it, then try again.",
     "internal_error": "Something went wrong on the server. The server's log has the details; try again.",
 }

@@ -7,6 +7,7 @@ accept(db, settings)            # somebody answers: this database is the right o
 
 from __future__ import annotations
 
+import threading
 import time
 from contextlib import closing
 
@@ -18,7 +19,7 @@ from server.services import erasure
 from server.settings import Settings
 from server.storage.blobs import INCOMING, BlobStore
 from server.storage.db import Database
-from server.storage.high_water import explain_lost_rows, set_mark
+from server.storage.high_water import explain_lost_rows, read_newest, set_mark
 from server.storage.migrate import exists
 from server.storage.tables import audit as audit_table
 from server.storage.tables import patient
@@ -55,11 +56,14 @@ def refuse_strangers(settings: Settings) -> None:
         raise StrangersError(text)
 
 
-def refuse_foreign_folder(db: Database, settings: Settings, patience_s: float = 10.0) -> None:
+def refuse_foreign_folder(
+    db: Database, settings: Settings, stop: threading.Event, patience_s: float = 10.0
+) -> None:
     """Raise StrangersError where this host's data folder or clock is not that of the PostgreSQL database.
 
     A worker elsewhere needs the server's own folder of stored files (shared by the network), and leases need
-    clocks that agree. The server writes the mark some seconds after the first row.
+    clocks that agree. The server writes the mark some seconds after the first row of the audit log; until
+    there is one nobody has work, and this waits (`stop` ends it).
     """
     theirs = db.read_clock()
     if theirs is None:
@@ -71,8 +75,15 @@ def refuse_foreign_folder(db: Database, settings: Settings, patience_s: float = 
             f"{settings.lease_s / 3:.1f}. Set both by NTP."
         )
     until = time.monotonic() + patience_s
-    while not settings.mark.exists() and time.monotonic() < until:
-        time.sleep(0.2)
+    while not settings.mark.exists() and not stop.wait(0.2):
+        with db.read() as c:
+            nobody_works = read_newest(c) is None
+        if nobody_works:
+            until = time.monotonic() + patience_s
+        elif time.monotonic() > until:
+            break
+    if stop.is_set():
+        return
     with db.read() as c:
         lost = explain_lost_rows(c, settings.mark)
     if lost is not None or not settings.mark.exists():

@@ -34,7 +34,7 @@ from server.storage.archive import PIECE, ArchivedFile, ClinicKey, read_archive
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.high_water import HighWater, read_newest, set_mark
-from server.storage.migrate import MigrationError, copy_database, exists, upgrade
+from server.storage.migrate import MigrationError, copy_database, exists, require_current, upgrade
 from server.storage.person_tables import api_token
 from server.storage.report_tables import report_link
 from server.storage.tables import login_session, now, one_time_token, patient, session
@@ -177,12 +177,15 @@ def _require_empty(settings: Settings) -> None:
 
 
 def _has_database(settings: Settings) -> bool:
-    """Whether a clinic is in it already: a file, or rows on the server."""
+    """Whether a clinic is in it already: a file, or rows on the server; tables of another version are one."""
     if not settings.database_url:
         return settings.database.exists()
     if not exists(settings.database_source):
         return False
-    upgrade(settings.database_source, backups=settings.backups)
+    try:
+        require_current(settings.database_source)
+    except MigrationError:
+        return True
     with closing(Database(settings.database_source)) as db, db.read() as c:
         return read_newest(c) is not None or count_patients_and_sessions(c) != (0, 0)
 

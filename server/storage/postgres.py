@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, inspect, make_url
+from sqlalchemy.engine import ExceptionContext
 from sqlalchemy.exc import DBAPIError, OperationalError
 
 from server.storage.columns import metadata
@@ -168,7 +169,7 @@ class PostgresServer:
             "idle_in_transaction_session_timeout": f"{forgotten_s}s",
         }
         # pre-ping: PostgreSQL may have been restarted since a connection was used last
-        return create_engine(
+        engine = create_engine(
             self._url,
             **{"max_overflow": MAX_READERS, "pool_pre_ping": True, "hide_parameters": True} | options,
             connect_args={
@@ -177,6 +178,19 @@ class PostgresServer:
                 "options": " ".join(f"-c {name}={value}" for name, value in told.items()),
             },
         )
+        event.listen(engine, "handle_error", _hide_details)
+        return engine
+
+
+def _hide_details(context: ExceptionContext) -> None:
+    """Take the row's values out of an error's text, which goes to the log: they may be a patient's."""
+    raw, wrapped = context.original_exception, context.sqlalchemy_exception
+    short = getattr(getattr(raw, "diag", None), "message_primary", None)
+    if short is None:
+        return
+    said, raw.args = str(raw), (short,)
+    if wrapped is not None:
+        wrapped.args = tuple(str(part).replace(said, short) for part in wrapped.args)
 
 
 def _outlive_readers(c: Connection) -> bool:

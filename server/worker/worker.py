@@ -269,7 +269,7 @@ def run_worker(settings: Settings, *, with_starter: bool = False) -> None:
         call_when_parent_ends(stop.set)
     db = Database(settings.database_source)
     try:
-        custody.refuse_foreign_folder(db, settings)
+        custody.refuse_foreign_folder(db, settings, stop)
         queue = TableQueue(db, settings.lease_s)
         Worker(settings, db, BlobStore(settings.blobs), queue, stop).run()
     finally:

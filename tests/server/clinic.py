@@ -73,7 +73,7 @@ class Clinic:
 async def open_clinic(folder: Path, **settings: Any) -> AsyncIterator[Clinic]:
     """Start an application on a folder and stop it again; estimators only if `live_workers` says so."""
     options = Settings(data_dir=folder, **{"live_workers": 0, **settings})
-    if not options.database.exists():
+    if not options.database_url and not options.database.exists():
         write_database(options.database)
     app = create_app(options)
     async with app.router.lifespan_context(app):

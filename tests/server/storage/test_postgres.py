@@ -6,12 +6,14 @@ import datetime as dt
 import sys
 import threading
 import time
+import traceback
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from sqlalchemy import insert, select
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import IntegrityError, OperationalError
 
 from server import audit
 from server.main import main
@@ -27,8 +29,9 @@ from server.storage.tables import metadata, new_id, now, patient, user
 from tests.databases import write_database
 from tests.engines import require_postgres
 from tests.postgres import PASSWORD, run_sql
+from tests.server.clinic import ORIGIN, open_clinic
 
-pytestmark = pytest.mark.postgres
+pytestmark = [pytest.mark.postgres, pytest.mark.anyio]
 
 
 def test_every_reason_why_it_cannot_be_used_is_a_sentence(
@@ -141,6 +144,25 @@ def test_a_writer_that_waits_too_long_is_told_that_the_database_is_busy(
         assert is_busy(busy.value)
 
 
+def test_no_value_of_a_row_is_in_the_text_of_an_error(postgres: str) -> None:
+    with closing(Database(postgres)) as db:
+        for wrong in ({"code": "CANARY", "birth_year": 85}, {"code": "CANARY", "note": None}):
+            row = {"id": new_id(), "note": "", "created_at": now()} | wrong
+            with pytest.raises(IntegrityError, match="violates") as refused, db.write() as c:
+                c.execute(insert(patient).values(row))
+            assert "CANARY" not in "".join(traceback.format_exception(refused.value))
+
+
+async def test_what_only_postgres_refuses_is_a_problem_of_the_request(tmp_path: Path, postgres: str) -> None:
+    async with open_clinic(tmp_path, database_url=postgres) as clinic, clinic.client("clinician") as client:
+        for note, status in (("as usual", 201), ("\0", 422)):
+            answer = await client.post(
+                f"{ORIGIN}/api/v1/patients", json={"code": f"P-{status}", "note": note}
+            )
+            assert answer.status_code == status
+        assert answer.json()["code"] in {"not_storable", "invalid_request"}
+
+
 def test_a_frozen_writer_is_forgotten(postgres: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.storage.postgres.FORGOTTEN_S", 1)
     with closing(Database(postgres)) as frozen, closing(Database(postgres)) as other:
@@ -170,15 +192,20 @@ def test_a_worker_elsewhere_needs_the_servers_folder_and_its_time(
     elsewhere.mkdir()
     settings = Settings(data_dir=here, database_url=postgres)
     with closing(Database(postgres)) as db:
+        stop = threading.Event()
+        threading.Timer(0.5, stop.set).start()
+        refuse_foreign_folder(db, settings, stop, patience_s=0.0)  # no row yet: it waits to be told
+        assert stop.is_set()
+        stop.clear()
         with db.write() as c:
             patients.create(c, None, code="P-1")
         set_mark(db, settings.mark)
-        refuse_foreign_folder(db, settings)
+        refuse_foreign_folder(db, settings, stop)
         with pytest.raises(StrangersError, match="Share that folder"):
-            refuse_foreign_folder(db, Settings(data_dir=elsewhere, database_url=postgres), patience_s=0.0)
+            refuse_foreign_folder(db, replace(settings, data_dir=elsewhere), stop, patience_s=0.0)
         monkeypatch.setattr("time.time", lambda: 0.0)
         with pytest.raises(StrangersError, match="clock"):
-            refuse_foreign_folder(db, settings)
+            refuse_foreign_folder(db, settings, stop)
 
 
 def test_what_was_erased_is_in_no_table_of_the_disk_and_who_reads_only_delays_it(
