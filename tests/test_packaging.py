@@ -67,7 +67,7 @@ LOCKS = {
 @pytest.mark.parametrize("name", LOCKS)
 def test_the_lock_covers_what_is_declared_and_every_version_has_hashes(name: str) -> None:
     text = (ROOT / name).read_text("utf-8")
-    entries = re.findall(r"^([\w.-]+)==(\S+)(.*(?:\\\n.*)*)", text, re.MULTILINE)
+    entries = re.findall(r"^([\w.-]+)==(\S+)((?:.*\\\n)*.*)$", text, re.MULTILINE)
     locked: dict[str, list[Version]] = {}
     for package, version, rest in entries:
         locked.setdefault(canonicalize_name(package), []).append(Version(version))

@@ -32,6 +32,7 @@ DEEDS: Final[Mapping[str, str]] = {
     "patient.created": "added the patient",
     "patient.changed": "changed what is said of the patient",
     "patient.exported": "took along everything that is stored of the patient",
+    "patient.deidentified": "took along results of the patient for research, without the name",
     "patient.erased": "deleted the patient with all recordings",
     "note.added": "wrote a note",
     "note.removed": "removed a note",

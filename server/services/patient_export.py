@@ -10,7 +10,6 @@ What belongs to a patient is found by the references of the tables, so a new tab
 from __future__ import annotations
 
 import datetime as dt
-import io
 import json
 import zipfile
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, Table, or_, select
 
+from server.export.zipping import ZipSink
 from server.services import patients
 from server.services.provenance import CODE_VERSION
 from server.storage.archive import PIECE
@@ -88,7 +88,7 @@ def _zip(
     trail: list[dict[str, Any]],
     people: dict[str, str],
 ) -> Iterator[bytes]:
-    sink = _Sink()
+    sink = ZipSink()
     missing = []
     # stored as it is: recordings hardly shrink, and the server has others to serve
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_STORED) as archive:
@@ -139,23 +139,3 @@ def _plain(value: object) -> object:
 
 def _dump(tree: object) -> str:
     return json.dumps(tree, ensure_ascii=False, indent=1, default=_plain)
-
-
-class _Sink(io.RawIOBase):
-    """What a zip is written into: it cannot go back, and hands on what came."""
-
-    def __init__(self) -> None:
-        self._pieces: list[bytes] = []
-
-    def writable(self) -> bool:
-        return True
-
-    def write(self, data: Any) -> int:
-        self._pieces.append(bytes(data))
-        return len(data)
-
-    def take(self) -> bytes:
-        """What has come since it was last asked."""
-        taken = b"".join(self._pieces)
-        self._pieces.clear()
-        return taken

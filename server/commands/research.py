@@ -1,0 +1,73 @@
+"""`sagittal research`: de-identified results of patients for research, and who is behind a pseudonym."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+
+from server.settings import load_settings
+
+
+def research(
+    data_dir: Path | None,
+    out: Path | None,
+    key: Path,
+    patients: Sequence[str],
+    signals: bool,
+    without_consent: bool,
+    who: str | None,
+) -> int:
+    """Write the zip, or name the patient behind a pseudonym; 1 when that is not possible.
+
+    Parameters
+    ----------
+    out : zip to write. key : the clinic's key; a new one is made where there is none. patients : their codes,
+        none = all. without_consent : also those who have no consent to research written down.
+    who : a pseudonym; nothing is written.
+    """
+    from core.errors import SagittalError
+    from server.services import deidentified
+    from server.storage import fs
+    from server.storage.blobs import BlobStore
+    from server.storage.db import Database
+    from server.storage.migrate import MigrationError, require_current
+
+    settings = load_settings({"data_dir": data_dir})
+    try:
+        require_current(settings.database)
+        if out is None and who is None:
+            raise SagittalError("nothing_asked", "Name the zip to write, or a pseudonym with --who.")
+        is_new = not key.exists()
+        if who is not None and is_new:
+            raise SagittalError("no_key", f"{key} is not there; give the key of the pseudonym.")
+        secret = deidentified.open_key(key)
+        with closing(Database(settings.database)) as db:
+            with db.read() as c:
+                if who is not None:
+                    found = deidentified.find_person(c, secret, who)
+                    sys.stdout.write(f"{who} is {found.code}\n" if found else f"{who} is nobody here\n")
+                    return 0 if found else 1
+                asked = deidentified.list_chosen(c, patients)
+                chosen = [p for p in asked if without_consent or deidentified.has_agreed(c, p.id)]
+            if not chosen:
+                raise SagittalError("nobody", "None of them has agreed to research; see --without-consent.")
+            target = (out or Path()).absolute()
+            fs.make_folder(target.parent)
+            with fs.IncomingFile(target.parent) as incoming:
+                for piece in deidentified.export_deidentified(
+                    db, BlobStore(settings.blobs), secret, chosen, with_signals=signals
+                ):
+                    incoming.write(piece)
+                incoming.keep(target)
+    except (MigrationError, SagittalError) as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    if is_new:
+        sys.stdout.write(f"{key} is a new key: who has it can lead pseudonyms back. Keep it in the clinic.\n")
+    sys.stdout.write(
+        f"Written: {target}, {len(chosen)} patients; {len(asked) - len(chosen)} have not agreed.\n"
+    )
+    sys.stdout.flush()
+    return 0
