@@ -41,11 +41,14 @@ def measure_foot_lag(events: GaitEvents, params: AlternationParams) -> float | N
     """Time by which the right foot seems later than the left one, s; None with too few steps."""
     after: dict[Side, Floats] = {}
     for side, other in zip(SIDES, reversed(SIDES), strict=True):
-        contact, lift = np.array(events.times(side, "ic")), np.array(events.times(other, "tc"))
+        contact, lift = np.array(events.times(side, "ic")), np.sort(events.times(other, "tc"))
         if not len(contact) or not len(lift):
             return None
-        apart = lift[None, :] - contact[:, None]
-        nearest = apart[np.arange(len(contact)), np.argmin(np.abs(apart), axis=1)]
+        # the lifts before and after; all pairs would take gigabytes of a take of hours
+        next_one = np.searchsorted(lift, contact)
+        before = lift[np.maximum(next_one - 1, 0)] - contact
+        behind = lift[np.minimum(next_one, len(lift) - 1)] - contact
+        nearest = np.where(np.abs(before) <= np.abs(behind), before, behind)
         after[side] = nearest[np.abs(nearest) < FURTHEST_S]
         if len(after[side]) < params.least_steps:
             return None

@@ -342,8 +342,7 @@ def copy_row(source, target):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def keep_state(memory, row):  # type: ignore[no-untyped-def]
     """Write the state into one row (`row_length`,), of P what is on and below the diagonal."""
-    x, before, P = memory.x, memory.before, memory.P
-    at = 0
+    x, before, P, at = memory.x, memory.before, memory.P, 0
     for i in range(x.shape[0]):
         for c in range(16):
             row[at + c] = x[i, c]
@@ -361,8 +360,7 @@ def keep_state(memory, row):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def restore_state(memory, row):  # type: ignore[no-untyped-def]
     """The way back of `keep_state`; above the diagonal P stays as it is."""
-    x, before, P = memory.x, memory.before, memory.P
-    at = 0
+    x, before, P, at = memory.x, memory.before, memory.P, 0
     for i in range(x.shape[0]):
         for c in range(16):
             x[i, c] = row[at + c]
