@@ -78,7 +78,7 @@ WORDS: Final = frozenset(
         r"\S+",
         """
     above acceleration active admin affected after ago anatomical and ankle assessment assessments
-    assistant bad bar barefoot bars baseline before below both bouts cane centimetres chest clinician
+    assistant bad bar barefoot bars baseline before below both bouts cane centimetres changed chest clinician
     consistent copies copy crutch days degrees early ended estimated exact fading failed fast faster feet
     female flexion foot frontal further good gravity harness heading higher hip inclination inconsistent
     inside insoles inward kinematic knee larger late left less longer low lower male mean measured median

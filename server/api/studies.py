@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter
 from starlette.responses import Response
@@ -17,10 +17,12 @@ from server.export.zipping import zip_files
 from server.services import studies
 
 router = APIRouter(tags=["exports"])
-_ZIP = {200: {"description": "The tables", "content": {"application/zip": {"schema": BINARY}}}}
+_ANSWERS: dict[int | str, dict[str, Any]] = refusals(409) | {
+    200: {"description": "The tables", "content": {"application/zip": {"schema": BINARY}}}
+}
 
 
-@router.get("/study.zip", response_class=Response, responses={**_ZIP, **refusals(409)})
+@router.get("/study.zip", response_class=Response, responses=_ANSWERS)
 def make_study(
     db: Db,
     reviewed: Reviewed,

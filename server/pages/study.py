@@ -46,6 +46,6 @@ def show_study(
         ticked=len(found) <= TICKED_AT_MOST,
         asked=asked,
         all=f"/api/v1/study.zip?{urlencode(asked)}",
-        protocols=[("", "Any"), *PROTOCOL_NAMES.items()],
+        protocols=[("", "All"), *PROTOCOL_NAMES.items()],
         names=PROTOCOL_NAMES,
     )  # fmt: skip

@@ -162,7 +162,7 @@ def _collect_params(
         "edits": [e.to_json() for e in edits.edits],
         "visit": _describe_visit(patient, AnalysedSession(session, found, edits)).to_json(),
     }
-    params = {kind.name: {**shared, "kind": kind.name} for kind in wanted}
+    params: dict[str, dict[str, Any]] = {kind.name: {**shared, "kind": kind.name} for kind in wanted}
     handed_on = [kind.name for kind in wanted if kind.hands_on_signed]
     signed = signed_reports.find_documents(c, session.id) if handed_on else None
     if signed is not None:

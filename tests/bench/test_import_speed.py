@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
+import json
 import sys
 
 import numpy as np
 import pytest
 from pyarrow import csv
 
-from core.formats import SourceFile, read_recording, write_recording
+from core.formats import SourceFile, device_motion, read_recording, write_recording
 from core.formats.text import to_utf8
 from core.formats.vendors import find_vendor
 from tests.bench.pairs import in_pairs
@@ -91,3 +92,16 @@ def test_a_stored_take_is_smaller_and_faster_than_its_text(files: list[SourceFil
     )
     assert packed < 0.5 * plain
     assert ratio < 1.0
+
+
+@pytest.mark.bench
+def test_a_phone_costs_at_most_three_times_what_parsing_its_json_does() -> None:
+    name, make = VENDOR_SAMPLES["DeviceMotion JSON"]
+    data = json.dumps({"events": json.loads(make())["events"] * 60}).encode()
+    ours, theirs, ratio = in_pairs(lambda: device_motion.read(data, name), lambda: json.loads(data))
+    size = len(data) / 1e6
+    sys.stdout.write(
+        f"\nDeviceMotion JSON: {size:.1f} MB at {size / ours:.0f} MB/s of CPU, Python's JSON alone at "
+        f"{size / theirs:.0f} MB/s: {ratio:.2f} times its CPU\n"
+    )
+    assert ratio <= 3.0

@@ -46,6 +46,7 @@ PAGES: dict[str, Address] = {
     "report": lambda f: f"/sessions/{f.done}/report",
     "leaflet": lambda f: f"/sessions/{f.done}/leaflet",
     "course": lambda f: f"/patients/{f.patient}/course",
+    "study": lambda f: "/study",
     "jobs": lambda f: "/jobs",
     "sensors": lambda f: "/sensors",
     "users": lambda f: "/users",
