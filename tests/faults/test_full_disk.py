@@ -188,7 +188,7 @@ async def test_a_disk_that_became_read_only_is_said_and_can_be_read(disk: Path, 
             engines = clinic.db._reader, clinic.db._writer
             clinic.db._reader, clinic.db._writer = there._reader, there._writer
             blobs = clinic.app.state.blobs
-            blobs.root, blobs._incoming = frozen / "blobs", frozen / "blobs" / "incoming"
+            blobs.root, blobs.incoming = frozen / "blobs", frozen / "blobs" / "incoming"
             await _use_read_only(v)
             there.close()
             clinic.db._reader, clinic.db._writer = engines
