@@ -12,7 +12,7 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, Reviewed
-from server.pages.session_context import read_context
+from server.pages.session_context import read_measured_context
 from server.pages.shell import record_opening, render_page
 from server.services import analyses, edit_log, reports
 
@@ -30,7 +30,7 @@ def show_parameter(
 ) -> Response:
     """One parameter of a session with every stride behind it."""
     with db.read() as c:
-        context = read_context(c, sid)
+        context = read_measured_context(c, sid)
         found = analyses.get_shown(c, sid)
         edits = edit_log.edits_of(c, found.id)
     number = reports.behind_number(

@@ -34,7 +34,7 @@ from server.pages.report_rows import (
     select_groups,
     select_others,
 )
-from server.pages.session_context import lead_to_days, read_context
+from server.pages.session_context import lead_to_days, read_measured_context
 from server.pages.shell import FRAGMENT, record_opening, render_page, render_sheets
 from server.pages.takes import view_takes
 from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
@@ -186,7 +186,7 @@ def gather_report(
     """What a page or the sheets of a session's report show; `report` is None where nothing is analysed."""
     paper = template == PAPER
     with db.read() as c:
-        context = read_context(c, sid)
+        context = read_measured_context(c, sid)
         patient = context["patient"]
         done = histories.list_analysed(c, patient.id) if who.may(Action.READ_RESULT) else []
         this = next((a for a in done if a.session.id == sid), None)

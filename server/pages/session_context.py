@@ -45,7 +45,6 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
     return {
         "session": session,
         "patient": patient,
-        "controls": controls.list_visits(c, patient, session),
         "curves": _may_have_curves(c, session),
         "recording": session.state != "empty",
         "job": None if job is None else view_job(job),
@@ -54,6 +53,12 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
         "damages": live.list_damages(c, session_id),
         "report": None,
     }
+
+
+def read_measured_context(c: Connection, session_id: str) -> dict[str, Any]:
+    """The same with the visits of the clinic's controls, for pages that show figures beside theirs."""
+    context = read_context(c, session_id)
+    return context | {"controls": controls.list_visits(c, context["patient"], context["session"])}
 
 
 def _may_have_curves(c: Connection, session: Session) -> bool:

@@ -17,7 +17,7 @@ from server.http.templates import render
 from server.pages.charts import KEY_HEIGHT, draw_chart
 from server.pages.report_rows import select_first
 from server.pages.session import explain_emptiness
-from server.pages.session_context import lead_to_days, read_context
+from server.pages.session_context import lead_to_days, read_measured_context
 from server.pages.shell import FRAGMENT, record_opening, render_page
 from server.services import analyses, edit_log, reports, signals
 from server.services.reviewed import ReviewedAnalyses
@@ -35,7 +35,7 @@ def show_timeline(
 ) -> Response:
     """Strides, events and signals over time, to look at and to correct."""
     with db.read() as c:
-        context = read_context(c, sid)
+        context = read_measured_context(c, sid)
         if elsewhere := lead_to_days(context):
             return elsewhere
         latest = analyses.latest(c, sid)
@@ -62,7 +62,7 @@ def show_numbers(
     if FRAGMENT not in request.headers:
         return RedirectResponse(f"/sessions/{sid}/timeline#numbers", status_code=303)
     with db.read() as c:
-        context = read_context(c, sid)
+        context = read_measured_context(c, sid)
         latest = analyses.get_shown(c, sid)
         edits = edit_log.edits_of(c, latest.id)
     trail.record_watched(who, "numbers.opened", "session", sid)

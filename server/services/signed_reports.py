@@ -212,14 +212,19 @@ def find_in_force(c: Connection, session_id: str) -> SignedReport | None:
 
 def find_documents(c: Connection, session_id: str) -> SignedDocuments | None:
     """The version in force with its document and PDF; None where nothing is signed."""
-    found = find_in_force(c, session_id)
-    if found is None:
-        return None
-    query = select(report_file).where(
-        report_file.c.report_id == found.id, report_file.c.name.in_((DOCUMENT, PDF))
+    query = (
+        select(*_NAMES, report_file.c.name, report_file.c.sha256, report_file.c.size)
+        .join(report_file, report_file.c.report_id == signed_report.c.id)
+        .where(signed_report.c.session_id == session_id, signed_report.c.reopened_at.is_(None))
+        .where(report_file.c.name.in_((DOCUMENT, PDF)))
+        .order_by(report_file.c.name)
     )
-    rows = c.execute(query.order_by(report_file.c.name))
-    return SignedDocuments(found, {row.name: Blob(row.sha256, row.size) for row in rows})
+    rows = list(c.execute(query))
+    files = {row.name: Blob(row.sha256, row.size) for row in rows}
+    if DOCUMENT not in files:
+        return None
+    values = {name: getattr(rows[0], name) for name in SignedReport.__dataclass_fields__ if name != "sha256"}
+    return SignedDocuments(SignedReport(**values, sha256=files[DOCUMENT].sha256), files)
 
 
 def find_file(c: Connection, report_id: str, name: str) -> tuple[str, str | None]:
