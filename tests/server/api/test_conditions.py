@@ -279,8 +279,8 @@ async def test_paper_has_the_sentences_that_its_numbers_refer_to_the_changes_and
     for words in ("What stands out", "Changed since 2 Mar 2026", "Sagittal profile score"):
         assert words in paper
         assert words in screen
-    sentences = paper[paper.index('class="r-short"') : paper.index("<h2>Parameters</h2>")]
-    table = paper[paper.index("<h2>Parameters</h2>") :]
+    begins = paper.index("r-tbl params")
+    sentences, table = paper[paper.index('class="r-short"') : begins], paper[begins:]
     told, marked = (
         set(re.findall(r'class="rank" aria-hidden="true">(\d)', part)) for part in (sentences, table)
     )
