@@ -14,7 +14,7 @@ from fastapi import FastAPI
 from server.auth.sessions import Logins
 from server.auth.throttle import Throttle
 from server.jobs.feed import JobFeed
-from server.jobs.table import TableQueue
+from server.jobs.opening import open_queue
 from server.live.hub import Hub
 from server.metrics import StateCollector
 from server.processes.supervisor import Workers
@@ -69,7 +69,7 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     app.state.reviewed = ReviewedAnalyses(app.state.blobs)
     await asyncio.to_thread(_look_after, db, app.state.blobs, settings)
     app.state.trail = AuditTrail(db)
-    app.state.queue = TableQueue(db, settings.lease_s)
+    app.state.queue = open_queue(db, settings.lease_s)
     app.state.feed = JobFeed(db)
     app.state.throttle = Throttle()
     app.state.logins = Logins(

@@ -26,8 +26,10 @@ def start_log(settings: Settings, handler: logging.Handler | None = None) -> Non
     handler.addFilter(_add_request_id)
     handler.setFormatter(JsonLines() if settings.log_format == "json" else _Lines())
     logging.basicConfig(level=logging.INFO, handlers=[handler])
-    for library in ("alembic", "weasyprint", "fontTools"):
+    for library in ("alembic", "procrastinate", "weasyprint", "fontTools"):
         logging.getLogger(library).setLevel(logging.WARNING)
+    # it warns of every attempt; that there is no line to PostgreSQL is said once, by who needs it
+    logging.getLogger("psycopg.pool").setLevel(logging.ERROR)
 
 
 class JsonLines(logging.Formatter):

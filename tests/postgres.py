@@ -140,9 +140,10 @@ BEGIN
         WHERE datname = current_database() AND pid <> pg_backend_pid();
     SET LOCAL session_replication_role = replica;  -- without triggers and references
     FOR one IN
-        SELECT tablename FROM pg_tables WHERE schemaname = 'public' AND tablename <> 'alembic_version'
+        SELECT format('%I.%I', schemaname, tablename) FROM pg_tables
+        WHERE schemaname IN ('public', 'procrastinate') AND tablename <> 'alembic_version'
     LOOP
-        EXECUTE format('DELETE FROM %I', one);
+        EXECUTE 'DELETE FROM ' || one;
     END LOOP;
     PERFORM setval(sequencename::regclass, 1, false) FROM pg_sequences WHERE schemaname = 'public';
 END $$"""

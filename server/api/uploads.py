@@ -35,7 +35,7 @@ class UploadAnnouncement(schemas.Request):
     """A file that will come in parts."""
 
     name: Annotated[str, StringConstraints(min_length=1, max_length=500)]
-    size: Annotated[int, Field(ge=1, le=1 << 53, strict=True, description="bytes")]
+    size: Annotated[int, Field(ge=1, le=1 << 53, description="bytes")]
 
 
 class UploadEnd(schemas.Request):

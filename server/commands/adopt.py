@@ -46,13 +46,13 @@ def _list(settings: Settings) -> int:
 
 
 def _adopt(settings: Settings, take: str, session: str) -> int:
-    from server.jobs.table import TableQueue
+    from server.jobs.opening import open_queue
     from server.services import live_logs
     from server.storage.blobs import BlobStore
     from server.storage.db import Database
 
     with closing(Database(settings.database_source)) as db:
-        queue = TableQueue(db, settings.lease_s)
+        queue = open_queue(db, settings.lease_s)
         live_logs.adopt(db, BlobStore(settings.blobs), settings, queue, None, take, session)
     sys.stdout.write(f"It is the newest recording of /sessions/{session} now and will be analysed.\n")
     sys.stdout.flush()

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from core.condition import USUAL, WalkingCondition
 from core.frames import SEGMENTS, Segment, Side
-from server.jobs.table import TableQueue
+from server.jobs.opening import open_queue
 from server.services import analyses, patients, prescriptions, recordings, sessions
 from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings, load_settings
@@ -191,7 +191,7 @@ def _add(
             upload.write(content)
             upload.keep()
     with db.write() as c:
-        queue = TableQueue(db, settings.lease_s)
+        queue = open_queue(db, settings.lease_s)
         recordings.set_manifest(c, None, session.id, manifest)
         recordings.inspect(c, queue, None, session.id)
         analyses.submit(c, queue, None, session.id)

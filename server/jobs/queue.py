@@ -9,7 +9,9 @@ it as a fence. A write that meets no row means that the job has gone to somebody
 from __future__ import annotations
 
 import datetime as dt
+import threading
 from collections.abc import Callable, Collection, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Any, Final, Literal, Protocol
@@ -20,6 +22,8 @@ from server.storage.tables import job
 
 Publish = Callable[[Connection], None]
 """Writes a result's rows; called inside the transaction that marks the job done."""
+Wait = Callable[[threading.Event], object]
+"""Returns when there may be a job to claim, or soon after the event is set."""
 
 
 TUNE: Final = "tune"
@@ -169,3 +173,6 @@ class JobQueue(Protocol):
 
     def release(self, claim: Claim) -> bool:
         """Give the job back unharmed because the worker shuts down."""
+
+    def listen(self) -> AbstractContextManager[Wait]:
+        """While the block runs, an idle worker can wait for a job that may be claimed."""

@@ -7,15 +7,18 @@ taken for a dead one: the clock was set back; the fence keeps a mistake in that 
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, and_, insert, or_, select, update
 
-from server.jobs.queue import VIEW_COLUMNS, Claim, JobView, LeaseState, Priority, Publish, job_view
+from server.jobs.queue import VIEW_COLUMNS, Claim, JobView, LeaseState, Priority, Publish, Wait, job_view
 from server.storage.db import Database
 from server.storage.tables import ACTIVE_STATES, job, new_id, now
 
+POLL_S = 0.2
+"""Pause between two looks for work; a look is one read of an index."""
 MAX_DEATHS = 3
 """Silent deaths of workers after which a job is given up."""
 
@@ -79,7 +82,9 @@ class TableQueue:
             "cancel_requested": False,
             "created_at": self._clock(),
         }
-        return job_view(c.execute(insert(job).values(values).returning(*VIEW_COLUMNS)).one())
+        view = job_view(c.execute(insert(job).values(values).returning(*VIEW_COLUMNS)).one())
+        self._announce(c, view.id)
+        return view
 
     def get(self, job_id: str) -> JobView | None:
         """See JobQueue."""
@@ -197,7 +202,20 @@ class TableQueue:
 
     def release(self, claim: Claim) -> bool:
         """See JobQueue."""
-        return self._fenced(claim, state="queued", worker=None, lease_until=None)
+        with self._db.write() as c:
+            free = {"state": "queued", "worker": None, "lease_until": None}
+            if c.execute(update(job).where(_fence(claim)).values(**free)).rowcount != 1:
+                return False
+            self._announce(c, claim.job_id)
+        return True
+
+    @contextmanager
+    def listen(self) -> Iterator[Wait]:
+        """See JobQueue; the table is looked at again and again."""
+        yield lambda stop: stop.wait(POLL_S)
+
+    def _announce(self, c: Connection, job_id: str) -> None:
+        """Tell idle workers of a job that waits, with the commit; here they look for themselves."""
 
     def _fenced(self, claim: Claim, **values: object) -> bool:
         with self._db.write() as c:

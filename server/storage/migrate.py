@@ -31,8 +31,8 @@ SOURCE = Path(server.__file__).parent.parent / "migrations"
 
 
 NO_DRIVER = (
-    "PostgreSQL needs the library psycopg, which is not installed. Install Sagittal with its extra: "
-    "pip install '.[postgres]'."
+    "PostgreSQL needs the libraries psycopg and procrastinate, which are not installed. Install Sagittal "
+    "with its extra: pip install '.[postgres]'."
 )
 
 
@@ -102,14 +102,15 @@ def upgrade(
         backups = backups or database.parent / "backups"
     at = _known(config, database)
     wanted = ScriptDirectory.from_config(config).as_revision_number(target)
-    if at == wanted:
-        return None
     backup = None
-    if at is not None:
-        if backups is None:
-            raise MigrationError("The database is older. Start the server, or run `sagittal migrate`.")
-        backup = _backup(database, at, backups, scripts)
-    command.upgrade(config, target)
+    if at != wanted:
+        if at is not None:
+            if backups is None:
+                raise MigrationError("The database is older. Start the server, or run `sagittal migrate`.")
+            backup = _backup(database, at, backups, scripts)
+        command.upgrade(config, target)
+    if isinstance(database, str):
+        _prepare_delivery(database)
     return backup
 
 
@@ -146,6 +147,33 @@ def require_current(database: Source, scripts: Path | None = None) -> None:
             f"The database is at revision {at}, this version needs {head}. "
             "Start the server or run `sagittal migrate`."
         )
+    if isinstance(database, str) and not _has_delivery(database):
+        raise MigrationError(
+            "The database has no tables of this version's procrastinate, by which jobs are delivered. "
+            "Start the server or run `sagittal migrate`; install the same version everywhere."
+        )
+
+
+def _prepare_delivery(database: str) -> None:
+    server = PostgresServer(database)
+    try:
+        server.prepare_delivery()
+    except ModuleNotFoundError as error:
+        raise MigrationError(NO_DRIVER) from error
+    except DatabaseError as error:
+        raise MigrationError(server.explain(error)) from error
+
+
+def _has_delivery(database: str) -> bool:
+    server = PostgresServer(database)
+    engine = server.reader()
+    try:
+        with engine.connect() as c:
+            return server.has_delivery(c)
+    except ModuleNotFoundError as error:
+        raise MigrationError(NO_DRIVER) from error
+    finally:
+        engine.dispose()
 
 
 def _known(config: Config, database: Source) -> str | None:

@@ -27,6 +27,8 @@ FORGOTTEN_S = 60
 """A writing transaction of a frozen or unreachable program is ended after so long without a word."""
 WRITING, SERVING = 0x5A610001, 0x5A610002
 """Numbers of the advisory locks: whoever writes, and the web server of a database."""
+DELIVERY_SCHEMA = "procrastinate"
+"""PostgreSQL schema of procrastinate's tables, by which job ids are delivered; no backup has them."""
 
 
 class PostgresServer:
@@ -54,6 +56,32 @@ class PostgresServer:
     def migrator(self) -> Engine:
         """An engine for Alembic: a second program that migrates waits for the first, and finds it done."""
         return self._locking(MIGRATION_WAIT_MS)
+
+    def has_delivery(self, c: Connection) -> bool:
+        """Whether the tables of the installed procrastinate are there; raises ModuleNotFoundError."""
+        from procrastinate import __version__ as version
+
+        said = "SELECT obj_description(to_regnamespace(%s), 'pg_namespace')"
+        return bool(c.exec_driver_sql(said, (DELIVERY_SCHEMA,)).scalar_one() == version)
+
+    def prepare_delivery(self) -> None:
+        """Make them, in place of another version's: what is lost so, a slow poll of the job table finds."""
+        from procrastinate import __version__ as version
+        from procrastinate.schema import SchemaManager
+
+        engine = self.migrator()
+        try:
+            with engine.begin() as c:
+                if self.has_delivery(c):
+                    return
+                c.exec_driver_sql(f"DROP SCHEMA IF EXISTS {DELIVERY_SCHEMA} CASCADE")
+                c.exec_driver_sql(f"CREATE SCHEMA {DELIVERY_SCHEMA}")
+                c.exec_driver_sql(f"SET LOCAL search_path TO {DELIVERY_SCHEMA}")
+                # many statements at once, which must not have parameters: SQLAlchemy would give an empty set
+                c.connection.cursor().execute(SchemaManager.get_schema())
+                c.exec_driver_sql(f"COMMENT ON SCHEMA {DELIVERY_SCHEMA} IS '{version}'")
+        finally:
+            engine.dispose()
 
     @contextmanager
     def watch(self) -> Iterator[Callable[[], object]]:

@@ -18,8 +18,8 @@ from sqlalchemy import Connection
 from sqlalchemy.exc import SQLAlchemyError
 
 from core.errors import SagittalError
-from server.jobs.queue import Claim, JobQueue, LeaseState
-from server.jobs.table import TableQueue
+from server.jobs.opening import open_queue
+from server.jobs.queue import Claim, JobQueue, LeaseState, Wait
 from server.log import start_log
 from server.processes.lifeline import call_when_parent_ends
 from server.services import custody, erasure
@@ -36,7 +36,7 @@ from server.worker.task import TASKS, Task, load
 log = logging.getLogger("server.worker.worker")
 
 IDLE_S = 0.2
-"""Pause between two looks for work; a look is one read of an index."""
+"""Longest wait for a word of the child, and first pause after an error."""
 LOOK_S = 0.5
 """Pause between two looks for a request to cancel, and between two progress writes (at most 2 per second)."""
 CHECKPOINT_S = 5.0
@@ -65,24 +65,29 @@ class Worker:
 
     def run(self) -> None:
         """Work until stopped; an error of the database or the child costs a pause, never the worker."""
-        pause_s = IDLE_S
-        next_sweep = 0.0
         try:
-            while not self._stop.is_set():
-                try:
-                    if time.monotonic() >= next_sweep:
-                        next_sweep = time.monotonic() + SWEEP_S
-                        sweep(self._db, self._blobs, self._settings)
-                    worked = self._turn()
-                    pause_s = IDLE_S
-                except (ChildDiedError, SQLAlchemyError, OSError):
-                    log.exception("worker %s: will try again", self._name)
-                    self._drop_child()
-                    worked, pause_s = False, min(2 * pause_s, 30.0)
-                if not worked:
-                    self._stop.wait(pause_s)
+            with self._queue.listen() as wait:
+                self._work(wait)
         finally:
             self._drop_child()
+
+    def _work(self, wait: Wait) -> None:
+        pause_s = IDLE_S
+        next_sweep = 0.0
+        while not self._stop.is_set():
+            try:
+                if time.monotonic() >= next_sweep:
+                    next_sweep = time.monotonic() + SWEEP_S
+                    sweep(self._db, self._blobs, self._settings)
+                worked = self._turn()
+                pause_s = IDLE_S
+                if not worked:
+                    wait(self._stop)
+            except (ChildDiedError, SQLAlchemyError, OSError):
+                log.exception("worker %s: will try again", self._name)
+                self._drop_child()
+                pause_s = min(2 * pause_s, 30.0)
+                self._stop.wait(pause_s)
 
     def _turn(self) -> bool:
         child = self._warm_child()
@@ -270,7 +275,7 @@ def run_worker(settings: Settings, *, with_starter: bool = False) -> None:
     db = Database(settings.database_source)
     try:
         custody.refuse_foreign_folder(db, settings, stop)
-        queue = TableQueue(db, settings.lease_s)
+        queue = open_queue(db, settings.lease_s)
         Worker(settings, db, BlobStore(settings.blobs), queue, stop).run()
     finally:
         db.close()

@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 
 from sqlalchemy import select
 
+from server.jobs.opening import open_queue
 from server.jobs.queue import JobView
-from server.jobs.table import TableQueue
 from server.services import analyses, patients, recordings, sessions
 from server.settings import Settings
 from server.storage.blobs import BlobStore
@@ -61,7 +61,7 @@ class Clinic:
             write_database(self.settings.database)
         self.db = Database(self.settings.database_source)
         self.blobs = BlobStore(self.settings.blobs)
-        self.queue = TableQueue(self.db, lease_s)
+        self.queue = open_queue(self.db, lease_s)
         self.folder = folder
         with self.db.write() as c:
             self.patient = patients.create(c, None, code="P-1")

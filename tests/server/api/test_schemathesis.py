@@ -24,7 +24,7 @@ EXAMPLES = 12
 # films that are none or that nobody agreed to, and days of a mistyped year
 BEYOND_SCHEMA = (
     "manifest", "analyses", "edits", "{name}", "prescriptions", "targets", "tunings", "video", "notes",
-    "programmes", "planned-visits",
+    "programmes", "planned-visits", "uploads",
 )  # fmt: skip
 BEYOND = [schemathesis.checks.positive_data_acceptance]
 PARTS = 24

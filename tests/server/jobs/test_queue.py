@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 from sqlalchemy import select
 
+from server.jobs.opening import open_queue
 from server.jobs.queue import Claim, JobView, LeaseState, Priority
-from server.jobs.table import MAX_DEATHS, TableQueue
+from server.jobs.table import MAX_DEATHS
 from server.storage.db import Database, Source
 from server.storage.tables import job
 from tests.databases import write_database
@@ -41,7 +42,7 @@ class Bench:
     def __init__(self, source: Source) -> None:
         self.db = Database(source)
         self.clock = Clock()
-        self.queue = TableQueue(self.db, LEASE_S, self.clock)
+        self.queue = open_queue(self.db, LEASE_S, self.clock)
         self.published: list[tuple[str, int]] = []
 
     def submit(self, key: str, **more: Any) -> JobView:
