@@ -29,7 +29,7 @@ _MOST_SENSORS: Final = 64
 _MOST_FRAMES: Final = 10_000_000
 _WIDTHS: Final = {"sensorOrientation": 4, "sensorFreeAcceleration": 3, "sensorMagneticField": 3}
 """Elements of a frame that are read → numbers per sensor."""
-_TODO: Final = "Export it from MVN again with sensor data switched on."
+_AGAIN: Final = "Export it from MVN again with sensor data switched on."
 
 
 def looks_like(data: bytes) -> bool:
@@ -118,7 +118,7 @@ class _Reader:
         if not self._labels or not self._rows:
             raise FormatError(
                 "missing_acc" if self._broken else "empty",
-                f"{self._source} holds no frames with orientation and free acceleration of sensors. {_TODO}",
+                f"{self._source} holds no frames with orientation and free acceleration of sensors. {_AGAIN}",
             )
         if rate is None or not 1.0 <= rate <= 10_000.0:
             raise FormatError(

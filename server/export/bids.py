@@ -14,14 +14,13 @@ from typing import Any, Final
 import numpy as np
 
 from core.frames import SEGMENTS, Segment
+from server.export.ages import OLDEST
 from server.export.content import ExportContent
 from server.export.zipping import zip_files
 from server.report.columns import floats_of
 
 VERSION: Final = "1.9.0"
 TRACKSYS: Final = "imu"
-OLDEST: Final = 89
-"""Age from which no number is told."""
 
 CHANNELS: Final = ("name", "component", "type", "tracked_point", "units", "placement", "reference_frame")
 

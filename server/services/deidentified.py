@@ -27,7 +27,7 @@ from core.condition import CHOICES
 from core.errors import FormatError, InputError
 from server import audit
 from server.export import sheets
-from server.export.bids import OLDEST
+from server.export.ages import OLDEST, coarsen_age
 from server.export.content import ExportContent, VisitFacts, open_content
 from server.export.sheets import Row, TableSheet
 from server.export.zipping import EARLIEST, ZipSink
@@ -169,13 +169,12 @@ def _open(db: Database, blobs: BlobStore, key: ResearchKey, person: Patient, vis
     with db.read() as c:
         found = analyses.get_shown(c, visit.id)
         edits = edit_log.edits_of(c, found.id).edits
-    age = person.find_age(visit.performed_on)
     facts = VisitFacts(
         subject=key.name_person(person.id),
         visit=key.name_visit(visit.id),
         day=key.shift(person.id, visit.performed_on).isoformat(),
         protocol=visit.protocol,
-        age_years=None if age is None else min(age, OLDEST),
+        age_years=coarsen_age(person.find_age(visit.performed_on)),
         height_m=person.find_height(visit),
         version=CODE_VERSION,
     )

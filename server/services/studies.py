@@ -16,6 +16,7 @@ from sqlalchemy import Connection
 
 from core.errors import SagittalError
 from core.frames import Protocol
+from server.export.ages import coarsen_age
 from server.report.analysis_json import parameter_row
 from server.report.exports import strides_csv
 from server.report.study_tables import StudyTables, StudyTake, write_study
@@ -32,9 +33,6 @@ from server.storage.tables import now
 
 MOST_VISITS: Final = 300
 """Of one study; more are asked for in parts."""
-
-OLDEST_TOLD: Final = 89
-"""Who is as old or older is not told apart: there are few of them."""
 
 
 @dataclass(frozen=True)
@@ -152,14 +150,13 @@ def _name(session: Session) -> str:
 
 
 def _label(person: Patient, session: Session, first: dt.date) -> dict[str, Any]:
-    age = person.find_age(session.performed_on)
     return {
         "sub": make_pseudonym(person.id),
         "ses": make_pseudonym(session.id),
         "days_since_first": (session.performed_on - first).days,
         "protocol": session.protocol,
         "sex": person.sex,
-        "age_years": None if age is None else min(age, OLDEST_TOLD),
+        "age_years": coarsen_age(person.find_age(session.performed_on)),
         "height_m": person.find_height(session),
         "affected_side": person.affected_side,
         "is_control": person.is_control,
