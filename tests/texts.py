@@ -81,7 +81,8 @@ WORDS: Final = frozenset(
     assistant bad bar barefoot bars baseline before below both bouts cane centimetres changed chest clinician
     consistent copies copy crutch days degrees early ended estimated exact fading failed fast faster feet
     female flexion foot frontal further good gravity harness heading higher hip inclination inconsistent
-    inside insoles inward kinematic knee larger late left less longer low lower male mean measured median
+    inside insoles inward kinematic knee larger late left less limits longer low lower male mean measured
+    median
     months more moving narrower no none norm norms now off outward pace paused pelvis points poor probe
     push-off reconstruction repetitions rhythm right rollator sagittal shank shoes shorter silent slow
     slower smaller socks squat squats step steps steps/min stick still straighter stride strides tests thigh

@@ -38,6 +38,8 @@ def has_room_for_profile(report: Mapping[str, Any], assessment: str, note: str) 
         _count_lines(changed) + (_count_lines(left_changes) + 1 if report["since"] else 0),
     )
     noted = ceil(len(note) / (2 * HALF))
+    if report["trend"] is not None and report["trend"].missing:
+        noted += 1
     return (
         len(assessment) <= MOST_CHARACTERS
         and assessment.strip().count("\n") < 2 * MOST_PARAGRAPHS

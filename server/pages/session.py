@@ -42,6 +42,8 @@ from server.report.bundle import read_poses
 from server.report.curves import GLANCE_STRIDES, strip_svg
 from server.report.model import ReportModel
 from server.report.profile import BAR_HEIGHT, PAPER_BAR_HEIGHT
+from server.report.trend_strip import LEAST_VISITS, TrendStrip, trend_strip
+from server.report.trends import VisitKind
 from server.report.wording import speak_places
 from server.services import (
     analyses,
@@ -191,7 +193,8 @@ def gather_report(
         done = histories.list_analysed(c, patient.id) if who.may(Action.READ_RESULT) else []
         this = next((a for a in done if a.session.id == sid), None)
         if this is not None:
-            context["before"] = comparisons.find_previous(c, this.session, done)
+            alike = comparisons.list_comparable(c, this.session, done)
+            context |= {"before": comparisons.pick_previous(alike), "alike": alike if paper else []}
             trained = feedback.gather(c, patient, sid, done)
             if template == OVERVIEW and context["session"].has_video:
                 context["video"] = videos.find(c, sid)
@@ -229,6 +232,7 @@ def view_report(
         context["patient"],
         _name(this),
         before and _name(before),
+        *((_name(a), kind) for a, kind in context.get("alike", ())),
         *((v.person, v.sex, v.birth_year, v.performed_on, v.found.id, v.edits.key) for v in controls),
     )
     return reviewed.keep_page(key, lambda: _draw_report(reviewed, this, context, page))
@@ -292,7 +296,17 @@ def _draw_report(
             )
         ),
         "has_poses": "poses.parquet" in found.files,
+        "trend": _follow(reviewed, model, context),
     }
+
+
+def _follow(reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any]) -> TrendStrip | None:
+    """Speed and score up to this visit, of those walked alike; None on screen, of few, of poor data."""
+    alike: Sequence[tuple[AnalysedSession, VisitKind]] = context.get("alike", ())
+    if model.headline is None or model.quality.kind == "bad" or len(alike) < LEAST_VISITS:
+        return None
+    visits = [histories.read_visit(reviewed, a, kind) for a, kind in alike]
+    return trend_strip(visits, context["patient"].affected_side)
 
 
 def _draw_still(

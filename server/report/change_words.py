@@ -99,17 +99,15 @@ def limit_words(change: Change) -> tuple[str, ...]:
     said = []
     if change.limit is not None:
         people = f" ({change.people})" if change.people else ""
-        said.append(
-            f"MDC {format_number(change.limit, _limit_digits(term))}{unit}: {change.limit_source}{people}."
-        )
+        said.append(f"MDC {format_limit(change.limit, term)}{unit}: {change.limit_source}{people}.")
     if change.mcid is not None:
-        said.append(f"MCID {format_number(change.mcid, _limit_digits(term))}{unit}: {change.mcid_source}.")
+        said.append(f"MCID {format_limit(change.mcid, term)}{unit}: {change.mcid_source}.")
     return tuple(said)
 
 
-def _limit_digits(term: Term) -> int:
-    """Limits keep a decimal more than tenths need; metres in millimetres."""
-    return max(term.digits, 3 if term.unit == "m" else 1)
+def format_limit(limit: float, term: Term) -> str:
+    """A limit of change without its unit: a decimal more than tenths need, metres in millimetres."""
+    return format_number(limit, max(term.digits, 3 if term.unit == "m" else 1))
 
 
 def _verdict(change: Change) -> str:

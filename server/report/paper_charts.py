@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
-SVG: Final = "{http://www.w3.org/2000/svg}"
+from server.report.paper_words import SVG, place_words
 
 SHEET_PX: Final = 703
 """Width of a sheet between its margins (web/static/css/pdf.css): 210 mm without 2 × 12 mm."""
@@ -108,6 +108,8 @@ def _draw_chart(figure: Element, classes: list[set[str]], styles: ChartStyles) -
         right = max(right, LABEL_PX) if own else right
         plot, height = width - left - right, float(figure.get("height", "0"))
         _fix_size(figure, plot, height)
+        if "cycle" in classes[1]:
+            place_words(figure, plot, height, left)
         figure.set("width", f"{width:g}")
         figure.set("height", f"{height + top + bottom:g}")
         figure.set("viewBox", f"{-left:g} {-top:g} {width:g} {height + top + bottom:g}")

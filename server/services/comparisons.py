@@ -12,6 +12,7 @@ from core.condition import compare_conditions, is_comparable
 from core.norms import Norms, look_up_norms
 from server.report.comparison import ComparedRow, compare_rows
 from server.report.numbers import Numbers
+from server.report.trends import VisitKind
 from server.services import analyses, edit_log, patients, programmes, sessions
 from server.services.errors import Conflict
 from server.services.histories import AnalysedSession, classify_visit
@@ -75,30 +76,40 @@ def pair(c: Connection, session_id: str, other_id: str) -> SessionPair:
     return SessionPair(patients.get(c, both[0].session.patient_id), *both)
 
 
-def find_previous(c: Connection, session: Session, done: Sequence[AnalysedSession]) -> AnalysedSession | None:
-    """The analysed session walked under the same condition that a session's own table is compared with.
+def list_comparable(
+    c: Connection, session: Session, done: Sequence[AnalysedSession]
+) -> list[tuple[AnalysedSession, VisitKind]]:
+    """The analysed sessions of earlier days that a session is compared with, oldest first, then itself.
 
-    It is the one of the last day before; for an assessment the assessment that was, so that a single training
-    does not stand for the course. Takes of one day walked alike are one visit, not a change of each other.
-    None for a session with feedback, and none has feedback itself.
+    All were walked under its condition. Of an assessment they are the assessments, so that a training does
+    not stand for the course. Takes of one day walked alike are one visit, not a change of each other. A
+    session with feedback stands alone, and none before has feedback. Empty where it has no result itself.
 
     Parameters
     ----------
-    done : the analysed sessions of the patient, oldest first (histories.analysed).
+    done : the analysed sessions of the patient, oldest first (histories.list_analysed).
     """
     this = next((a for a in done if a.session.id == session.id), None)
     if this is None:
-        return None
+        return []
     planned = programmes.list_kinds(c, [session.patient_id])
     kind = classify_visit(session, planned.get(session.id))
-    for a in reversed(done):
-        s = a.session
-        if not is_comparable(a.condition, this.condition) or s.performed_on >= session.performed_on:
-            continue
-        if kind == "assessment" and classify_visit(s, planned.get(s.id)) == "training":
-            continue
-        return a
-    return None
+    earlier = [
+        (a, classify_visit(a.session, planned.get(a.session.id)))
+        for a in done
+        if is_comparable(a.condition, this.condition) and a.session.performed_on < session.performed_on
+    ]
+    return [*(e for e in earlier if kind == "training" or e[1] == "assessment"), (this, kind)]
+
+
+def find_previous(c: Connection, session: Session, done: Sequence[AnalysedSession]) -> AnalysedSession | None:
+    """The last session before this one in `list_comparable`: what its table is compared with; None = none."""
+    return pick_previous(list_comparable(c, session, done))
+
+
+def pick_previous(alike: Sequence[tuple[AnalysedSession, VisitKind]]) -> AnalysedSession | None:
+    """The last but one of `list_comparable`; None = there is none."""
+    return alike[-2][0] if len(alike) > 1 else None
 
 
 def _moment(session: Session) -> tuple[dt.date, dt.datetime]:

@@ -144,21 +144,28 @@ def read_history(
         if chosen is None or not is_alike(a.condition, chosen.condition):
             continue
         plan = planned.get(a.session.id)
-        visits.append(
-            AnalysedVisit(
-                a.session.id,
-                a.session.performed_on,
-                a.session.title,
-                None if plan is None else plan.label,
-                classify_visit(a.session, None if plan is None else plan.kind),
-                a.condition,
-                reviewed.read_numbers(a.found, a.edits),
-            )
-        )
+        label = None if plan is None else plan.label
+        kind = classify_visit(a.session, None if plan is None else plan.kind)
+        visits.append(read_visit(reviewed, a, kind, label))
     shown = {v.session_id for v in visits}
     rest = [a for a in done if a.session.id not in shown]
     condition = None if chosen is None else replace(chosen.condition, feedback=False)
     return PatientHistory(patient, condition, tuple(visits), _others(rest), tuple(plans))
+
+
+def read_visit(
+    reviewed: ReviewedAnalyses, a: AnalysedSession, kind: VisitKind, label: str | None = None
+) -> AnalysedVisit:
+    """The numbers of a visit as they count; raises IntegrityError. `kind`, `label` : as of AnalysedVisit."""
+    return AnalysedVisit(
+        a.session.id,
+        a.session.performed_on,
+        a.session.title,
+        label,
+        kind,
+        a.condition,
+        reviewed.read_numbers(a.found, a.edits),
+    )
 
 
 def read_performance(reviewed: ReviewedAnalyses, done: Sequence[AnalysedSession]) -> list[PerformanceDay]:

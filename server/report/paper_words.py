@@ -1,0 +1,128 @@
+"""Where the words of a cycle chart stand on paper, where letters have no light edge: clear of its curves."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import Final, NamedTuple
+from xml.etree.ElementTree import Element
+
+SVG: Final = "{http://www.w3.org/2000/svg}"
+
+CURVES: Final = frozenset({"ml", "mr", "pvl", "pvr"})
+UPRIGHTS: Final = frozenset({"fol", "for"})
+"""Classes of what a word must not lie on: means of both sides and of the visit before, and the foot-offs."""
+
+LETTER_PX: Final = 5.5
+"""Mean width of a letter at 11 px, of the widest font a little more than it is."""
+ABOVE_PX, BELOW_PX, ROOM_PX = 8.5, 2.5, 1.5
+"""Of a line of text over and under its base line, and what is left free around it."""
+STEP_PX: Final = 2
+OUTWARDS_PX: Final = {True: (0, -3), False: (0, 3, 6)}
+"""How far the upper word, and the lower one, may go from its usual line towards the edge and over it."""
+ABOVE_PLOT: Final = -5
+"""Base line of what stands above the plot, in px: the foot-offs."""
+
+_STEP: Final = re.compile(r"([MlL])|(-?\d+\.?\d*)\s+(-?\d+\.?\d*)")
+
+Box = tuple[float, float, float, float]
+"""Left, top, right, bottom in px."""
+
+
+def place_words(figure: Element, width: float, height: float, left: float) -> None:
+    """Move the words of a chart along its upper or lower edge to where they touch least.
+
+    The upper word goes above the plot where no place inside is clear and the foot-offs leave room.
+
+    Parameters
+    ----------
+    figure : of fixed size, px. width, height : of its plot area. left : margin.
+    """
+    curves = [
+        p for part in figure.iter(f"{SVG}path") if _is_of(part, CURVES) for p in _sample(part.get("d", ""))
+    ]
+    uprights = [float(e.get("x1", "0")) for e in figure.iter(f"{SVG}line") if _is_of(e, UPRIGHTS)]
+    others = [_box_of(t) for t in figure.iter(f"{SVG}text") if _is_of(t, {"tl", "tr"})]
+    for word in figure.iter(f"{SVG}text"):
+        if not _is_of(word, {"words"}) or word.get("text-anchor") != "start":
+            continue
+        first = _box_of(word)
+        is_upper = first[3] < height / 2
+        best = _find_place(first, width, OUTWARDS_PX[is_upper], curves, uprights)
+        above = (-left, ABOVE_PLOT - ABOVE_PX, first[2] - first[0] - left, ABOVE_PLOT + BELOW_PX)
+        if is_upper and best.touched and not any(_overlap(above, other) for other in others):
+            best = _Place(0, -left, ABOVE_PLOT)
+        word.set("x", f"{best.x:g}")
+        word.set("y", f"{best.base:g}")
+        word.set("dx", "0")
+        word.set("dy", "0")
+
+
+class _Place(NamedTuple):
+    """Where a line of text can begin, px, and how many px of lines it would lie on."""
+
+    touched: int
+    x: float
+    base: float
+
+
+def _find_place(
+    first: Box,
+    width: float,
+    outwards: Sequence[int],
+    curves: Sequence[tuple[float, float]],
+    uprights: Sequence[float],
+) -> _Place:
+    """The place that touches least; of equal ones the least outwards, then the leftmost."""
+    long, begin = first[2] - first[0], round(first[0])
+    places = range(begin, max(int(width - long), begin) + 1, STEP_PX)
+    return min(
+        (
+            _Place(
+                _count_touches((x, first[1] + out, x + long, first[3] + out), curves, uprights),
+                x,
+                first[3] - BELOW_PX + out,
+            )
+            for out in outwards
+            for x in places
+        ),
+        key=lambda place: place.touched,
+    )
+
+
+def _count_touches(box: Box, curves: Sequence[tuple[float, float]], uprights: Sequence[float]) -> int:
+    """How many px of curves lie in a box, and a line from bottom to top as all of its height."""
+    low, top, high, bottom = box[0] - ROOM_PX, box[1] - ROOM_PX, box[2] + ROOM_PX, box[3] + ROOM_PX
+    return sum(low <= x <= high and top <= y <= bottom for x, y in curves) + sum(
+        round(bottom - top) for x in uprights if low <= x <= high
+    )
+
+
+def _overlap(a: Box, b: Box) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def _box_of(text: Element) -> Box:
+    long = LETTER_PX * len("".join(text.itertext()))
+    x = float(text.get("x", "0")) + float(text.get("dx", "0"))
+    base = float(text.get("y", "0")) + float(text.get("dy", "0"))
+    x -= {"middle": long / 2, "end": long}.get(text.get("text-anchor", ""), 0.0)
+    return x, base - ABOVE_PX, x + long, base + BELOW_PX
+
+
+def _sample(path: str) -> Iterator[tuple[float, float]]:
+    """Points about a px apart on a path of M, L and l, as `paper_charts.stretch_path` writes it."""
+    command, x, y = "M", 0.0, 0.0
+    for letter, across, down in _STEP.findall(path):
+        if letter:
+            command = letter
+            continue
+        ends = (x + float(across), y + float(down)) if command == "l" else (float(across), float(down))
+        steps = 1 if command == "M" else max(1, round(max(abs(ends[0] - x), abs(ends[1] - y))))
+        for k in range(1, steps + 1):
+            yield x + (ends[0] - x) * k / steps, y + (ends[1] - y) * k / steps
+        x, y = ends
+
+
+def _is_of(shape: Element, classes: frozenset[str] | set[str]) -> bool:
+    return not classes.isdisjoint(shape.get("class", "").split())
