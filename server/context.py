@@ -94,9 +94,12 @@ def _study_choice(
         list[Annotated[str, Query(pattern=HEX_ID)]] | None,
         Query(max_length=100, description="only these; none = all"),
     ] = None,
+    ticked: Annotated[bool, Query(description="only the visits that are named, even if none is")] = False,
 ) -> StudyChoice:
     # a form sends what was left open as empty
-    return StudyChoice(q, protocol or None, since or None, until or None, frozenset(visit or ()))
+    return StudyChoice(
+        q, protocol or None, since or None, until or None, frozenset(visit or ()) if visit or ticked else None
+    )
 
 
 StudyVisits = Annotated[StudyChoice, Depends(_study_choice)]

@@ -15,6 +15,7 @@ from importlib.metadata import version
 from typing import Any, Final
 
 from core.errors import SagittalError
+from core.events.result import MANUAL
 from server.report.columns import write_csv
 from server.report.estimator import list_estimated_angles
 
@@ -92,6 +93,8 @@ def _list_strides(take: StudyTake) -> Iterator[dict[str, object]]:
     for row in csv.DictReader(io.StringIO(written.decode())):
         own = [a for a in modelled if a.endswith(f"_{row['side'][0]}")]
         values = {name: _value(cell) for name, cell in row.items()}
+        if row.get("excluded_reason", "").startswith(MANUAL):
+            values["excluded_reason"] = MANUAL.removesuffix(":")  # a person's words may name somebody
         yield {"take": take.name, **take.labels, **values, "estimated_angles": " ".join(own) or None}
 
 

@@ -7,8 +7,7 @@ from typing import Final
 
 import msgspec
 
-from server.processes.channel import Channel
-from server.processes.child import end_process, start_child
+from server.processes.errand import run_errand
 from server.report.pdf import PdfMissing
 from server.services import signed_reports
 from server.services.errors import ServiceError
@@ -38,18 +37,15 @@ def make_pdf(settings: Settings, document: bytes) -> bytes:
         the library is not there. PdfFailed: it took too long or ended without a word.
     """
     with _turn:
-        process, end = start_child("server.services.paper_child", settings)
-        line = Channel(end)
         try:
-            line.send(document)
-            if not line.has_message(LONGEST_S):
-                raise PdfFailed("pdf_failed", f"The PDF was not made within {LONGEST_S:.0f} s. Try again.")
-            reply = msgspec.msgpack.decode(line.receive(), type=PaperReply)
+            answer = run_errand("server.services.paper_child", settings, document, LONGEST_S)
+        except TimeoutError as error:
+            raise PdfFailed(
+                "pdf_failed", f"The PDF was not made within {LONGEST_S:.0f} s. Try again."
+            ) from error
         except (EOFError, OSError) as error:
             raise PdfFailed("pdf_failed", "The process that makes the PDF has ended. Try again.") from error
-        finally:
-            line.close()
-            end_process(process)
+    reply = msgspec.msgpack.decode(answer, type=PaperReply)
     if reply.code == "pdf_missing":
         raise PdfMissing
     if reply.code:

@@ -1,15 +1,16 @@
 """The visits of a study as two tables: which ones are chosen, and their analyses as they count.
 
 Nothing is analysed anew and nothing is kept: the tables are made of the stored analyses with the persons'
-edits. Persons and visits stand in them by pseudonyms, those of the other exports; no date, no note.
+edits, in a process of their own (study_child.py). Persons and visits stand in them by pseudonyms, those of
+the other exports; no date, no note.
 """
 
 from __future__ import annotations
 
 import datetime as dt
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 from sqlalchemy import Connection
@@ -42,26 +43,40 @@ class StudyChoice:
     Parameters
     ----------
     search : part of a patient's code or note. protocol : None = any. since, until : days, both included.
-    visits : only these of them; empty = all.
+    visits : only these of them; None = all.
     """
 
     search: str = ""
     protocol: Protocol | None = None
     since: dt.date | None = None
     until: dt.date | None = None
-    visits: frozenset[str] = field(default_factory=frozenset)
+    visits: frozenset[str] | None = None
 
 
 def list_visits(c: Connection, choice: StudyChoice) -> list[Session]:
     """The visits of a choice, by patient and day."""
+    if choice.visits is not None and not choice.visits:
+        return []
     return sessions.search(
         c,
         search=choice.search,
         protocol=choice.protocol,
         since=choice.since,
         until=choice.until,
-        ids=choice.visits,
+        ids=choice.visits or (),
     )
+
+
+def check_size(chosen: Sequence[Session]) -> None:
+    """Refuse a study of no visit or of too many; raises Conflict no_visits, too_many_visits."""
+    if not chosen:
+        raise Conflict("no_visits", "No visit fits this choice. Choose another period or protocol.")
+    if len(chosen) > MOST_VISITS:
+        raise Conflict(
+            "too_many_visits",
+            f"{len(chosen)} visits fit this choice, at most {MOST_VISITS} go into one study. "
+            "Choose a shorter period and put the tables together.",
+        )
 
 
 def make_study(
@@ -76,14 +91,7 @@ def make_study(
     """
     with db.read() as c:
         chosen = list_visits(c, choice)
-        if not chosen:
-            raise Conflict("no_visits", "No visit fits this choice. Choose another period or protocol.")
-        if len(chosen) > MOST_VISITS:
-            raise Conflict(
-                "too_many_visits",
-                f"{len(chosen)} visits fit this choice, at most {MOST_VISITS} go into one study. "
-                "Choose a shorter period and put the tables together.",
-            )
+        check_size(chosen)
         people = {p: patients.get(c, p) for p in dict.fromkeys(s.patient_id for s in chosen)}
         shown = analyses.latest_of(c, [s.id for s in chosen])
         edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])

@@ -12,8 +12,9 @@ import httpx
 import pyarrow.parquet as pq
 import pytest
 
+from server.services import study_maker
 from tests.server.api.test_exports import API, visit
-from tests.server.clinic import Clinic
+from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
 
@@ -36,7 +37,7 @@ async def test_the_tables_have_every_visit_as_it_counts_by_pseudonyms(clinic: Cl
         empty = (await client.post(f"{API}/patients/{patient}/sessions", json=asked)).json()["id"]
         before = unpack(await client.get(f"{API}/study.zip"))
         counted = next(row for row in rows(before["strides.csv"]) if not row["excluded_reason"])
-        edit = {"kind": "exclude_stride", "side": counted["side"], "reason": "stumbled"}
+        edit = {"kind": "exclude_stride", "side": counted["side"], "reason": "Jane stumbled"}
         edit["time_s"] = (float(counted["start_s"]) + float(counted["end_s"])) / 2  # type: ignore[assignment]
         (await client.post(f"{API}/sessions/{first}/edits", json=edit)).raise_for_status()
         found = unpack(await client.get(f"{API}/study.zip"))
@@ -50,6 +51,7 @@ async def test_the_tables_have_every_visit_as_it_counts_by_pseudonyms(clinic: Cl
                 {"since": "yesterday"},
                 {"protocol": "fly"},
                 {"visit": ["x"]},
+                {"ticked": True},  # each tick was taken away: nothing, not everything
             )
         ]
     async with clinic.client("viewer") as client:
@@ -69,7 +71,7 @@ async def test_the_tables_have_every_visit_as_it_counts_by_pseudonyms(clinic: Cl
             if name != "provenance.json" or secret != "2026-03":
                 assert secret.encode() not in content, (name, secret)
     # one visit has an edit: its stride does not count, and its figures are those without it
-    left_out = [r for r in rows(found["strides.csv"]) if r["excluded_reason"] == "manual:stumbled"]
+    left_out = [r for r in rows(found["strides.csv"]) if r["excluded_reason"] == "manual"]
     assert len(left_out) == 1
     assert [t["edits"] for t in takes if t["take"] == left_out[0]["take"]] == ["1"]
     assert len(rows(found["strides.csv"])) == len(rows(before["strides.csv"]))
@@ -79,6 +81,30 @@ async def test_the_tables_have_every_visit_as_it_counts_by_pseudonyms(clinic: Cl
     assert len(made["takes"]) == 3
     assert len(made["analyses"]) == 2
     assert (page.count('name="visit"'), "JOHN-DOE" in page) == (1, False)
-    assert [a.status_code for a in refused] == [409, 422, 422, 422]
+    assert [a.status_code for a in refused] == [409, 422, 422, 422, 409]
     about = [row["resource_id"] for row in trail if row["action"] == "study.exported"]
     assert sorted(about) == sorted([first, second, empty] * 2 + [first, empty])
+
+
+async def test_a_study_stops_nobody_else_and_says_why_there_is_none(
+    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await visit(clinic, "JILL-DOE")
+    monkeypatch.setattr(study_maker, "LONGEST_S", 0.0)
+    async with clinic.client("clinician", raises=False) as client:
+        late = await client.get(f"{API}/study.zip")
+    monkeypatch.setattr(study_maker, "run_errand", cut_off)
+    async with clinic.client("clinician", raises=False) as client:
+        died = await client.get(f"{API}/study.zip")
+        own = {"name": "R", "scopes": ["read", "write"], "days": 1, "password": PASSWORD}
+        token = (await client.post(f"{API}/account/tokens", json=own)).json()["token"]
+    async with clinic.client(headers={"authorization": f"Bearer {token}"}) as script:
+        by_token = await script.get(f"{API}/study.zip")
+    assert [(a.status_code, a.json()["code"]) for a in (late, died)] == [(503, "study_failed")] * 2
+    assert "Choose fewer visits" in late.json()["detail"]
+    assert by_token.status_code == 403
+
+
+def cut_off(*_: object) -> bytes:
+    """What happens to a line whose other end has gone."""
+    raise EOFError

@@ -1,0 +1,53 @@
+"""The process that makes the tables of one study and ends: reading hundreds of results stops nobody.
+
+Started by server/services/study_maker.py as `python -m server.services.study_child <socket> <parent pid>`. It
+reads the database and writes nothing.
+"""
+
+from __future__ import annotations
+
+import logging
+from contextlib import closing
+
+import msgspec
+
+from core.errors import SagittalError
+from server.export.zipping import zip_files
+from server.processes.child import enter_child
+from server.services.reviewed import ReviewedAnalyses
+from server.services.studies import StudyChoice, make_study
+from server.settings import Settings
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+
+
+class StudyReply(msgspec.Struct, frozen=True):
+    """The tables of a study in a zip and the visits in them, or why there is none."""
+
+    content: bytes = b""
+    visits: tuple[str, ...] = ()
+    code: str = ""
+    message: str = ""
+
+
+def main() -> None:
+    """Make the tables of the one choice that comes over the line."""
+    line, settings = enter_child()
+    try:
+        reply = _make(settings, msgspec.msgpack.decode(line.receive(), type=StudyChoice))
+    except SagittalError as error:
+        reply = StudyReply(code=error.code, message=error.message)
+    except Exception:
+        logging.getLogger(__name__).exception("a study could not be made")
+        reply = StudyReply(code="internal_error", message="The tables could not be made; the log says why.")
+    line.send(msgspec.msgpack.encode(reply))
+
+
+def _make(settings: Settings, choice: StudyChoice) -> StudyReply:
+    with closing(Database(settings.database_source)) as db:
+        tables, visits = make_study(db, ReviewedAnalyses(BlobStore(settings.blobs)), choice)
+    return StudyReply(zip_files(tables.files), tuple(visits))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,57 @@
+"""Studies as a download: each made by a process of its own, one at a time."""
+
+from __future__ import annotations
+
+import threading
+from typing import Final
+
+import msgspec
+
+from server.processes.errand import run_errand
+from server.services.errors import Conflict, ServiceError
+from server.services.studies import StudyChoice, check_size, list_visits
+from server.services.study_child import StudyReply
+from server.settings import Settings
+from server.storage.db import Database
+
+LONGEST_S: Final = 300.0
+"""Longest one may take; the most visits that are allowed take some ten seconds of computing."""
+
+_turn = threading.Semaphore(1)
+
+
+class StudyFailed(ServiceError):  # noqa: N818 - says what failed
+    """No tables could be made."""
+
+    status = 503
+
+
+def fetch_study(db: Database, settings: Settings, choice: StudyChoice) -> tuple[bytes, tuple[str, ...]]:
+    """The tables of a choice as a zip, and which visits are in them.
+
+    Raises
+    ------
+    Conflict
+        no_visits, too_many_visits. StudyFailed: it took too long, or ended without a word.
+    """
+    with db.read() as c:
+        check_size(list_visits(c, choice))
+    with _turn:
+        try:
+            answer = run_errand(
+                "server.services.study_child", settings, msgspec.msgpack.encode(choice), LONGEST_S
+            )
+        except TimeoutError as error:
+            raise StudyFailed(
+                "study_failed", f"The tables were not made within {LONGEST_S:.0f} s. Choose fewer visits."
+            ) from error
+        except (EOFError, OSError) as error:
+            raise StudyFailed(
+                "study_failed", "The process that makes the tables has ended. Choose fewer visits."
+            ) from error
+    reply = msgspec.msgpack.decode(answer, type=StudyReply)
+    if reply.code in {"no_visits", "too_many_visits"}:  # changed since it was looked at
+        raise Conflict(reply.code, reply.message)
+    if reply.code:
+        raise StudyFailed(reply.code, reply.message)
+    return reply.content, reply.visits
