@@ -338,6 +338,7 @@ SCRIPT_PLACES: Final = (
     SCRIPTS,
     "core/agreement/tell_live.py",
     "core/calibration/score.py",
+    "core/norms/",
     "core/online/",
     "core/parameters/catalogue/",
     "server/http/",

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import datetime as dt
+import functools
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
+
+from markupsafe import Markup
 
 from web.language import MONTHS
 
@@ -59,6 +63,25 @@ def pattern(text: str) -> str:
     return re.sub(r"[\^$\\.*+?()\[\]{}|/]", r"\\\g<0>", text)
 
 
+_ICON = re.compile(r'\s*<symbol id="i-([\w-]+)".*?</symbol>', re.DOTALL)
+_SHOWN = re.compile(r'href="#i-([\w-]+)"')
+_SCRIPTED = re.compile(r'#i-([\w-]+)|\bicon(?:: |\([^()"]*)"([\w-]+)"(?: : "([\w-]+)")?')
+
+
+@functools.cache
+def find_scripted_icons() -> frozenset[str]:
+    """Icons that the pages' scripts show."""
+    scripts = (Path(__file__).parent / "static" / "js").rglob("*.js")
+    found = (names for script in scripts for names in _SCRIPTED.findall(script.read_text("utf-8")))
+    return frozenset(name for names in found for name in names if name)
+
+
+def used_icons(page: str) -> Markup:
+    """The page without the symbols of icons that neither it nor a script shows, a twentieth of a session."""
+    kept = find_scripted_icons().union(_SHOWN.findall(page))
+    return Markup(_ICON.sub(lambda icon: icon[0] if icon[1] in kept else "", page))  # noqa: S704
+
+
 def as_it_is(value: Any) -> Any:
     """Return the value: nothing is translated into the language of the sources."""
     return value
@@ -70,6 +93,7 @@ FILTERS: dict[str, Callable[..., Any]] = {
     "filesize": filesize,
     "number": number,
     "seconds": seconds,
+    "used_icons": used_icons,
     "pattern": pattern,
     "verbatim": as_it_is,
     "spoken": as_it_is,

@@ -47,6 +47,7 @@ def load_templates(language: str) -> Jinja2Templates:
     loader = FlushLeftLoader(folder) if is_source else SpokenLoader(folder)
     templates = Jinja2Templates(env=Environment(loader=loader, autoescape=True))
     templates.env.filters.update(FILTERS)
+    templates.env.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
     if not is_source:
         shown = Shown(load_catalogue(language))
         templates.env.filters.update(shown.filters)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Final
 
@@ -61,6 +62,9 @@ from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
 from server.storage.db import Database
+from server.viewer.client import client_version
+from server.viewer.first_picture import draw_first_picture
+from server.viewer.motion import prepare_motion
 from server.viewer.still import draw_still
 from web.words import day, seconds
 
@@ -71,10 +75,13 @@ SEVERITIES: Final = ("bad", "warn", "info")
 NO_STRIDE_CODES: Final = ("foot_missing", "no_strides", "few_steps")
 """Notices that explain a take without strides."""
 
-OVERVIEW, PAPER, VALUES = "session.html", "print.html", "_values.html"
+OVERVIEW, CURVES, PAPER, VALUES = "session.html", "kinematics.html", "print.html", "_values.html"
 
-STRIP_STRIDES: Final = 150
+STRIP_STRIDES: Final = 64
 """A longer walk has too many strides to be told apart beside the figure; the timeline shows them."""
+
+MOST_FRAMES: Final = 120_000
+"""A page would wait too long for the first picture of a walk of more, 20 min at 100 Hz."""
 
 FIRST_CURVES: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 
@@ -121,7 +128,7 @@ def show_kinematics(
     who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """All cycle curves with the replay."""
-    return _show_report(request, db, reviewed, sid, who, "kinematics.html")
+    return _show_report(request, db, reviewed, sid, who, CURVES)
 
 
 @router.get("/sessions/{sid}/values")
@@ -160,7 +167,7 @@ def _show_report(
     context = gather_report(db, reviewed, sid, who, template)
     if context["report"] is None and template == PAPER:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
-    if template == "kinematics.html" and (elsewhere := lead_to_days(context)):
+    if template == CURVES and (elsewhere := lead_to_days(context)):
         return elsewhere
     if template == VALUES:
         request.app.state.trail.record_watched(who, "numbers.opened", "session", sid)
@@ -281,6 +288,7 @@ def _draw_report(
             if (overview or paper) and p.variable.name in FIRST_CURVES and p.sides
         ],
         "still": _draw_still(reviewed, this, bundle.strides, patient) if paper and used else None,
+        "first_picture": _draw_first(reviewed, this, model) if page in (OVERVIEW, CURVES) else None,
         "strip": strip_svg(bundle.strides, model.duration_s) if 0 < total <= STRIP_STRIDES else "",
         "drawn": "some strides" if overview and max(model.used.values()) > GLANCE_STRIDES else "",
         "stride_words": f"{used} of {total} used",
@@ -324,6 +332,21 @@ def _draw_still(
     return None if svg is None else {"svg": svg, "caption": caption}
 
 
+def _draw_first(
+    reviewed: ReviewedAnalyses, this: AnalysedSession, model: ReportModel
+) -> dict[str, str] | None:
+    """What the replay will show first, where the page's clock begins, and the client that will show it."""
+    if "poses.parquet" not in this.found.files:
+        return None
+    poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))
+    if not poses.q or not 0 < len(poses.t_s) <= MOST_FRAMES:
+        return None
+    spans: Sequence[Mapping[str, Any]] = model.replay["strides"]  # type: ignore[assignment]
+    first = next((s for s in spans if s["used"]), next(iter(spans), {"start_s": 0.0}))
+    svg = draw_first_picture(prepare_motion(poses), first["start_s"])
+    return None if svg is None else {"svg": svg, "client": f"/views/client/{client_version()}"}
+
+
 def _draw_panels(model: ReportModel, heights: Mapping[bool, int]) -> list[dict[str, Any]]:
     """All cycle charts; those of the last row also say the unit of the x axis."""
     last_row = len(model.panels) - COLUMNS
@@ -331,11 +354,19 @@ def _draw_panels(model: ReportModel, heights: Mapping[bool, int]) -> list[dict[s
 
 
 def _list_for_clock(model: ReportModel, variables: Sequence[str]) -> dict[str, Any]:
-    """What the page's clock needs, with the curves of some variables only."""
+    """What the page's clock needs, with some variables' curves only, in whole degrees as it says them."""
     curves: Mapping[str, Any] = model.replay["curves"]  # type: ignore[assignment]
     spans: Sequence[Mapping[str, Any]] = model.replay["strides"]  # type: ignore[assignment]
     strides = [[s["side"], s["start_s"], s["end_s"], int(s["used"])] for s in spans]
-    return {**model.replay, "strides": strides, "curves": {v: curves[v] for v in variables if v in curves}}
+    whole = {
+        v: {
+            side: mean and [None if x is None else math.floor(x + 0.5) for x in mean]
+            for side, mean in curves[v].items()
+        }
+        for v in variables
+        if v in curves
+    }
+    return {**model.replay, "strides": strides, "curves": whole}
 
 
 def explain_emptiness(model: ReportModel) -> str:

@@ -40,7 +40,7 @@ class CycleWords:
 STRIDE: Final = CycleWords("the gait cycle", "strides", "% of gait cycle")
 SQUAT: Final = CycleWords("the squat", "squats", "% of squat")
 
-GLANCE_STRIDES: Final = 7
+GLANCE_STRIDES: Final = 5
 
 _TOP, _BOTTOM, _BOTTOM_WITH_UNIT = 18, 20, 34
 _CLOSE_PCT = 6.0
@@ -79,7 +79,7 @@ def cycle_svg(
     if panel.norm is not None:
         plot.norm(panel.norm.mean_deg, panel.norm.sd_deg, glance)
     if panel.comfortable is not None:
-        plot.curve(panel.comfortable.mean_deg, "cm", glance)
+        plot.curve(panel.comfortable.mean_deg, "cm", 4 if glance else 1)
     plot.grid(v.ticks)
     for side, curve in panel.sides.items():
         plot.foot_off_spread(side, curve)
@@ -89,7 +89,7 @@ def cycle_svg(
     for css, drawn in (("pv", {} if earlier is None else earlier.sides), ("m", panel.sides)):
         for side, curve in drawn.items():
             if curve.mean_deg is not None:
-                plot.curve(curve.mean_deg, f"{css}{KEY[side]}", glance)
+                plot.curve(curve.mean_deg, f"{css}{KEY[side]}", 2 if glance else 1)
     plot.foot_offs(panel.sides)
     plot.cursor()
     plot.x_axis(over.unit if x_unit else None)
@@ -122,11 +122,11 @@ def range_svg(
 def strip_svg(strides: Strides, duration_s: float, height: int = 92) -> str:
     """Draw all strides over time: stance full, swing light, left out faded with a cross, a line for now.
 
-    Every stride is a `<g data-stride>` with its number in the stride list. One left out says why; the page's
-    script names the others, which are many.
+    Every stride is a `<g>`, in the order of the stride list. One left out says why; the page's script names
+    the others, which are many.
     """
     plot_height = height - 24
-    marks = "".join(_stride_mark(i, s, duration_s) for i, s in enumerate(strides.strides))
+    marks = "".join(_stride_mark(s, duration_s) for s in strides.strides)
     letters = "".join(
         make_label("0", plot_height * (0.25 + 0.5 * i), side[0].upper(), f"t{KEY[side]}", "end", dx=-9, dy=4)
         for i, side in enumerate(SIDES)
@@ -139,21 +139,21 @@ def strip_svg(strides: Strides, duration_s: float, height: int = 92) -> str:
     )
 
 
-def _stride_mark(index: int, s: Stride, duration_s: float) -> str:
+def _stride_mark(s: Stride, duration_s: float) -> str:
     k, top, out = KEY[s.side], 40 if s.side == "left" else 540, s.excluded_reason is not None
-    start, end = 1000 * s.start_s / duration_s, 1000 * s.end_s / duration_s
-    off = end if s.tc_s is None else 1000 * s.tc_s / duration_s
+    start, end = round(1000 * s.start_s / duration_s), round(1000 * s.end_s / duration_s)
+    off = end if s.tc_s is None else round(1000 * s.tc_s / duration_s)
     said, cross = "", ""
     if s.excluded_reason is not None:
         title = f"{s.side} stride, {s.start_s:.2f} to {s.end_s:.2f} s, left out: "
         said = f"<title>{escape(title + explain_exclusion(s.excluded_reason))}</title>"
-        a, b = f"{start:.0f}", f"{end:.0f}"
-        cross = f'<path class="xx" d="M{a} {top + 60}L{b} {top + 360}M{a} {top + 360}L{b} {top + 60}"/>'
+        across = end - start
+        cross = f'<path class="xx" d="M{start} {top + 60}l{across} 300M{start} {top + 360}l{across}-300"/>'
     faded = " x" if out else ""
     return (
-        f'<g data-stride="{index}">{said}'
-        f'<path class="st{k}{faded}" d="M{start:.0f} {top}H{off:.0f}v420H{start:.0f}"/>'
-        f'<path class="sw{k}{faded}" d="M{off:.0f} {top}H{end:.0f}v420H{off:.0f}"/>'
+        f"<g>{said}"
+        f'<path class="st{k}{faded}" d="M{start} {top}H{off}v420H{start}"/>'
+        f'<path class="sw{k}{faded}" d="M{off} {top}H{end}v420H{off}"/>'
         f"{cross}</g>"
     )
 
@@ -165,7 +165,7 @@ class _CyclePlot(PlotArea):
         step = 4 if glance else 1
         upper, lower = self._points(mean + sd)[::step], self._points(mean - sd)[::step]
         self.add(f'<polygon class="band" points="{" ".join(upper + lower[::-1])}"/>')
-        self.curve(mean, "nm", glance)
+        self.curve(mean, "nm", step)
 
     def grid(self, ticks: Sequence[float]) -> None:
         for tick in ticks:
@@ -183,8 +183,7 @@ class _CyclePlot(PlotArea):
             d = self._path(angle[::step], step)
             self.add(f'<path class="s{KEY[side]}" data-stride="{index}" d="{d}"/>')
 
-    def curve(self, angle: Floats, css: str, glance: bool) -> None:
-        step = 2 if glance else 1
+    def curve(self, angle: Floats, css: str, step: int) -> None:
         self.add(f'<path class="{css}" d="{self._path(angle[::step], step)}"/>')
 
     def foot_offs(self, sides: Mapping[Side, SideCurve]) -> None:

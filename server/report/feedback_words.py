@@ -76,8 +76,10 @@ def schedule_words(content: Prescription) -> str:
     if s.kind == "every":
         said = "every stride"
     else:
-        said = f"{' → '.join(f'{p}{NBSP}%' for p in s.shares_pct)} of the strides"
-        said += f", {s.strides_per_share} strides each" if len(s.shares_pct) > 1 else ""
+        shares = " → ".join(f"{p}{NBSP}%" for p in s.shares_pct)
+        said = f"{shares} of the strides"
+        if len(s.shares_pct) > 1:
+            said = f"{shares} of the strides, {s.strides_per_share} strides each"
     if s.probe_every is not None:
         said += f"; after every {s.probe_every}, {s.probe_strides} without"
     if s.retention_strides:

@@ -29,8 +29,25 @@ QUALITY: Final = 10
 """Of brotli: 9 packs 7 % worse, 11 takes twice the time for 2 %."""
 
 _HIDE_PANEL = "<style>.mantine-Paper-root,.mantine-Notifications-root{display:none!important}</style>"
-_TAKE_ADDRESS = "<script>history.replaceState(null, '', `/views/${location.hash.slice(1)}/`)</script>"
-"""Before viser's scripts: the page is the same for all views; its client asks for the pipe at its address."""
+_BEGIN = """<script>{
+  const [view, dark] = location.hash.slice(1).split(",");
+  history.replaceState(null, "", `/views/${view}/${dark ? "?darkMode" : ""}`);
+  const tell = (what) => parent.postMessage(what, location.origin);
+  const open = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+    const context = open.call(this, kind, ...more);
+    if (kind !== "webgl2") return context;
+    if (!context) tell("no-3d");
+    else context.drawElementsInstanced = function (...all) {
+      delete context.drawElementsInstanced;
+      requestAnimationFrame(() => requestAnimationFrame(() => tell("drawn")));
+      return context.drawElementsInstanced(...all);
+    };
+    return context;
+  };
+}</script>"""
+"""Before viser's scripts. The page is the same for all views; its client asks for the pipe at its address and
+is dark at once if the hash says so. Of what is drawn in copies (batches.py) the figure is first."""
 
 _PACKED = re.compile(r'<script data-p="([^"]*)" data-ss="(\d+)" data-cs="(\d+)">')
 _BOOT = re.compile(
@@ -55,7 +72,7 @@ def client_page() -> str:
     start, opened, scripts = head.partition("<head>")
     if not (found and opened):
         raise RuntimeError("viser's client page has no head; this version of viser is not supported.")
-    return f"{start}{opened}{_TAKE_ADDRESS}{scripts}{_HIDE_PANEL}{found}{body}"
+    return f"{start}{opened}{_BEGIN}{scripts}{_HIDE_PANEL}{found}{body}"
 
 
 @functools.cache

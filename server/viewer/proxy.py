@@ -1,6 +1,8 @@
 """The routes of the 3D replay: the viewer page, the pipe to its viser server, and the time cursor.
 
-    WS  /sessions/{sid}/replay?tab=…&dark=…   the time cursor; the page around owns the clock
+    WS  /sessions/{sid}/replay?tab=…&dark=…&t=…&view=…   the time cursor; the page around owns the clock
+            t = the moment shown first; view = 32 hexadecimal digits that the page made up, by which it may
+            load the client and its pipe at once, while the view is being opened
             sends {"t": seconds}, true|false for one of "dark", "follow" (the person, else the whole walk
             is in the picture) and "ground" (footprints and trails), {"look": "right" or another of VIEWS in
             room.py} or {"ghost": "norm" or another of GhostName in motion.py, null for none}, answered by
@@ -12,6 +14,7 @@
     GET /views/{view}/   for an iframe: leads to viser's own client page, which takes this address again
     GET /views/client/{version}   that page, the same for all views, which browsers therefore keep
     WS  /views/{view}    the pipe; the client finds it from its own address
+    The document tells the page around: "drawn" when a figure is to be seen, "no-3d" where there is no WebGL
 
 A view can be seen by the sign-in that opened it only.
 """
@@ -119,7 +122,7 @@ def client(version: str, request: Request) -> Response:
 @router.websocket("/views/{view_id}")
 async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
     """Carry viser's messages."""
-    view = _views(ws).find(view_id, who.login_id, who.role)
+    view = await _views(ws).find_soon(view_id, who.login_id, who.role)
     if view is None:
         await _say_gone(ws)
         return
@@ -148,23 +151,26 @@ async def replay(
     tab: Annotated[str, Query(max_length=64)] = "",
     dark: bool = False,
     ghost: Annotated[str | None, Query(max_length=64)] = None,
+    t: Annotated[float, Query(allow_inf_nan=False)] = 0.0,
+    view: Annotated[str | None, Query(pattern="^[0-9a-f]{32}$")] = None,
 ) -> None:
     """Open the view of this browser tab and let the page move its cursor; `ghost` = another visit over it."""
     await ws.accept()
     try:
-        view = await _open(ws, sid, who, tab, dark, ghost)
+        opened = await _open(ws, sid, who, ghost, tab=tab, dark=dark, t_s=t, name=view)
     except (Problem, SagittalError) as error:
         problem = as_problem(error)
         await ws.send_json({"error": {"code": problem.code, "detail": problem.detail}})
         await ws.close(_GONE, problem.code)
         return
     logins = ws.app.state.logins
-    with view.keep_open():
-        motion = view.figure.motion
+    name = view if view and _views(ws).find(view, who.login_id, who.role) is opened else opened.id
+    with opened.keep_open():
+        motion = opened.figure.motion
         await ws.send_json(
             {
-                "view": view.id,
-                "src": f"/views/{view.id}/",
+                "view": name,
+                "src": f"/views/{name}/",
                 "start_s": float(motion.t_s[0]),
                 "duration_s": motion.duration_s,
                 "placed": motion.placed,
@@ -172,7 +178,7 @@ async def replay(
                 "hidden": motion.hidden,
             }
         )
-        cursor = asyncio.create_task(_follow(ws, view, ViewActivity(lambda: logins.touch(who.login_id))))
+        cursor = asyncio.create_task(_follow(ws, opened, ViewActivity(lambda: logins.touch(who.login_id))))
         over = asyncio.create_task(wait_for_sign_out(lambda: logins.is_open(who.login_id)))
         await asyncio.wait((cursor, over), return_when=asyncio.FIRST_COMPLETED)
         ended = over.done()
@@ -185,7 +191,7 @@ async def replay(
 
 
 async def _open(
-    ws: WebSocket, sid: str, who: Identity, tab: str, dark: bool, other: str | None
+    ws: WebSocket, sid: str, who: Identity, other: str | None, *, tab: str, **shown_first: Any
 ) -> FigureView[ReplayFigure]:
     db, reviewed = ws.app.state.db, ws.app.state.reviewed
 
@@ -225,7 +231,7 @@ async def _open(
         return replace(motion, ghosts=ghosts)
 
     shown = _state(this) if before is None else f"{_state(this)} over {_state(before)}"
-    return await _views(ws).open(who.login_id, tab, shown, load, dark)
+    return await _views(ws).open(who.login_id, tab, shown, load, **shown_first)
 
 
 def _replayable(c: Connection, sid: str) -> AnalysedSession | None:

@@ -29,12 +29,13 @@ class ReplayFigure:
     Parameters
     ----------
     server : a viser server of its own.
-    motion : prepared by `server.viewer.motion.prepare_motion`.
+    motion : prepared by `server.viewer.motion.prepare_motion`. t_s : the moment shown first.
     """
 
-    def __init__(self, server: viser.ViserServer, motion: ReplayMotion, dark: bool = False) -> None:
-        self._server, self._motion = server, motion
-        self._t_s = float(motion.t_s[0])
+    def __init__(
+        self, server: viser.ViserServer, motion: ReplayMotion, dark: bool = False, t_s: float = 0.0
+    ) -> None:
+        self._server, self._motion, self._t_s = server, motion, t_s
         self._middle = (motion.root.min(axis=0) + motion.root.max(axis=0)) / 2
         scene = server.scene
         x, y = self._middle.tolist()

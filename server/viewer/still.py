@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from html import escape
 from typing import Final
 
@@ -13,7 +12,7 @@ from core.frames import Floats, Side
 from server.viewer.colours import Tint
 from server.viewer.few_poses import find_matrices
 from server.viewer.layout import FigureLayout
-from server.viewer.shapes import Mesh
+from server.viewer.outlines import find_front, split_surfaces, trace_edges
 
 HEIGHT_PX: Final = 116
 WIDEST_PX: Final = 92
@@ -43,64 +42,35 @@ def draw_still(poses: Poses, t_s: float, near: Side, title: str) -> str | None:
     for batch in layout.divide(layout.place(q, p)).values():
         turns = find_matrices(batch.wxyz[0].astype(np.float64))
         for k, (tint, measured) in enumerate(zip(batch.tint, batch.measured, strict=True)):
-            for points in _split(batch.mesh):
-                outline, depth = _project(points @ turns[k].T + batch.position[0, k], front, near)
-                parts.append((depth, CSS[tint] if measured else f"{CSS[tint]} {FAINT}", outline))
+            for mesh in split_surfaces(batch.mesh):
+                seen, depth = _project(mesh[0] @ turns[k].T + batch.position[0, k], front, near)
+                outlines = [seen[line] for line in trace_edges(mesh, find_front(seen, mesh))]
+                parts.append((depth, CSS[tint] if measured else f"{CSS[tint]} {FAINT}", outlines))
     parts.sort(key=lambda part: -part[0])
-    return _write([(css, outline) for _, css, outline in parts if len(outline)], title)
-
-
-def _split(mesh: Mesh) -> Iterator[Floats]:
-    """The vertices of each closed surface of a mesh."""
-    vertices, faces = mesh
-    surface, before = np.arange(len(vertices)), None
-    while before is None or (surface != before).any():  # each vertex takes the least number of its faces
-        before = surface
-        surface = surface.copy()
-        np.minimum.at(surface, faces, before[faces].min(axis=1)[:, None])
-    for k in np.unique(surface):
-        yield vertices[surface == k].astype(np.float64)
+    return _write([(css, outlines) for _, css, outlines in parts if outlines], title)
 
 
 def _project(points: Floats, front: Floats, near: Side) -> tuple[Floats, float]:
-    """Outline (n, 2) m, to the right and up, and how far from who looks; a surface on edge has none."""
+    """Points (n, 2) m, to the right and up, and how far from who looks they are in the mean."""
     along = front / np.linalg.norm(front) * (1.0 if near == "right" else -1.0)
     away = np.array([-along[1], along[0]])  # to the left of who looks along `along`
     flat = np.column_stack((points[:, :2] @ along, points[:, 2]))
-    return find_hull(flat), float((points[:, :2] @ away).mean())
+    return flat, float((points[:, :2] @ away).mean())
 
 
-def find_hull(points: Floats) -> Floats:
-    """The convex hull (m, 2) of points (n, 2), counter-clockwise from the leftmost; none of points on a line.
-
-    A. M. Andrew 1979, doi:10.1016/0020-0190(79)90072-3. The web process draws, and scipy is not loaded there.
-    """
-    ordered = np.unique(points, axis=0).tolist()
-    hull: list[list[float]] = []
-    for way in (ordered, ordered[::-1]):
-        begun = len(hull)
-        for x, y in way:
-            while len(hull) - begun > 1:
-                (x1, y1), (x2, y2) = hull[-2:]
-                if (x2 - x1) * (y - y1) > (y2 - y1) * (x - x1):
-                    break
-                hull.pop()
-            hull.append([x, y])
-        hull.pop()  # where the other way begins
-    return np.array(hull if len(hull) > 2 else []).reshape(-1, 2)
-
-
-def _write(parts: list[tuple[str, Floats]], title: str) -> str:
-    every = np.concatenate([outline for _, outline in parts])
+def _write(parts: list[tuple[str, list[Floats]]], title: str) -> str:
+    every = np.concatenate([line for _, outlines in parts for line in outlines])
     (left, low), (right, high) = every.min(axis=0), every.max(axis=0)
     low = min(low, 0.0)
     scale = min((HEIGHT_PX - 4) / (high - low), (WIDEST_PX - 4) / (right - left))
     width, height = scale * (right - left) + 4, scale * (high - low) + 4
     drawn = []
-    for css, outline in parts:
-        x, y = 2 + scale * (outline[:, 0] - left), 2 + scale * (high - outline[:, 1])
-        path = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x, y, strict=True))
-        drawn.append(f'<path class="{css}" d="M{path}z"/>')
+    for css, outlines in parts:
+        path = ""
+        for line in outlines:
+            x, y = 2 + scale * (line[:, 0] - left), 2 + scale * (high - line[:, 1])
+            path += f"M{'L'.join(f'{a:.1f} {b:.1f}' for a, b in zip(x, y, strict=True))}z"
+        drawn.append(f'<path class="{css}" d="{path}"/>')
     floor = 2 + scale * high
     return (
         f'<svg class="chart still" width="{width:.0f}" height="{height:.0f}" '

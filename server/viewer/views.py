@@ -29,6 +29,9 @@ from server.viewer.scene_server import socket_of, start_scene_server, stop_scene
 IDLE_S = 30.0
 """A view without a viewer is stopped after this; a page reload comes back well within it."""
 
+PATIENCE_S = 5.0
+"""A pipe waits as long for its view: the page loads the 3D client while the view is being opened."""
+
 SWEEP_S = 1.0
 MAX_VIEWS = 48
 """Open views at most, about 15 MB each for a 10 min walk if all show different ones."""
@@ -82,9 +85,10 @@ class FigureViews:
         self._views: dict[str, FigureView[Any]] = {}
         self._motions: weakref.WeakValueDictionary[str, ReplayMotion] = weakref.WeakValueDictionary()
         self._opening = asyncio.Lock()
+        self._awaited: dict[str, asyncio.Event] = {}
 
     def __len__(self) -> int:
-        return len(self._views)
+        return len(set(self._views.values()))
 
     def find(self, view_id: str, login_id: str, role: Role) -> FigureView[Any] | None:
         """Return a view to those who may look at it, None to everybody else."""
@@ -93,14 +97,32 @@ class FigureViews:
             return None
         return view
 
+    async def find_soon(self, view_id: str, login_id: str, role: Role) -> FigureView[Any] | None:
+        """As `find`, but wait a while for a view that nobody has opened yet."""
+        if view_id not in self._views:
+            opened = self._awaited.setdefault(view_id, asyncio.Event())
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(opened.wait(), PATIENCE_S)
+            self._awaited.pop(view_id, None)
+        return self.find(view_id, login_id, role)
+
     async def open(
-        self, login_id: str, tab: str, source: str, load: Callable[[], ReplayMotion], dark: bool = False
+        self,
+        login_id: str,
+        tab: str,
+        source: str,
+        load: Callable[[], ReplayMotion],
+        *,
+        dark: bool = False,
+        t_s: float = 0.0,
+        name: str | None = None,
     ) -> FigureView[ReplayFigure]:
         """Return the view of one browser tab on one source, made at need.
 
         Parameters
         ----------
         source : id of the analysis shown; `load` reads and prepares it and is called in a thread.
+        t_s : the moment shown first. name : the page's own id of it, which it is found by, too.
 
         Raises
         ------
@@ -110,6 +132,8 @@ class FigureViews:
         async with self._opening:
             view = self._known((login_id, tab, source))
             if view is not None:
+                view.figure.pose(t_s)
+                self._enter(name, view)
                 return view
             await self._make_room()
             motion = self._motions.get(source)
@@ -117,9 +141,11 @@ class FigureViews:
                 motion = await asyncio.to_thread(load)
                 self._motions[source] = motion
             server, figure = await asyncio.to_thread(
-                _start, lambda server: ReplayFigure(server, motion, dark)
+                _start, lambda server: ReplayFigure(server, motion, dark, t_s)
             )
-            return self._add((login_id, tab, source), login_id, Action.READ_RESULT, server, figure)
+            view = self._add((login_id, tab, source), login_id, Action.READ_RESULT, server, figure)
+            self._enter(name, view)
+            return view
 
     async def open_live(
         self,
@@ -150,13 +176,13 @@ class FigureViews:
     async def sweep(self) -> None:
         """Stop every view that nobody has watched for the idle time."""
         now = time.monotonic()
-        for view in list(self._views.values()):
+        for view in set(self._views.values()):
             if view.viewers == 0 and now - view.left_at >= self._idle_s:
                 await self._stop(view)
 
     async def close(self) -> None:
         """Stop all views."""
-        for view in list(self._views.values()):
+        for view in set(self._views.values()):
             await self._stop(view)
 
     @contextlib.asynccontextmanager
@@ -194,8 +220,13 @@ class FigureViews:
         self._views[view.id] = view
         return view
 
+    def _enter(self, name: str | None, view: FigureView[Any]) -> None:
+        """Let a view be found by a name, unless another has it."""
+        if name is not None and self._views.setdefault(name, view) is view and name in self._awaited:
+            self._awaited[name].set()
+
     async def _make_room(self) -> None:
-        if len(self._views) < self._limit:
+        if len(self) < self._limit:
             return
         unwatched = [v for v in self._views.values() if v.viewers == 0]
         if not unwatched:
@@ -206,7 +237,7 @@ class FigureViews:
         await self._stop(min(unwatched, key=lambda v: v.left_at))
 
     async def _stop(self, view: FigureView[Any]) -> None:
-        self._views.pop(view.id, None)
+        self._views = {name: other for name, other in self._views.items() if other is not view}
         if view.let_go is not None:
             view.let_go()
         await asyncio.to_thread(stop_scene_server, view.server)

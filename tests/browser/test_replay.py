@@ -12,7 +12,7 @@ import httpx
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from core.frames import SIDES
 from server.viewer.client import client_version
@@ -21,7 +21,7 @@ from tests.browser import filling
 from tests.browser.conftest import DESK, PACED, Filled, Opener, RunningServer, is_ours
 from tests.browser.picture import wait_for_picture, wait_until_still
 from tests.data import data_folder
-from tests.server.viewer.seeing import pixels_of
+from tests.server.viewer.seeing import pixels_of, shot
 from tests.walks import NEURA
 
 
@@ -104,6 +104,27 @@ def test_a_session_loads_little_the_first_time_and_next_to_nothing_again(
     assert len(again) == 1
     assert again[0] < 2_000, "a browser keeps viser's page"
     context.close()
+
+
+def test_the_first_picture_gives_way_to_the_figure_without_a_jump(
+    opened: Opener, solid: Browser, filled: Filled
+) -> None:
+    page, held = opened("/account", browser=solid), list[Route]()
+    page.route("**/views/client/*", lambda route: held.append(route))
+    page.goto(f"/sessions/{filled.done}", wait_until="domcontentloaded")
+    view = page.locator("gait-view")
+    drawn = shot(view)
+    expect(view.get_by_role("img", name="Where the replay begins")).to_be_visible()
+    expect(view.locator("[data-say]")).to_have_text("Opening the 3D view…")
+    while not held:
+        page.wait_for_timeout(20)
+    held[0].continue_()
+    page.locator("gait-view[data-drawn]").wait_for()
+    expect(view.get_by_role("img")).to_have_count(0)
+    shown = shot(view)
+    for side in SIDES:
+        first, then = (pixels_of(picture, TINTS[False][side]) for picture in (drawn, shown))
+        assert (first & then).sum() > 0.7 * max(first.sum(), then.sum()), side
 
 
 def test_a_lost_line_comes_back_by_itself(opened: Opener, solid: Browser, filled: Filled) -> None:

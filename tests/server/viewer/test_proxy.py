@@ -114,6 +114,27 @@ async def test_a_tab_gets_its_own_view_and_a_reload_the_same(ward: Ward) -> None
         assert other["view"] != again["view"]
 
 
+async def test_a_page_may_load_the_client_while_its_view_is_being_opened(ward: Ward) -> None:
+    headers, name = ward.cookie(), "0123456789abcdef" * 2
+
+    async def first_of_scene() -> object:
+        async with piped(ward, headers, name) as ws:
+            return await ws.recv()
+
+    early = asyncio.create_task(first_of_scene())
+    await asyncio.sleep(0.05)  # it waits, the view is not there yet
+    url = ward.url(f"/sessions/{ward.session_id}/replay?tab=early&t=3.0&view={name}")
+    async with connect(url, additional_headers=headers, proxy=None) as cursor:
+        assert json.loads(await cursor.recv())["view"] == name
+        assert isinstance(await asyncio.wait_for(early, 5), bytes)
+        view = views_of(ward).find(name, *_login_of(ward, headers))
+        assert view is not None
+        assert view is views_of(ward).find(view.id, *_login_of(ward, headers))
+    taken = {**ward.cookie("admin")}
+    async with connect(url, additional_headers=taken, proxy=None) as theirs:
+        assert json.loads(await theirs.recv())["view"] != name, "of somebody else the name is not heard"
+
+
 async def test_page_is_served_to_its_own_sign_in_only_and_with_its_own_policy(ward: Ward) -> None:
     headers = ward.cookie()
     async with (

@@ -49,9 +49,9 @@ class CycleCharts extends HTMLElement {
 
 class StrideStrip extends HTMLElement {
   connectedCallback() {
-    this.marks = [...this.querySelectorAll("g[data-stride]")];
-    for (const mark of this.marks) {
-      const stride = clock.strides[mark.dataset.stride];
+    this.marks = [...this.querySelectorAll("g")]; // one a stride, in the order of the list
+    for (const [index, mark] of this.marks.entries()) {
+      const stride = clock.strides[index];
       if (!mark.querySelector("title")) {
         const title = document.createElementNS("http://www.w3.org/2000/svg", "title");
         title.textContent = speak`${stride.side} stride, ${stride.start_s.toFixed(2)} to ${stride.end_s.toFixed(2)} s`;
@@ -65,7 +65,7 @@ class StrideStrip extends HTMLElement {
 
   show() {
     const now = clock.percent === null ? -1 : clock.strides.indexOf(clock.stride);
-    for (const mark of this.marks) mark.classList.toggle("on", Number(mark.dataset.stride) === now);
+    for (const [index, mark] of this.marks.entries()) mark.classList.toggle("on", index === now);
     const line = this.querySelector(".now");
     if (line && clock.duration) {
       const x = `${(100 * clock.t) / clock.duration}%`;

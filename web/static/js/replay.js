@@ -4,6 +4,8 @@ import { localise, speak, translate } from "./common/words.js";
 
 const RATE_MS = 33; // the figure is posed at most 30 times a second (docs/data-flow.md, "The 3D figure")
 const RETRY_MS = [500, 1000, 2000, 5000];
+const FADE_MS = 400; // longer than the first picture takes to go (pages.css)
+const PATIENCE_MS = 30_000; // a 3D view that has not said by then that it has drawn is shown as it is
 
 const isDark = () => getComputedStyle(document.documentElement).colorScheme.startsWith("dark");
 
@@ -22,12 +24,24 @@ const SEGMENTS = {
   shank_r: speak`right lower leg`, foot_l: speak`left foot`, foot_r: speak`right foot`,
 };
 
+// 32 hexadecimal digits, the page's own name for a view that the server is still opening
+const makeName = () => Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
+
+// What would delay the first picture of the page waits for it; a page that nobody sees paints none.
+const afterPaint = (then) => (document.hidden ? then() : requestAnimationFrame(() => setTimeout(then)));
+
 const setting = (button) => ({ [button.dataset.switch]: button.ariaPressed === "true" });
 
 class GaitView extends HTMLElement {
   connectedCallback() {
     this.frame = this.querySelector("iframe");
+    this.first = this.querySelector("[data-first]");
     this.tries = 0;
+    addEventListener("message", (e) => {
+      if (e.source !== this.frame.contentWindow || e.origin !== location.origin) return;
+      if (e.data === "drawn") this.uncover();
+      if (e.data === "no-3d") this.say(this.lacking = speak`This browser shows no 3D. The charts and the table have all values.`);
+    });
     this.onTick = () => this.request();
     clock.addEventListener("tick", this.onTick);
     const recolour = () => this.tell({ dark: isDark() });
@@ -62,7 +76,13 @@ class GaitView extends HTMLElement {
 
   connect() {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
-    const query = new URLSearchParams({ tab: tabId(), dark: String(isDark()) });
+    const query = new URLSearchParams({ tab: tabId(), dark: String(isDark()), t: String(clock.t) });
+    const client = this.tries ? null : this.getAttribute("client");
+    if (client) {
+      const view = this.view = makeName();
+      query.set("view", view);
+      afterPaint(() => this.load(`${client}#${view}${isDark() ? ",dark" : ""}`));
+    }
     if (this.dataset.ghost) query.set("ghost", this.dataset.ghost);
     this.socket = new WebSocket(`${scheme}://${location.host}${this.getAttribute("replay")}?${query}`);
     this.socket.onmessage = (e) => this.receive(JSON.parse(e.data));
@@ -80,11 +100,15 @@ class GaitView extends HTMLElement {
   receive(message) {
     if (message.error) {
       this.refused = message.error.code !== "bad_message";
+      if (this.refused) {
+        this.frame.hidden = true;
+        this.uncover();
+      }
       this.say(translate(message.error.detail));
     } else if (message.src) {
       this.tries = 0;
-      this.frame.src = isDark() ? `${message.src}?darkMode` : message.src;
-      this.frame.hidden = false;
+      if (message.view !== this.view) this.load(message.src);
+      this.view = null; // after a lost line it is another
       this.dataset.state = "open";
       this.say("");
       this.options.hidden = false;
@@ -110,21 +134,41 @@ class GaitView extends HTMLElement {
     }
   }
 
+  load(address) {
+    if (this.refused) return;
+    this.frame.src = address;
+    this.frame.hidden = false;
+    setTimeout(() => this.uncover(), PATIENCE_MS);
+  }
+
+  // The figure is there: the drawing in front of it goes.
+  uncover() {
+    const first = this.first;
+    this.first = null;
+    if (!first) return;
+    first.classList.add("gone");
+    setTimeout(() => first.remove(), FADE_MS);
+    this.dataset.drawn = "";
+    this.say(this.lacking ?? "");
+  }
+
   tell(message) {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
   }
 
   say(text) {
     const el = this.querySelector("[data-say]");
-    if (el && el.textContent !== text) el.textContent = text;
+    const said = text || (this.first ? speak`Opening the 3D view…` : "");
+    if (el && el.textContent !== said) el.textContent = said;
   }
 
   // The one that the figure is drawn on; viser has others.
   canvas() {
-    return this.frame.contentDocument.querySelector("canvas[data-engine]");
+    return this.frame.contentDocument?.querySelector("canvas[data-engine]");
   }
 
   async savePicture() {
+    if (!this.canvas()) return;
     const { savePicture } = await import("./figure-export.js");
     await savePicture(this.canvas(), () => this.tell({ t: clock.t }), `figure-${clock.t.toFixed(2)}s.png`);
   }
@@ -135,6 +179,7 @@ class GaitView extends HTMLElement {
       this.recording.stop();
       return;
     }
+    if (!this.canvas()) return;
     const { recordVideo } = await import("./figure-export.js");
     this.recording = recordVideo(this.canvas(), `figure-${clock.t.toFixed(2)}s`, () => {
       this.recording = null;

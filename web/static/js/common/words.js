@@ -19,6 +19,8 @@ const PATTERNS = Object.entries(CATALOGUE).filter(([message]) => PLACEHOLDER.tes
 }).sort((a, b) => b.words - a.words); // of two that fit, the one with more words of its own
 const FOLDED = new Map(Object.entries(CATALOGUE).map(([message, said]) => [message.toLowerCase(), said]));
 const WORDY = /\p{L}{3}.*\s\p{L}{3}.*\s\p{L}{3}/su; // a sentence that nobody knows, a citation: as it is
+const DAY = /^(\d{1,2}) (Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec) (\d{4})$/; // as the server writes it
+const SOURCED = /^(.+?)((?:, n = \d+)? \(.+\))$/s; // people, how many, and who measured them
 const MARK = new Intl.NumberFormat(LANGUAGE).format(0.5)[1];
 
 /** @param {string} said @param {Record<string, string>} values */
@@ -53,12 +55,18 @@ const MOST_SAID = 2000;
 function find(value) {
   if (!/\p{L}{2}/u.test(value)) return localise(value);
   const inner = value.trim();
+  if (DAY.test(inner)) {
+    const day = new Date(`${inner} 00:00`);
+    return value.replace(inner, day.toLocaleDateString(LANGUAGE, { day: "2-digit", month: "2-digit", year: "numeric" }));
+  }
   const known = CATALOGUE[inner] ?? recase(inner, FOLDED.get(inner.toLowerCase()));
   if (known !== undefined) return value.replace(inner, () => known);
   for (const { said, names, form } of PATTERNS) {
     const found = form.exec(inner);
     if (found) return value.replace(inner, () => fill(said, Object.fromEntries(names.map((name, i) => [name, translate(found[i + 1])]))));
   }
+  const [, said, source] = SOURCED.exec(inner) ?? [];
+  if (said && CATALOGUE[said]) return value.replace(inner, () => CATALOGUE[said] + source);
   const sentences = inner.split(/(?<=[.!?…])\s+(?=[A-Z0-9“])/);
   return sentences.length > 1 ? sentences.map(translate).join(" ") : WORDY.test(value) ? value : localise(value);
 }

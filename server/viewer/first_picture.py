@@ -1,0 +1,221 @@
+"""The first picture of a replay as a drawing, by the camera that the 3D view begins with.
+
+It stands in the page until the 3D view has drawn, which without a graphics processor takes seconds. The same
+parts at the same places: the figure, its shadow, what its feet left on the floor, and the floor's lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from core.frames import Bools, Floats
+from server.viewer.batches import ARMS, FAINT
+from server.viewer.body_parts import PartName
+from server.viewer.colours import Tint
+from server.viewer.few_poses import find_matrices
+from server.viewer.motion import ReplayMotion
+from server.viewer.outlines import find_front, split_surfaces, trace_edges
+from server.viewer.replay_floor import CHUNK, RECENT_PRINTS
+from server.viewer.room import FOV_RAD, CameraShot, frame_person
+from server.viewer.shapes import Mesh, make_footprint
+
+HEIGHT: Final = 500
+"""Units of the drawing from the top of the picture to its bottom; how wide the picture is does not matter."""
+
+SHADOW: Final = np.array([-0.2, -0.2])
+"""Where the shadow of what is 1 m above the floor falls, m: viser's own lamp, in the axes of the room."""
+
+LINES_M: Final = 7
+"""Lines of the floor are drawn as far to each side of the person."""
+
+_NEAREST_M: Final = 0.6
+_EVERY: Final = 2
+"""Of so many pieces of a trail one is drawn."""
+
+_OFF: Final = 0.7
+"""Units that a line may miss a point by."""
+
+_DEFS: Final = (
+    "<defs>"
+    + "".join(
+        f'<linearGradient id="fp-{k}"><stop offset=".5"/><stop offset="1"/></linearGradient>' for k in "lrb"
+    )
+    + '<linearGradient id="fp-far" gradientUnits="userSpaceOnUse" x1="0" x2="0" y1="-60" y2="250">'
+    '<stop stop-opacity="0"/><stop offset="1"/></linearGradient></defs>'
+)
+"""The lamp shines from above and ahead, and the floor ends in the distance."""
+_CSS: Final[dict[Tint, str]] = {"left": "fp-l", "right": "fp-r", "body": "fp-b", "ring": "fp-g"}
+
+
+@dataclass(frozen=True, eq=False)
+class _SeenSurface:
+    """A closed surface in the picture: vertices (n, 2) and depth (n,) m, the faces that look at who looks."""
+
+    name: PartName
+    css: str
+    opacity: float
+    mesh: Mesh
+    seen: Floats
+    depth: Floats
+    shown: Bools
+    shadow: Floats | None
+
+
+def draw_first_picture(motion: ReplayMotion, t_s: float) -> str | None:
+    """Draw the frame nearest to a time as `ReplayFigure` shows it first; None where it shows no figure then.
+
+    Returns
+    -------
+    An SVG as high as its place and centred in it; whatever it is wide, it is cut off or shows more floor.
+    """
+    frame = motion.index(t_s)
+    if not motion.valid[frame]:
+        return None
+    camera = _Camera(frame_person(motion.size, motion.facing))
+    place = np.append(motion.root[frame], 0.0)
+    surfaces = list(_see_surfaces(motion, frame, place, camera))
+    middle = (motion.root.min(axis=0) + motion.root.max(axis=0)) / 2 - place[:2]
+    shadows = [
+        _draw(s.mesh, s.shadow, find_front(s.shadow, s.mesh)) for s in surfaces if s.shadow is not None
+    ]
+    parts = [
+        f'<path class="fp-lines" d="{_draw_floor(camera, middle)}"/>',
+        *_draw_trails(motion, frame, place, camera),
+        *_draw_prints(motion, frame, place, camera),
+        f'<path class="fp-shadow" d="{"".join(shadows)}"/>',
+    ]
+    for s in _order(surfaces):
+        clear = "" if s.opacity == 1.0 else f' opacity="{s.opacity:g}"'
+        parts.append(f'<path class="{s.css}"{clear} d="{_draw(s.mesh, s.seen, s.shown)}"/>')
+    return (
+        f'<svg class="first-picture" viewBox="-1 {-HEIGHT // 2} 2 {HEIGHT}" aria-hidden="true">'
+        f"{_DEFS}{''.join(parts)}</svg>"
+    )
+
+
+class _Camera:
+    """A camera of the room: points (n, 3) m → the picture."""
+
+    def __init__(self, shot: CameraShot) -> None:
+        self.eye = np.array(shot.eye)
+        sight = np.array(shot.at) - self.eye
+        sight /= np.linalg.norm(sight)
+        right = np.cross(sight, (0.0, 0.0, 1.0))
+        right /= np.linalg.norm(right)
+        self._axes = np.stack((right, np.cross(right, sight), sight)).T
+
+    def see(self, points: Floats) -> tuple[Floats, Floats]:
+        """Where they are (n, 2), to the right and up from the middle of the picture, and how deep (n,), m."""
+        across, up, ahead = ((points - self.eye) @ self._axes).T
+        half = np.tan(FOV_RAD / 2) * ahead
+        return HEIGHT / 2 * np.column_stack((across, up)) / half[:, None], ahead
+
+
+def _see_surfaces(motion: ReplayMotion, frame: int, place: Floats, camera: _Camera) -> Iterator[_SeenSurface]:
+    for name, batch in motion.batches.items():
+        turns = find_matrices(batch.wxyz[frame].astype(np.float64))
+        meshes = list(split_surfaces(batch.mesh))
+        for k, (tint, measured) in enumerate(zip(batch.tint, batch.measured, strict=True)):
+            opacity = ARMS if name == "arms" else 1.0 if measured else FAINT
+            for mesh in meshes:
+                points = mesh[0] @ turns[k].T + batch.position[frame, k] - place
+                seen, depth = camera.see(points)
+                shadow = None
+                if name not in ("arms", "rings"):
+                    fallen = points[:, :2] + points[:, 2:] * SHADOW
+                    shadow, _ = camera.see(np.column_stack((fallen, np.zeros(len(fallen)))))
+                shown = find_front(seen, mesh)
+                if name == "rings":  # their flat ends are inside the leg
+                    shown &= np.ptp(mesh[0][mesh[1], 1], axis=1) > 0
+                yield _SeenSurface(name, _CSS[tint], opacity, mesh, seen, depth, shown, shadow)
+
+
+def _order(surfaces: list[_SeenSurface]) -> list[_SeenSurface]:
+    """From the farthest to the nearest, rings after their leg."""
+    far = {id(s): float(s.depth.mean()) for s in surfaces}
+    leg = next((far[id(s)] for s in surfaces if (s.name, s.css) == ("shanks", _CSS["right"])), 0.0)
+    return sorted(surfaces, key=lambda s: (-leg, 1.0) if s.name == "rings" else (-far[id(s)], 0.0))
+
+
+def _draw_floor(camera: _Camera, middle: Floats) -> str:
+    """Lines of the floor every metre, in front of the camera."""
+    path = ""
+    at = np.arange(-LINES_M, LINES_M + 1)
+    for axis in (0, 1):
+        for k in at + middle[axis] % 1.0:
+            ends = np.zeros((2, 3))
+            ends[:, axis], ends[:, 1 - axis] = k, (-LINES_M, LINES_M)
+            ahead = camera.see(ends)[1]
+            if ahead.max() <= _NEAREST_M:
+                continue
+            if ahead.min() < _NEAREST_M:
+                near = int(np.argmin(ahead))
+                share = (_NEAREST_M - ahead[near]) / (ahead[1 - near] - ahead[near])
+                ends[near] += share * (ends[1 - near] - ends[near])
+            path += _write_line(camera.see(ends)[0])
+    return path
+
+
+def _draw_trails(motion: ReplayMotion, frame: int, place: Floats, camera: _Camera) -> Iterator[str]:
+    for side, trail in motion.trails.items():
+        count = int(np.searchsorted(trail.t_s, motion.t_s[frame], side="right"))
+        pieces = trail.pieces[max(0, count // CHUNK - 1) * CHUNK : count]
+        if len(pieces):
+            points = np.concatenate((pieces[:-1:_EVERY, 0], pieces[-1:, 1])) - place
+            seen, ahead = camera.see(points)
+            yield f'<path class="fp-way {_CSS[side]}" d="{_write_line(seen[ahead > _NEAREST_M])}"/>'
+
+
+def _draw_prints(motion: ReplayMotion, frame: int, place: Floats, camera: _Camera) -> Iterator[str]:
+    for side, prints in motion.prints.items():
+        count = int(np.searchsorted(prints.t_s, motion.t_s[frame], side="right"))
+        mesh = make_footprint(motion.body.foot, side)
+        path = ""
+        for k in range(max(0, count - RECENT_PRINTS), count):
+            turn = find_matrices(prints.wxyz[k].astype(np.float64))
+            seen, ahead = camera.see(mesh[0] @ turn.T + prints.position[k] - place)
+            if ahead.min() > _NEAREST_M:
+                path += _draw(mesh, seen, find_front(seen, mesh))
+        if path:
+            yield f'<path class="fp-print {_CSS[side]}" d="{path}"/>'
+
+
+def _draw(mesh: Mesh, seen: Floats, shown: Bools) -> str:
+    return "".join(f"{_write_line(seen[line])}z" for line in trace_edges(mesh, shown))
+
+
+def _write_line(points: Floats) -> str:
+    """A line through points in whole units, without those that it comes near anyway."""
+    whole = np.rint(points * (1, -1)).astype(int)
+    whole = whole[_find_corners(whole.astype(float))]
+    steps = np.diff(whole, axis=0)
+    steps = steps[(steps != 0).any(axis=1)]
+    numbers = " ".join(f"{x} {y}" for x, y in steps.tolist()).replace(" -", "-")
+    return f"M{whole[0, 0]} {whole[0, 1]}l{numbers}" if len(steps) else ""
+
+
+def _find_corners(points: Floats) -> list[int]:
+    """Indices of the points that a line needs (Douglas and Peucker 1973, doi:10.3138/FM57-6770-U75U-7727)."""
+    kept, spans = {0, len(points) - 1}, [(0, len(points) - 1)]
+    while spans:
+        first, last = spans.pop()
+        if last - first < 2:
+            continue
+        along = points[last] - points[first]
+        away = points[first + 1 : last] - points[first]
+        length = np.hypot(*along)
+        off = abs(_turn(along, away)) / length if length else np.hypot(*away.T)
+        k = int(np.argmax(off))
+        if off[k] > _OFF:
+            middle = first + 1 + k
+            kept.add(middle)
+            spans += [(first, middle), (middle, last)]
+    return sorted(kept)
+
+
+def _turn(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
