@@ -144,18 +144,20 @@ def read_recording(data: bytes, source: str) -> Recording:
                 "bad_parquet", f"{source} declares {meta.num_rows} rows, {unpacked} bytes: too large."
             )
         info = _read_info((meta.metadata or {}).get(_KEY), source)
-        return _recording(file.read(use_threads=False), info, source)
+        return _recording(file, info, source)
     except DAMAGE as e:
         raise FormatError("bad_parquet", f"{source} is a damaged recording ({e}); upload it again.") from e
 
 
-def count_rows(file: SourceFile) -> int:
-    """Rows of a Parquet file; 0 where it is damaged."""
+def count_rows_and_sensors(file: SourceFile) -> tuple[int, int]:
+    """Rows and sensors of a Parquet file; 0 where it is damaged."""
     try:
         with file.open() as opened:
-            return int(pq.ParquetFile(opened).metadata.num_rows)
+            opened_file = pq.ParquetFile(opened)
+            sensors = sum(name.endswith(f".{_AXES['acc'][0]}") for name in opened_file.schema_arrow.names)
+            return int(opened_file.metadata.num_rows), sensors
     except DAMAGE:
-        return 0
+        return 0, 0
 
 
 def open_long(file: SourceFile) -> Recording:
@@ -254,16 +256,18 @@ def _read_subject(info: Mapping[str, object]) -> Subject:
     )
 
 
-def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Recording:
-    axis = table[_TIME].to_numpy() * 1e-6
+def _recording(file: pq.ParquetFile, info: Mapping[str, object], source: str) -> Recording:
+    axis = file.read([_TIME], use_threads=False)[_TIME].to_numpy() * 1e-6
     streams: dict[str, ImuStream] = {}
     segments: dict[str, object] = {}
     notices: list[Notice] = []
     for sensor in _list(info["sensors"]):
         device = str(sensor["id"])
-        first = table[f"{device}.acc_x"].combine_chunks()
+        name = f"{device}.acc_x"
+        first = file.read([name], use_threads=False)[name].combine_chunks()
         rows = np.flatnonzero(np.asarray(first.is_valid(), np.bool_)) if first.null_count else slice(None)
-        signals = {kind: _signal(table, device, names, rows) for kind, names in _AXES.items()}
+        del first
+        signals = {kind: _signal(file, device, names, rows) for kind, names in _AXES.items()}
         acc = signals["acc"]
         if acc is None:
             raise KeyError(f"{device}.acc")
@@ -307,12 +311,15 @@ def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Reco
 
 
 def _signal(
-    table: pa.Table, device: str, names: tuple[str, ...], rows: NDArray[np.int64] | slice
+    file: pq.ParquetFile, device: str, names: tuple[str, ...], rows: NDArray[np.int64] | slice
 ) -> Floats | None:
-    if f"{device}.{names[0]}" not in table.column_names:
+    """One signal (n, axes) alone: the whole table beside the signals would be half of these once more."""
+    columns = [f"{device}.{n}" for n in names]
+    if columns[0] not in file.schema_arrow.names:
         return None
+    table = file.read(columns, use_threads=False)
     with np.errstate(invalid="ignore"):
-        return np.stack([table[f"{device}.{n}"].to_numpy()[rows] for n in names], axis=-1).astype(np.float64)
+        return np.stack([table[n].to_numpy()[rows] for n in columns], axis=-1, dtype=np.float64)
 
 
 def _clear_infinite(device: str, signals: Mapping[str, Floats | None]) -> list[Notice]:

@@ -24,8 +24,13 @@ from core.sample_blocks import LongStream
 
 _SHOWN = 5
 
-LONG_ROWS: Final = 2_000_000
-"""A longer table is read block by block, for the monitor of daily life: five and a half hours at 100 Hz."""
+ROW_BYTES: Final = 1000.0
+SENSOR_BYTES: Final = 150.0
+"""Memory that an analysis needs for a row and for each sensor in it: two feet 1.3 kB, seven sensors 2."""
+
+MOST_BYTES: Final = 4.2e9
+"""A recording that needs more is read block by block, for the monitor of daily life: at 100 Hz five and a
+half hours of seven sensors, nine of two feet. Half of what a process may use (server/settings.py)."""
 
 
 @dataclass
@@ -186,12 +191,12 @@ def _take_long(member: SourceFile, spec: SourceSpec | None, upload: _Upload) -> 
                     sensor=stream.device_id,
                 )
             upload.long[stream.device_id] = stream
-            long = stream.duration_s * stream.rate_hz > LONG_ROWS
+            long = is_too_long(stream.duration_s * stream.rate_hz, 1)
         elif parquet.looks_like(head):
-            long = parquet.count_rows(member) > LONG_ROWS
+            long = is_too_long(*parquet.count_rows_and_sensors(member))
             if long:
                 upload.stored.append(parquet.open_long(member))
-        elif spec and spec.columns and table.estimate_rows(head, member.size) > LONG_ROWS:
+        elif spec and spec.columns and is_too_long(table.estimate_rows(head, member.size), len(spec.columns)):
             long = True
             upload.long |= table.open_long_table(member, spec)
         if not long:
@@ -203,6 +208,11 @@ def _take_long(member: SourceFile, spec: SourceSpec | None, upload: _Upload) -> 
         upload.problems.append((member.name, e))
         return True
     return True
+
+
+def is_too_long(rows: float, sensors: int) -> bool:
+    """Whether a recording is too long to be analysed at once; known before any of it is read."""
+    return rows * (ROW_BYTES + SENSOR_BYTES * sensors) > MOST_BYTES
 
 
 def _needs_manifest(name: str, data: bytes) -> str:

@@ -91,8 +91,10 @@ def analyse(
         When not even a common time axis can be made. Later stages never raise: what stops them is
         `TakeAnalysis.problem`.
     """
-    begun = TakeAnalysis(recording, config or PipelineConfig(), version)
-    return _run_from(begun, 0, progress, resumable=resumable)
+    begun = [TakeAnalysis(recording, config or PipelineConfig(), version)]
+    # what a stage lets go of is freed only where nobody here holds the take as it was
+    del recording
+    return _run_from(begun.pop(), 0, progress, resumable=resumable)
 
 
 def choose_recipe(analysis: TakeAnalysis) -> tuple[PipelineStage, ...]:
@@ -201,7 +203,7 @@ def _run_from(
     if analysis.source.protocol == "activity":
         analysis = run_stages(analysis, ACTIVITY[first:], progress)
     else:
-        analysis = run_stages(analysis, SIGNALS[first:], progress)
+        analysis = run_stages(analysis, SIGNALS[first:], progress, resumable=resumable)
         rest = choose_recipe(analysis)[max(first, len(SIGNALS)) :]
         analysis = run_stages(analysis, rest, progress, resumable=resumable)
     progress("done", 1.0)

@@ -115,6 +115,24 @@ def judge_signals(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
     return replace(analysis, report=report, problem=problem)
 
 
+def forget_magnetometers(analysis: TakeAnalysis) -> TakeAnalysis:
+    """No magnetometers: behind quality only a comparison of filters reads them."""
+    source, uniform, agreed = analysis.source, analysis.uniform, analysis.agreed
+    streams = {d: replace(s, mag=None) for d, s in source.streams.items()}
+    analysis = replace(analysis, source=replace(source, streams=streams))
+    if uniform is not None:
+        analysis = replace(analysis, uniform=_without_magnetometers(uniform))
+    if agreed is not None:
+        whole = None if agreed.whole is None else _without_magnetometers(agreed.whole)
+        kept = replace(agreed, recording=_without_magnetometers(agreed.recording), whole=whole)
+        analysis = replace(analysis, agreed=kept)
+    return analysis
+
+
+def _without_magnetometers(recording: UniformRecording) -> UniformRecording:
+    return replace(recording, sensors={s: replace(x, mag=None) for s, x in recording.sensors.items()})
+
+
 def calibrate_sensors(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """How each working sensor sits on its segment."""
     working = drop_stuck_sensors(analysis.recording)
@@ -340,7 +358,9 @@ TIMELINE: Final = PipelineStage("timeline", 0.0, lay_on_one_axis, ("uniform",), 
 AGREEMENT: Final = PipelineStage(
     "agreement", 0.02, compare_clocks, ("agreed",), ("setup", "agreement", "timeline")
 )
-QUALITY: Final = PipelineStage("quality", 0.03, judge_signals, ("report",), ("quality",))
+QUALITY: Final = PipelineStage(
+    "quality", 0.03, judge_signals, ("report",), ("quality",), let_go=forget_magnetometers
+)
 CALIBRATION: Final = PipelineStage("calibration", 0.05, calibrate_sensors, ("calibrated",), ("calibration",))
 ORIENTATION: Final = PipelineStage("orientation", 0.1, orient_segments, ("fused",), ("fusion",))
 EVENTS: Final = PipelineStage(

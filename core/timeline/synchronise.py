@@ -191,15 +191,20 @@ def _lay_sensor(
             f"Sensor {s.device_id} has no sample with both acceleration and angular rate; export it again.",
             sensor=s.device_id,
         )
-    channels = np.concatenate((s.acc[good], s.gyr[good]), axis=1)
-    (acc, gyr), valid, filled = lay_signal(s.t_s[good], channels, start_s, samples, s.rate_hz, rate, params)
     mag = _lay_magnetometer(s, start_s, samples, rate, params)
     first = int(np.searchsorted(s.t_s, start_s - params.on_grid / rate))
+    if _lies_on_axis(s.t_s, good, first, start_s, samples, rate, params):
+        # what laying would copy bit for bit; rows one after the other, as sums over others round otherwise
+        acc, gyr = (np.ascontiguousarray(x[first : first + samples]) for x in (s.acc, s.gyr))
+        valid = np.ones(samples, np.bool_)
+        return SensorSignals(s.device_id, acc, gyr, mag, valid, ~valid)
+    channels = np.concatenate((s.acc[good], s.gyr[good]), axis=1)
+    (acc, gyr), valid, filled = lay_signal(s.t_s[good], channels, start_s, samples, s.rate_hz, rate, params)
     return SensorSignals(
         s.device_id,
         _hold_once(acc, s.acc[first:]),
         _hold_once(gyr, s.gyr[first:]),
-        None if mag is None or s.mag is None else _hold_once(mag, s.mag[first:]),
+        mag,
         valid,
         filled,
     )
@@ -214,6 +219,21 @@ def _hold_once(laid: Floats, own: Floats) -> Floats:
     return own if own.flags.c_contiguous and np.array_equal(laid, own) else laid
 
 
+def _lies_on_axis(
+    t_s: Floats, good: Bools, first: int, start_s: float, samples: int, rate: float, params: TimelineParams
+) -> bool:
+    """Whether every point of the axis has one good sample on it, that of row `first` the first, and so on.
+
+    Told in the words of `lay_points`, so that rounding decides alike.
+    """
+    past, slack = first + samples, params.on_grid / rate
+    if past > len(t_s) or not good[first:past].all():
+        return False
+    axis, own = start_s + np.arange(samples) / rate, t_s[first:past]
+    alone = past == len(t_s) or t_s[past] > axis[-1] + slack
+    return bool(alone and np.all((own >= axis - slack) & (own <= axis + slack)))
+
+
 def _lay_magnetometer(
     s: ImuStream, start_s: float, samples: int, rate: float, params: TimelineParams
 ) -> Floats | None:
@@ -223,8 +243,11 @@ def _lay_magnetometer(
     good = is_complete(s.mag)
     if np.count_nonzero(good) < 0.5 * len(good):
         return None
+    first = int(np.searchsorted(s.t_s, start_s - params.on_grid / rate))
+    if _lies_on_axis(s.t_s, good, first, start_s, samples, rate, params):
+        return np.ascontiguousarray(s.mag[first : first + samples])
     values, _, _ = lay_signal(s.t_s[good], s.mag[good], start_s, samples, s.rate_hz, rate, params)
-    return np.asarray(values[0])
+    return _hold_once(np.asarray(values[0]), s.mag[first:])
 
 
 def is_complete(x: Floats) -> Bools:

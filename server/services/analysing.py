@@ -71,8 +71,9 @@ def analyse_files(
 
     tell("reading", 0.0)
     chosen = override_config(PipelineConfig(), choose_config(files, config))
-    take = read_recording(files, parse_manifest(manifest) if manifest is not None else None)
-    return analyse(take, chosen, tell, CODE_VERSION, resumable=resumable)
+    declared = parse_manifest(manifest) if manifest is not None else None
+    # by no name of its own: `analyse` lets go of parts of it
+    return analyse(read_recording(files, declared), chosen, tell, CODE_VERSION, resumable=resumable)
 
 
 def choose_config(files: Sequence[SourceFile], config: Mapping[str, Any] | None) -> Mapping[str, Any]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from core.angles.measure import measure_angles
 from core.body.l7s.filter import Adjoint, L7sParams, Worn
-from core.body.l7s.inputs import free_acceleration
+from core.body.l7s.inputs import SampleSeries, free_acceleration
 from core.body.l7s.poses import l7s_poses
 from core.body.model import BodyModel
 from core.body.poses import Poses
@@ -70,7 +70,7 @@ class Trial:
 
     calibrated: CalibratedRecording
     orientations: Orientations
-    acceleration: Mapping[Segment, Floats]
+    acceleration: Mapping[Segment, SampleSeries]
     steps: Mapping[Side, Bools]
     truth: WalkTruth
 
@@ -118,7 +118,7 @@ def turned_headings(of: Trial, by_deg: Mapping[Segment, float]) -> Trial:
     for segment, degrees in by_deg.items():
         turn = about(2, radians(degrees))
         q[segment] = multiply(turn, q[segment])
-        acceleration[segment] = rotate(turn, acceleration[segment])
+        acceleration[segment] = rotate(turn, acceleration[segment][:])
     return replace(of, orientations=replace(of.orientations, q=q), acceleration=acceleration)
 
 

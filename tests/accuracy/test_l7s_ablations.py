@@ -13,8 +13,8 @@ from typing import Final, get_args
 import numpy as np
 
 from core.body.l7s.filter import Adjoint, L7sParams, filter_block, start_l7s_state
-from core.body.l7s.inputs import inputs_of
-from core.body.l7s.legs import LegModel, solve_legs
+from core.body.l7s.inputs import take_of
+from core.body.l7s.legs import FIGURE, LegModel, solve_legs
 from core.body.poses import Poses
 from core.frames import FOOT, SIDES, Floats
 from tests.accuracy.l7s_walks import Trial, trial, trial_scores
@@ -64,8 +64,8 @@ def poses_of(of: Trial, R: Floats, p: Floats, model: LegModel) -> Poses:
     return Poses(
         t_s=of.orientations.t_s,
         rate_hz=RATE,
-        q=legs.q_by_segment(),
-        p=legs.p_by_segment(),
+        q={s: legs.q[:, i] for i, s in enumerate(FIGURE)},
+        p={s: legs.p[:, i] for i, s in enumerate(FIGURE)},
         valid=np.ones(n, bool),
         contact={FOOT[s]: of.steps[s] for s in SIDES},
         body=of.truth.body,
@@ -80,7 +80,7 @@ def scored(name: str, adjoint: Adjoint) -> Floats:
     params = L7sParams(adjoint=adjoint, projections=projections)
     of = trial("walk", 1.70, 2)
     model = LegModel.of(of.truth.body)
-    inputs = inputs_of(of.orientations, of.acceleration, of.steps, model, "3I")
+    inputs = take_of(of.orientations, of.acceleration, of.steps, model, "3I").part(slice(None))
     # the ankle at +d/2 is a middle of the foot that lies behind the ankle
     used = replace(model, foot=-model.foot) if flipped else model
     if form is None:

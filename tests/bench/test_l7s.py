@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
-from core.body.l7s.inputs import free_acceleration, inputs_of
+from core.body.l7s.inputs import free_acceleration, take_of
 from core.body.l7s.legs import LegModel
 from core.body.l7s.poses import compile_l7s_kernel
 from core.body.l7s.smoother import smooth_track
@@ -47,7 +47,8 @@ def walk(worn: Worn) -> tuple[L7sInputs, LegModel]:
         gyr = x.gyr - calibrated.calibration.segments[FOOT[side]].gyro_bias
         steps[side] = still_samples(x.acc, gyr, x.valid, RATE, FOOT_STILL)
     model = LegModel.of(truth.body)
-    return inputs_of(orientations, free_acceleration(calibrated, orientations), steps, model, worn), model
+    take = take_of(orientations, free_acceleration(calibrated, orientations), steps, model, worn)
+    return take.part(slice(None)), model
 
 
 def best(run: Callable[[], object], times: int = 5) -> float:

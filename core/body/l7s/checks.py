@@ -8,7 +8,8 @@ of core/simulate and on neura_walk, right and with sensors exchanged; limits are
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
@@ -41,7 +42,42 @@ LEAST_TURN: Final = np.radians(60.0)
 """Root of the sum of the squared turns of the strides below which nothing is said from turns."""
 
 
-def walking_checks(inputs: L7sInputs, track: L7sTrack, model: LegModel, rate_hz: float) -> dict[str, float]:
+@dataclass(frozen=True, eq=False)
+class SeenWalk:
+    """What the checks look at: of a block of samples, or of a take.
+
+    Parameters
+    ----------
+    step : (n, 2) foot still, left and right. forward : (n, 2) where both feet point, level, of any length.
+    feet : (n, 2, 2) level places of the filter, m. pelvis : (n, 3) acceleration upwards and to its left,
+    m/s², and how far it tilts forward, rad; None without its sensor.
+    """
+
+    step: Bools
+    forward: Floats
+    feet: Floats
+    pelvis: Floats | None
+
+    @classmethod
+    def of(cls, inputs: L7sInputs, track: L7sTrack) -> SeenWalk:
+        """Of a block and what the filter makes of it."""
+        forward = inputs.R[:, 1, :2, 2] + inputs.R[:, 2, :2, 2]
+        pelvis = _see_pelvis(inputs) if inputs.worn == "3I" else None
+        return cls(inputs.step, forward, track.p[:, 1:, :2].copy(), pelvis)
+
+    @classmethod
+    def join(cls, blocks: Sequence[SeenWalk]) -> SeenWalk:
+        """Successive blocks as one."""
+        pelvis = [x.pelvis for x in blocks if x.pelvis is not None]
+        return cls(
+            np.concatenate([x.step for x in blocks]),
+            np.concatenate([x.forward for x in blocks]),
+            np.concatenate([x.feet for x in blocks]),
+            np.concatenate(pelvis) if pelvis else None,
+        )
+
+
+def walking_checks(seen: SeenWalk, model: LegModel, rate_hz: float) -> dict[str, float]:
     """Measured quantities by name; one that the take does not show is not there.
 
     Returns
@@ -55,21 +91,20 @@ def walking_checks(inputs: L7sInputs, track: L7sTrack, model: LegModel, rate_hz:
     most that its height changes within some seconds, which L7S takes to be constant.
     """
     found: dict[str, float] = {}
-    moving = np.asarray(~inputs.step.all(axis=1))
-    forward = inputs.R[:, 1, :2, 2] + inputs.R[:, 2, :2, 2]
-    heading = np.unwrap(np.arctan2(forward[:, 1], forward[:, 0]))
+    moving = np.asarray(~seen.step.all(axis=1))
+    heading = np.unwrap(np.arctan2(seen.forward[:, 1], seen.forward[:, 0]))
     if moving.any():
         to_left = np.stack((-np.sin(heading), np.cos(heading)), axis=1)
-        outward = np.sum(to_left * (track.p[:, 1] - track.p[:, 2])[:, :2], axis=1)[moving]
+        outward = np.sum(to_left * (seen.feet[:, 0] - seen.feet[:, 1]), axis=1)[moving]
         low, high = (x * model.hip_width for x in OUTWARD)
         found["out_of_place_share"] = float(np.mean((outward < low) | (outward > high)))
-    rests = [_rests(inputs.step[:, leg], rate_hz) for leg in range(2)]
+    rests = [_rests(seen.step[:, leg], rate_hz) for leg in range(2)]
     phases = _phases(rests[0], rests[1], rate_hz) + _phases(rests[1], rests[0], rate_hz)
     if len(phases) >= LEAST_STRIDES:
         found["phase_off"] = float(np.median(np.abs(np.array(phases) - 0.5)))
-    if inputs.worn == "3I":
-        return found | _pelvis(inputs, moving, rate_hz)
-    return found | _turns(rests, heading, track, STRIDE_S[1] * rate_hz)
+    if seen.pelvis is not None:
+        return found | _pelvis(seen.pelvis, seen.step, moving, rate_hz)
+    return found | _turns(rests, heading, seen.feet, STRIDE_S[1] * rate_hz)
 
 
 def longest_gaps(valid: Mapping[Segment, Bools], rate_hz: float) -> dict[Segment, float]:
@@ -99,12 +134,12 @@ def _phases(own: np.ndarray, other: np.ndarray, rate_hz: float) -> list[float]:
     return phases
 
 
-def _turns(rests: list[np.ndarray], heading: Floats, track: L7sTrack, longest: float) -> dict[str, float]:
+def _turns(rests: list[np.ndarray], heading: Floats, feet: Floats, longest: float) -> dict[str, float]:
     """How much further the inner foot goes than the outer: two feet at a distance on a turning body."""
     left, right = rests
     if len(left) < 2 or len(right) < 2:
         return {}
-    ways = [_way(rests[leg], heading, track.p[:, 1 + leg]) for leg in range(2)]
+    ways = [_way(rests[leg], heading, feet[:, leg]) for leg in range(2)]
     ahead = np.diff(np.interp(left, right, ways[1])) - np.diff(ways[0])
     # standing and gaps are no strides, of either foot
     pause = np.flatnonzero(np.diff(right) > longest)
@@ -122,19 +157,25 @@ def _way(rests: np.ndarray, heading: Floats, p: Floats) -> Floats:
     """Way forward (rests,) in m that a foot has gone from its first rest on."""
     middle = 0.5 * (heading[rests[:-1]] + heading[rests[1:]])
     along = np.stack((np.cos(middle), np.sin(middle)), axis=1)
-    return np.concatenate(([0.0], np.cumsum(np.sum(np.diff(p[rests, :2], axis=0) * along, axis=1))))
+    return np.concatenate(([0.0], np.cumsum(np.sum(np.diff(p[rests], axis=0) * along, axis=1))))
 
 
-def _pelvis(inputs: L7sInputs, moving: Bools, rate_hz: float) -> dict[str, float]:
-    found = {"pelvis_rise_m": _rise(inputs.acc[:, 0, 2], rate_hz)}
+def _see_pelvis(inputs: L7sInputs) -> Floats:
+    """`SeenWalk.pelvis` of a block."""
     R = inputs.R[:, 0]
     to_left = R[:, :2, 1] / np.maximum(np.linalg.norm(R[:, :2, 1], axis=1), 1e-9)[:, None]
     sideways = np.sum(to_left * inputs.acc[:, 0, :2], axis=1)
-    alone = [inputs.step[:, leg] & ~inputs.step[:, 1 - leg] for leg in range(2)]
+    return np.stack((inputs.acc[:, 0, 2], sideways, np.arctan2(-R[:, 2, 0], R[:, 2, 2])), axis=1)
+
+
+def _pelvis(pelvis: Floats, step: Bools, moving: Bools, rate_hz: float) -> dict[str, float]:
+    upwards, sideways, tilt = pelvis.T
+    found = {"pelvis_rise_m": _rise(upwards, rate_hz)}
+    alone = [step[:, leg] & ~step[:, 1 - leg] for leg in range(2)]
     if alone[0].any() and alone[1].any():
         found["toward_foot_mps2"] = 0.5 * float(sideways[alone[0]].mean() - sideways[alone[1]].mean())
     if moving.any():
-        found["pelvis_tilt_sd_rad"] = float(np.std(np.arctan2(-R[moving, 2, 0], R[moving, 2, 2])))
+        found["pelvis_tilt_sd_rad"] = float(np.std(tilt[moving]))
     return found
 
 

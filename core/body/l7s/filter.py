@@ -129,6 +129,10 @@ class L7sTrack:
     v: Floats
     variance: Floats
 
+    def part(self, which: slice) -> L7sTrack:
+        """Some of the samples."""
+        return L7sTrack(self.R[which], self.p[which], self.v[which], self.variance[which])
+
 
 def filter_block(
     state: L7sState, inputs: L7sInputs, model: LegModel, rate_hz: float, params: L7sParams | None = None

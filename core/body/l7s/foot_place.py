@@ -18,6 +18,7 @@ import numpy as np
 
 from core.body.l7s.checks import BREAK_S, STRIDE_S
 from core.body.l7s.filter import L7sInputs
+from core.body.l7s.inputs import L7sTake
 from core.body.l7s.legs import LEGS, LegModel
 from core.frames import Bools, Floats
 from core.rest import find_runs
@@ -35,7 +36,7 @@ ON_FOOT_M: Final = 0.12
 """No place on a foot is further from its middle."""
 
 
-def find_sensor_offsets(inputs: L7sInputs, valid: Bools, model: LegModel, rate_hz: float) -> Floats:
+def find_sensor_offsets(inputs: L7sInputs | L7sTake, valid: Bools, model: LegModel, rate_hz: float) -> Floats:
     """Vector (2, 3) from each foot's sensor to the foot's middle, in Sy's axes of the foot, m.
 
     Zero, what the paper takes, where too few strides show it. Across the foot always zero: it rolls about
@@ -48,11 +49,9 @@ def find_sensor_offsets(inputs: L7sInputs, valid: Bools, model: LegModel, rate_h
     found = np.zeros((len(LEGS), 3))
     for leg in range(len(LEGS)):
         b = 1 + leg
-        seen = [
-            ball
-            for first, last in _swings(inputs.step[:, leg], valid[:, b], rate_hz)
-            if (ball := _find_ball(inputs.R[first:last, b], inputs.acc[first:last, b], rate_hz)) is not None
-        ]
+        swings = (inputs.part(slice(*x)) for x in _swings(inputs.step[:, leg], valid[:, b], rate_hz))
+        found_balls = (_find_ball(x.R[:, b], x.acc[:, b], rate_hz) for x in swings)
+        seen = [ball for ball in found_balls if ball is not None]
         if len(seen) < LEAST_STRIDES:
             continue
         forward_down = np.median(seen, axis=0) - [0.0, 0.5 * model.foot]
@@ -80,8 +79,6 @@ def _find_ball(R: Floats, acc: Floats, rate_hz: float) -> Floats | None:
     ----------
     R : (m, 3, 3) and acc : (m, 3) of the foot from rest to rest.
     """
-    from scipy.integrate import cumulative_trapezoid
-
     rising = -np.arcsin(np.clip(R[:, 2, 2], -1.0, 1.0))
     rising -= rising[0]
     highest = int(np.argmax(rising))
@@ -93,9 +90,15 @@ def _find_ball(R: Floats, acc: Floats, rate_hz: float) -> Floats | None:
     last = min(last, int(over[0])) if len(over) else last
     if rising[last] < LEAST_ROLL:
         return None
-    v = cumulative_trapezoid(acc, dx=1.0 / rate_hz, axis=0, initial=0)
+    v = _integrate(acc, 1.0 / rate_hz)
     v -= np.linspace(0.0, 1.0, len(v))[:, None] * v[-1]
     part = slice(0, last + 1)
-    way = cumulative_trapezoid(v[part], dx=1.0 / rate_hz, axis=0, initial=0)
+    way = _integrate(v[part], 1.0 / rate_hz)
     turned = (R[0] - R[part])[:, :, ::2].reshape(-1, 2)
     return np.asarray(np.linalg.lstsq(turned, way.reshape(-1), rcond=None)[0])
+
+
+def _integrate(x: Floats, dt: float) -> Floats:
+    """Integral (m, 3) of x (m, 3) from its first sample on, by trapezia."""
+    steps = np.cumsum(dt * (x[1:] + x[:-1]) / 2.0, axis=0)
+    return np.concatenate((np.zeros((1, x.shape[1])), steps))

@@ -6,6 +6,8 @@ Every kernel goes on from one block of samples to the next, so that a file is on
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
 import numba
 import numpy as np
@@ -16,6 +18,7 @@ from core.calibration.result import CalibratedRecording, SegmentCalibration
 from core.errors import EstimationError
 from core.frames import FOOT, GRAVITY, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
+from core.recording import SensorSignals
 from core.rotation.compiled import multiply3, to_matrix, transform
 
 
@@ -110,12 +113,35 @@ def remove_gravity(acc: Floats, valid: Bools, q: Floats, mounted: SegmentCalibra
     return out
 
 
-def free_acceleration(calibrated: CalibratedRecording, orientations: Orientations) -> dict[Segment, Floats]:
-    """Accelerations (n, 3) of all sensors with an orientation, as `remove_gravity`."""
+class SampleSeries(Protocol):
+    """Samples (n, 3) of which a part is asked for: an array, or what is computed when it is."""
+
+    def __getitem__(self, part: slice, /) -> Floats: ...
+
+
+@dataclass(frozen=True, eq=False)
+class FreeAcceleration:
+    """Acceleration of one sensor as `remove_gravity`, of the part that is asked for.
+
+    Parameters
+    ----------
+    signals : of the sensor. q : (n, 4) segment to W.
+    """
+
+    signals: SensorSignals
+    q: Floats
+    mounted: SegmentCalibration
+
+    def __getitem__(self, part: slice, /) -> Floats:
+        return remove_gravity(self.signals.acc[part], self.signals.valid[part], self.q[part], self.mounted)
+
+
+def free_acceleration(
+    calibrated: CalibratedRecording, orientations: Orientations
+) -> dict[Segment, FreeAcceleration]:
+    """Accelerations of all sensors with an orientation."""
     mounted, sensors = calibrated.calibration.segments, calibrated.recording.sensors
-    return {
-        s: remove_gravity(sensors[s].acc, sensors[s].valid, q, mounted[s]) for s, q in orientations.q.items()
-    }
+    return {s: FreeAcceleration(sensors[s], q, mounted[s]) for s, q in orientations.q.items()}
 
 
 def arrange_inputs(
@@ -149,14 +175,41 @@ def bodies_of(worn: Worn) -> tuple[Segment, ...]:
     return BODIES if worn == "3I" else BODIES[1:]
 
 
-def inputs_of(
+@dataclass(frozen=True, eq=False)
+class L7sTake:
+    """The filter's inputs of a take of which only parts are ever laid out: a sample of them has 290 bytes.
+
+    Parameters
+    ----------
+    step : (n, 2) left and right foot still.
+    """
+
+    q: Mapping[Segment, Floats]
+    acceleration: Mapping[Segment, SampleSeries]
+    step: Bools
+    model: LegModel
+    worn: Worn
+
+    def part(self, which: slice) -> L7sInputs:
+        """Some of the samples."""
+        needed = bodies_of(self.worn)
+        return arrange_inputs(
+            {s: self.q[s][which] for s in needed},
+            {s: self.acceleration[s][which] for s in needed},
+            self.step[which],
+            self.model,
+            self.worn,
+        )
+
+
+def take_of(
     orientations: Orientations,
-    acceleration: Mapping[Segment, Floats],
+    acceleration: Mapping[Segment, SampleSeries],
     steps: Mapping[Side, Bools],
     model: LegModel,
     worn: Worn,
-) -> L7sInputs:
-    """The filter's inputs of a whole take.
+) -> L7sTake:
+    """The filter's inputs of a take, part by part.
 
     Raises
     ------
@@ -178,4 +231,4 @@ def inputs_of(
                 sensor=FOOT[side],
             )
     step = np.stack([steps[side] for side in LEGS], axis=1)
-    return arrange_inputs(orientations.q, acceleration, step, model, worn)
+    return L7sTake(orientations.q, acceleration, step, model, worn)

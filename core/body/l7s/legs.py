@@ -111,14 +111,6 @@ class Legs:
     reach: Floats
     hinge: Floats
 
-    def q_by_segment(self) -> dict[Segment, Floats]:
-        """Segment → (n, 4)."""
-        return {s: self.q[:, i].copy() for i, s in enumerate(FIGURE)}
-
-    def p_by_segment(self) -> dict[Segment, Floats]:
-        """Segment → (n, 3)."""
-        return {s: self.p[:, i].copy() for i, s in enumerate(FIGURE)}
-
 
 def solve_legs(R: Floats, p: Floats, model: LegModel) -> Legs:
     """Thighs, shanks and feet from pelvis and feet: the knee by the law of cosines.

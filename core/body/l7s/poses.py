@@ -12,12 +12,13 @@ from typing import Final, get_args
 
 import numpy as np
 
-from core.body.l7s.checks import longest_gaps, walking_checks
+from core.body.l7s.checks import SeenWalk, longest_gaps, walking_checks
 from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
 from core.body.l7s.health import l7s_health, list_health_notices
-from core.body.l7s.inputs import KnownSamples, bodies_of, inputs_of
-from core.body.l7s.legs import BODIES, LEGS, LegModel, solve_legs
+from core.body.l7s.inputs import KnownSamples, L7sTake, SampleSeries, bodies_of, take_of
+from core.body.l7s.legs import BODIES, FIGURE, LEGS, LegModel, solve_legs
 from core.body.l7s.smoother import smooth_track
+from core.body.l7s.windows import WHOLE, PlacedWindow, place_windows
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.poses import Poses
 from core.errors import Notice
@@ -34,7 +35,7 @@ margin the count is the same for any number of passes."""
 
 def l7s_poses(
     orientations: Orientations,
-    acceleration: Mapping[Segment, Floats],
+    acceleration: Mapping[Segment, SampleSeries],
     steps: Mapping[Side, Bools],
     body: BodyModel,
     params: L7sParams | None = None,
@@ -72,55 +73,87 @@ def l7s_poses(
     params = params or L7sParams()
     worn = worn or ("3I" if "pelvis" in orientations.q else "2I")
     model = LegModel.of(body)
-    inputs = inputs_of(orientations, acceleration, steps, model, worn)
-    track, state = filter_block(
-        start_l7s_state(inputs, model, params), inputs, model, orientations.rate_hz, params
-    )
-    measured = bodies_of(worn)
-    R, p, passes = track.R, track.p, 0
-    offsets = np.zeros((len(LEGS), 3))
+    take = take_of(orientations, acceleration, steps, model, worn)
+    measured, rate = bodies_of(worn), orientations.rate_hz
+    valid = None
     if both_ways:
         valid = np.stack([orientations.valid[s] if s in measured else steps["left"] for s in BODIES], axis=1)
-        whole = smooth_track(track, inputs, valid, model, orientations.rate_hz)
-        R, p, passes, offsets = whole.R, whole.p, whole.passes, whole.offsets
-    legs = solve_legs(R, p, model)
-    length = model.thigh + model.shank
-    moving = ~inputs.step.all(axis=1) | inputs.step.all()
-    turned = angle_between(
-        from_matrix(R[:, 1:].reshape(-1, 3, 3)), from_matrix(inputs.R[:, 1:].reshape(-1, 3, 3))
-    ).reshape(-1, 2)
-    variances = np.diag(state.P)[:18].reshape(3, 6)[:, :3]
+    offsets, windows = place_windows(take, valid, rate, params)
+    figure, P = _Figure(take), np.empty((0, 0))
+    for window in windows:
+        figure.add(window)
+        P = window.P
+    variances = np.diag(P)[:18].reshape(3, 6)[:, :3]
     poses = Poses(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
-        q=legs.q_by_segment(),
-        p=legs.p_by_segment(),
-        valid=KnownSamples().push([orientations.valid[s] for s in measured], inputs.step),
+        q=figure.q,
+        p=figure.p,
+        valid=KnownSamples().push([orientations.valid[s] for s in measured], take.step),
         contact={FOOT[s]: np.asarray(steps[s], bool) for s in LEGS},
         body=body,
         method=(L7S_3I if worn == "3I" else L7S_2I).method,
         notices=_never_still(steps),
         diagnostics={
             "adjoint": params.adjoint,
-            "passes": passes,
-            "knee_straight_share": {
-                s: float(np.mean(legs.reach[moving, i] > length - STRETCHED_M)) for i, s in enumerate(LEGS)
-            },
-            "hinge_m": {s: float(np.abs(legs.hinge[:, i]).max()) for i, s in enumerate(LEGS)},
-            "excess_m": {
-                s: float(np.maximum(legs.reach[:, i] - length, 0.0).max()) for i, s in enumerate(LEGS)
-            },
+            **figure.measure(),
             "step_share": {s: float(np.mean(steps[s])) for s in LEGS},
             "sensor_ahead_m": {s: float(-offsets[i, 2]) for i, s in enumerate(LEGS)},
-            "foot_turned_rad": {s: float(turned[:, i].mean()) for i, s in enumerate(LEGS)},
             "position_sd_m": {s: float(np.sqrt(x.max())) for s, x in zip(BODIES, variances, strict=True)},
-            "min_eigenvalue": float(np.linalg.eigvalsh(state.P)[0]),
-            "gap_s": longest_gaps({s: orientations.valid[s] for s in measured}, orientations.rate_hz),
-            **walking_checks(inputs, track, model, orientations.rate_hz),
+            "min_eigenvalue": float(np.linalg.eigvalsh(P)[0]),
+            "gap_s": longest_gaps({s: orientations.valid[s] for s in measured}, rate),
+            **walking_checks(SeenWalk.join(figure.seen), model, rate),
         },
     )
     health = l7s_health(poses)
     return replace(poses, health=health, notices=(*poses.notices, *list_health_notices(health)))
+
+
+class _Figure:
+    """The seven segments of a take, window by window, and what is measured on them.
+
+    q, p : as in `Poses`; of a take of several windows in single precision, which is half of 850 MB for six
+    hours, and what its file has. seen : of each window.
+    """
+
+    def __init__(self, take: L7sTake) -> None:
+        n = len(take.step)
+        kind = np.float64 if n <= WHOLE else np.float32
+        self.q: dict[Segment, Floats] = {s: np.empty((n, 4), kind) for s in FIGURE}
+        self.p: dict[Segment, Floats] = {s: np.empty((n, 3), kind) for s in FIGURE}
+        self.seen: list[SeenWalk] = []
+        self._model = take.model
+        both = take.step.all(axis=1)
+        self._moving: Bools = np.asarray(~both | both.all())
+        self._passes = 0
+        self._straight, self._hinge, self._excess = np.zeros(2, np.int64), np.zeros(2), np.zeros(2)
+        self._turned: list[Floats] = []
+
+    def add(self, window: PlacedWindow) -> None:
+        """The next samples."""
+        legs = solve_legs(window.R, window.p, self._model)
+        at = slice(window.first, window.first + len(legs.q))
+        for i, s in enumerate(FIGURE):
+            self.q[s][at], self.p[s][at] = legs.q[:, i], legs.p[:, i]
+        self.seen.append(SeenWalk.of(window.inputs, window.track))
+        length = self._model.thigh + self._model.shank
+        self._passes = max(self._passes, window.passes)
+        self._straight += np.count_nonzero(legs.reach[self._moving[at]] > length - STRETCHED_M, axis=0)
+        self._hinge = np.maximum(self._hinge, np.abs(legs.hinge).max(axis=0))
+        self._excess = np.maximum(self._excess, (legs.reach - length).max(axis=0))
+        turned, measured = (from_matrix(x[:, 1:].reshape(-1, 3, 3)) for x in (window.R, window.inputs.R))
+        self._turned.append(angle_between(turned, measured).reshape(-1, 2))
+
+    def measure(self) -> dict[str, object]:
+        """The diagnostics of `l7s_poses` that the windows give."""
+        turned, moving = np.concatenate(self._turned), np.count_nonzero(self._moving)
+        return {
+            "passes": self._passes,
+            "knee_straight_share": {s: float(self._straight[i] / moving) for i, s in enumerate(LEGS)},
+            "hinge_m": {s: float(self._hinge[i]) for i, s in enumerate(LEGS)},
+            "excess_m": {s: float(self._excess[i]) for i, s in enumerate(LEGS)},
+            "foot_turned_rad": {s: float(turned[:, i].mean()) for i, s in enumerate(LEGS)},
+        }
 
 
 def _never_still(steps: Mapping[Side, Bools]) -> tuple[Notice, ...]:

@@ -95,13 +95,21 @@ class WholeTrack:
 
 
 def smooth_track(
-    track: L7sTrack, inputs: L7sInputs, valid: Bools, model: LegModel, rate_hz: float
+    track: L7sTrack,
+    inputs: L7sInputs,
+    valid: Bools,
+    model: LegModel,
+    rate_hz: float,
+    offsets: Floats | None = None,
+    first: int = 0,
 ) -> WholeTrack:
-    """Find the places of pelvis and feet over a whole take.
+    """Find the places of pelvis and feet over a take, or a part of it.
 
     Parameters
     ----------
     track : of the filter on these inputs. valid : (n, 3) sensor there; of a body without one it is not read.
+    offsets : (2, 3) as `find_sensor_offsets`; None = found in these inputs. first : sample of the take that
+        they begin with.
 
     Raises
     ------
@@ -112,11 +120,12 @@ def smooth_track(
     if inputs.worn == "2I":
         R[:, 0], acc[:, 0], density[:, 0] = _level_pelvis(R), 0.0, DENSITY_UNWORN
     n, dt = len(acc), 1.0 / rate_hz
-    hop = max(1, round(NODE_S * rate_hz))
+    hop = find_hop(rate_hz)
     at = np.arange(0, n, hop)
     leg = model.thigh + model.shank
     lengths = np.array([0.5 * model.hip_width, 0.5 * model.foot, leg, CARRIED * leg])
-    offsets = find_sensor_offsets(inputs, valid, model, rate_hz)
+    if offsets is None:
+        offsets = find_sensor_offsets(inputs, valid, model, rate_hz)
     p, passes = track.p.copy(), 0
     if len(at) > 2:
         free = _integrate_twice(acc, dt)
@@ -131,12 +140,18 @@ def smooth_track(
         raise EstimationError("l7s_diverged", NOT_FOUND)
     failed = _project_all(R, p, lengths)
     if failed >= 0:
+        failed += first
         raise EstimationError(
             "l7s_diverged",
             f"The leg constraints cannot be met at sample {failed}; check which foot each sensor is on and "
             "the body height.",
         )
     return WholeTrack(R, p, passes, offsets)
+
+
+def find_hop(rate_hz: float) -> int:
+    """Samples from node to node."""
+    return max(1, round(NODE_S * rate_hz))
 
 
 NOT_FOUND: Final = (
@@ -154,7 +169,8 @@ def _solve_nodes(
     x = start.copy()
     bent = np.zeros_like(x)
     bent[1:-1] = free[2:] - 2.0 * free[1:-1] + free[:-2]
-    band, slope = np.empty((BAND + 1, x.size)), np.empty(x.size)
+    # by columns, as the solver takes it: any other way round it is copied
+    band, slope = np.empty((BAND + 1, x.size), order="F"), np.empty(x.size)
     passes = 0
     while passes < PASSES:
         passes += 1

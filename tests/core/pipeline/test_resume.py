@@ -72,6 +72,9 @@ def test_an_analysis_that_nobody_resumes_lets_go_of_earlier_orientations_and_fin
     assert found.mounted is not None
     assert found.posed is not None
     assert found.mounted.orientations is found.posed.orientations
+    for analysis, there in ((found, False), (kept, True)):
+        streams, sensors = analysis.source.streams.values(), analysis.recording.sensors.values()
+        assert {x.mag is not None for x in streams} == {there} == {x.mag is not None for x in sensors}
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from core.body.estimate import PoseEstimate
 from core.body.health import HealthFinding, Verdict
 from core.body.l7s.filter import filter_block, start_l7s_state
 from core.body.l7s.health import INNER_M, list_health_notices
-from core.body.l7s.inputs import free_acceleration, inputs_of
+from core.body.l7s.inputs import SampleSeries, free_acceleration, take_of
 from core.body.l7s.legs import LegModel
 from core.body.l7s.poses import l7s_poses
 from core.body.model import BodyModel
@@ -197,7 +197,7 @@ def test_feet_whose_headings_disagree_are_told(
     orientations = estimate_orientations(calibrated)
     acceleration, turn = free_acceleration(calibrated, orientations), about(2, np.radians(off_deg))
     q = {**orientations.q, "foot_l": multiply(turn, orientations.q["foot_l"])}
-    moved = {**acceleration, "foot_l": rotate(turn, acceleration["foot_l"])}
+    moved: dict[Segment, SampleSeries] = {**acceleration, "foot_l": rotate(turn, acceleration["foot_l"][:])}
     body = simulated("fast_with_turns", 3)[1].body
     poses = l7s_poses(replace(orientations, q=q), moved, still_feet(calibrated), body)
     (found,) = (f for f in poses.health if f.name == "feet_out_of_place_pct")
@@ -268,7 +268,7 @@ def test_a_number_that_is_none_inside_a_valid_sample_is_refused() -> None:
     orientations = estimate_orientations(calibrated)
     model = LegModel.of(BodyModel.from_height(1.75))
     acceleration = free_acceleration(calibrated, orientations)
-    inputs = inputs_of(orientations, acceleration, still_feet(calibrated), model, "3I").part(slice(0, 60))
+    inputs = take_of(orientations, acceleration, still_feet(calibrated), model, "3I").part(slice(0, 60))
     acc: Floats = inputs.acc.copy()
     acc[37, 1, 2] = np.nan
     with pytest.raises(EstimationError) as error:
@@ -341,11 +341,11 @@ def test_a_squat_that_no_protocol_announced_is_told(depth_m: float, verdict: Ver
     recording = take("l7s_3i")
     calibrated = calibrate(recording)
     orientations = estimate_orientations(calibrated)
-    acceleration = dict(free_acceleration(calibrated, orientations))
+    acceleration: dict[Segment, SampleSeries] = {**free_acceleration(calibrated, orientations)}
     share = np.clip((recording.t_s - 2.0) / 3.0, 0.0, 1.0)
     sunk = depth_m * 64.0 * share**3 * (1.0 - share) ** 3
     down = np.gradient(np.gradient(sunk, 0.01), 0.01)
-    acceleration["pelvis"] = acceleration["pelvis"] - down[:, None] * [0.0, 0.0, 1.0]
+    acceleration["pelvis"] = acceleration["pelvis"][:] - down[:, None] * [0.0, 0.0, 1.0]
     body = simulated("fast_with_turns", 3)[1].body
     poses = l7s_poses(orientations, acceleration, still_feet(calibrated), body)
     # L7S pulls the pelvis back to its height: of 30 cm it shows few

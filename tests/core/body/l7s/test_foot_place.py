@@ -9,7 +9,7 @@ import pytest
 
 from core.body.l7s.filter import L7sInputs
 from core.body.l7s.foot_place import find_sensor_offsets
-from core.body.l7s.inputs import free_acceleration, inputs_of
+from core.body.l7s.inputs import free_acceleration, take_of
 from core.body.l7s.legs import LEGS, LegModel
 from core.body.model import BodyModel
 from core.calibration import calibrate
@@ -79,10 +79,10 @@ def test_simulated_feet_have_their_sensors_where_they_are_found(name: str) -> No
     calibrated = calibrate(recording)
     orientations = estimate_orientations(calibrated)
     model = LegModel.of(truth.body)
-    inputs = inputs_of(
+    inputs = take_of(
         orientations, free_acceleration(calibrated, orientations), steps_of(calibrated), model, "2I"
     )
-    found = find_sensor_offsets(inputs, np.ones((len(inputs.acc), 3), bool), model, RATE)
+    found = find_sensor_offsets(inputs, np.ones((len(inputs.step), 3), bool), model, RATE)
     for leg, side in enumerate(LEGS):
         x, y, _ = truth.mounts[FOOT[side]].position_m
         c, s = np.cos(model.incline), np.sin(model.incline)

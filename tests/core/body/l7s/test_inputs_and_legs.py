@@ -35,7 +35,7 @@ def test_legs_are_those_of_the_law_of_cosines() -> None:
     """Sy 2021 eq 40–44."""
     R, p = poses()
     legs = solve_legs(R, p, MODEL)
-    q, at = legs.q_by_segment(), legs.p_by_segment()
+    q, at = ({s: x[:, i] for i, s in enumerate(FIGURE)} for x in (legs.q, legs.p))
     np.testing.assert_allclose(q["pelvis"], from_matrix(R[:, 0] @ MODEL.to_isb("pelvis")), atol=1e-12)
     np.testing.assert_array_equal(at["pelvis"], p[:, 0])
     straight = 0

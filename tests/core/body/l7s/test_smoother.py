@@ -10,7 +10,7 @@ from scipy.linalg import solveh_banded
 
 from core.body.l7s import smoother
 from core.body.l7s.filter import L7sInputs, L7sTrack, Worn, filter_block, start_l7s_state
-from core.body.l7s.inputs import free_acceleration, inputs_of
+from core.body.l7s.inputs import free_acceleration, take_of
 from core.body.l7s.legs import LegModel, solve_legs
 from core.body.l7s.smoother import BAND, WholeTrack, smooth_track, write_equations
 from core.calibration import calibrate
@@ -29,7 +29,7 @@ def walk(worn: Worn) -> tuple[L7sInputs, L7sTrack, LegModel, Floats]:
     orientations = estimate_orientations(calibrated)
     model = LegModel.of(truth.body)
     acceleration = free_acceleration(calibrated, orientations)
-    inputs = inputs_of(orientations, acceleration, steps_of(calibrated), model, worn)
+    inputs = take_of(orientations, acceleration, steps_of(calibrated), model, worn).part(slice(None))
     track, _ = filter_block(start_l7s_state(inputs, model), inputs, model, 100.0)
     places = np.stack([truth.p[s][: len(inputs.step)] for s in ("pelvis", "foot_l", "foot_r")], axis=1)
     return inputs, track, model, places

@@ -1,0 +1,128 @@
+"""A take of L7S in windows: the filter runs through, the places are found window by window.
+
+Of a long take the equations of all nodes do not fit into memory: a sample of them has 3 kB. What is measured
+fixes the places of a node within some seconds around it, so that a window which is solved with more than
+that on both sides gives in its middle what the whole take gives (docs/science/l7s.md, "Both ways").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from core.body.l7s.filter import L7sInputs, L7sParams, L7sTrack, filter_block, start_l7s_state
+from core.body.l7s.foot_place import find_sensor_offsets
+from core.body.l7s.inputs import L7sTake
+from core.body.l7s.legs import LEGS
+from core.body.l7s.smoother import NODE_S, find_hop, smooth_track
+from core.frames import Bools, Floats
+
+WHOLE: Final = 1 << 16
+"""Samples up to which a take is one window: eleven minutes at 100 Hz, and 200 MB."""
+
+LONG: Final = 1 << 15
+"""Samples of a window of a longer take."""
+
+AROUND_S: Final = 60.0
+"""What is solved with a window before and after it."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedWindow:
+    """Successive samples with the places that were found.
+
+    Parameters
+    ----------
+    first : sample of the take that it begins with. inputs, track : of the filter. R : (n, 3, 3, 3) and
+    p : (n, 3, 3) of BODIES in Sy's frames. passes : of Gauss–Newton. P : (27, 27) of the filter after it.
+    """
+
+    first: int
+    inputs: L7sInputs
+    track: L7sTrack
+    R: Floats
+    p: Floats
+    passes: int
+    P: Floats
+
+
+def cut_windows(samples: int, rate_hz: float) -> list[tuple[slice, slice]]:
+    """Windows of a take, each as what is solved and what of that is the window's own.
+
+    All begin on a node of the take, so that they have its nodes.
+    """
+    count = 1 if samples <= WHOLE else -(-samples // LONG)
+    hop, around = find_hop(rate_hz), round(AROUND_S / NODE_S) * find_hop(rate_hz)
+    edges = [*(samples * i // count // hop * hop for i in range(count)), samples]
+    found = []
+    for first, past in pairwise(edges):
+        start, stop = max(0, first - around), min(samples, past + around)
+        found.append((slice(start, stop), slice(first - start, past - start)))
+    return found
+
+
+def place_windows(
+    take: L7sTake, valid: Bools | None, rate_hz: float, params: L7sParams
+) -> tuple[Floats, Iterator[PlacedWindow]]:
+    """Filter a take and find the places of its bodies.
+
+    Parameters
+    ----------
+    valid : (n, 3) as in `smooth_track`; None = the places are the filter's.
+
+    Returns
+    -------
+    `WholeTrack.offsets`, and the windows one after the other.
+
+    Raises
+    ------
+    EstimationError of `filter_block` and `smooth_track`, when a window is asked for.
+    """
+    offsets = np.zeros((len(LEGS), 3))
+    if valid is not None:
+        offsets = find_sensor_offsets(take, valid, take.model, rate_hz)
+    return offsets, _windows(take, valid, rate_hz, params, offsets)
+
+
+def _windows(
+    take: L7sTake, valid: Bools | None, rate_hz: float, params: L7sParams, offsets: Floats
+) -> Iterator[PlacedWindow]:
+    model = take.model
+    state = start_l7s_state(take.part(slice(0, 1)), model, params)
+    inputs, track = take.part(slice(0, 0)), None
+    first = 0
+    for solved, own in cut_windows(len(take.step), rate_hz):
+        fresh = take.part(slice(first + len(inputs.step), solved.stop))
+        found, state = filter_block(state, fresh, model, rate_hz, params)
+        if track is None:
+            inputs, track = fresh, found
+        else:
+            left = slice(solved.start - first, None)
+            inputs, track = join_inputs(inputs.part(left), fresh), join_tracks(track.part(left), found)
+        del fresh, found
+        first = solved.start
+        R, p, passes = track.R[own], track.p[own], 0
+        if valid is not None:
+            whole = smooth_track(track, inputs, valid[solved], model, rate_hz, offsets, first)
+            R, p, passes = whole.R[own], whole.p[own], whole.passes
+        yield PlacedWindow(first + own.start, inputs.part(own), track.part(own), R, p, passes, state.P)
+
+
+def join_inputs(before: L7sInputs, after: L7sInputs) -> L7sInputs:
+    """Two successive blocks as one."""
+    return L7sInputs(
+        np.concatenate((before.R, after.R)),
+        np.concatenate((before.acc, after.acc)),
+        np.concatenate((before.step, after.step)),
+        before.worn,
+    )
+
+
+def join_tracks(before: L7sTrack, after: L7sTrack) -> L7sTrack:
+    """The same of what the filter says."""
+    pairs = zip(vars(before).values(), vars(after).values(), strict=True)
+    return L7sTrack(*(np.concatenate(pair) for pair in pairs))
