@@ -31,7 +31,7 @@ def make_study(
     who: Annotated[Identity, require(Action.EXPORT_STUDY)],
 ) -> Response:
     """All strides and all takes of the chosen visits as they count, as CSV and Parquet, by pseudonyms."""
-    tables, visits = studies.make_study(db, reviewed, choice)
+    tables, visits = studies.make_study(db, reviewed, who, choice)
     for visit in visits:
         trail.record_opened(who, "study.exported", "session", visit, {"visits": len(visits)})
     return attachment(zip_files(tables.files), "study.zip")

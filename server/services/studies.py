@@ -16,6 +16,7 @@ from sqlalchemy import Connection
 
 from core.errors import SagittalError
 from core.frames import Protocol
+from server.auth.identity import Identity
 from server.export.ages import coarsen_age
 from server.report.analysis_json import parameter_row
 from server.report.exports import strides_csv
@@ -52,10 +53,11 @@ class StudyChoice:
     visits: frozenset[str] = field(default_factory=frozenset)
 
 
-def list_visits(c: Connection, choice: StudyChoice) -> list[Session]:
-    """The visits of a choice, by patient and day."""
+def list_visits(c: Connection, who: Identity, choice: StudyChoice) -> list[Session]:
+    """The visits of a choice that a person may open, by patient and day."""
     return sessions.search(
         c,
+        who,
         search=choice.search,
         protocol=choice.protocol,
         since=choice.since,
@@ -65,7 +67,7 @@ def list_visits(c: Connection, choice: StudyChoice) -> list[Session]:
 
 
 def make_study(
-    db: Database, reviewed: ReviewedAnalyses, choice: StudyChoice
+    db: Database, reviewed: ReviewedAnalyses, who: Identity, choice: StudyChoice
 ) -> tuple[StudyTables, list[str]]:
     """Write the tables of a choice, and say which visits are in them.
 
@@ -75,7 +77,7 @@ def make_study(
         no_visits, too_many_visits.
     """
     with db.read() as c:
-        chosen = list_visits(c, choice)
+        chosen = list_visits(c, who, choice)
         if not chosen:
             raise Conflict("no_visits", "No visit fits this choice. Choose another period or protocol.")
         if len(chosen) > MOST_VISITS:

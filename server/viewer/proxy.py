@@ -35,7 +35,7 @@ from websockets.exceptions import WebSocketException
 
 from core.errors import SagittalError
 from core.formats.json_tree import read_json
-from server.auth.access import require
+from server.auth.access import opens, require, still_opens
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.http.compression import accepts
@@ -98,7 +98,7 @@ router = APIRouter(lifespan=_lifespan, include_in_schema=False)
 @router.get("/views/{view_id}/")
 def page(view_id: str, who: Reader, request: Request) -> RedirectResponse:
     """Lead to the document of the 3D view, which learns from its fragment which view it shows."""
-    if _views(request).find(view_id, who.login_id, who.role) is None:
+    if _find(request, view_id, who) is None:
         raise Problem(404, "view_not_found", "This 3D view has ended. Reload the session page.")
     return RedirectResponse(
         f"/views/client/{client_version()}#{view_id}", headers={"Cache-Control": "no-store"}
@@ -119,7 +119,7 @@ def client(version: str, request: Request) -> Response:
 @router.websocket("/views/{view_id}")
 async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
     """Carry viser's messages."""
-    view = _views(ws).find(view_id, who.login_id, who.role)
+    view = await asyncio.to_thread(_find, ws, view_id, who)
     if view is None:
         await _say_gone(ws)
         return
@@ -131,7 +131,13 @@ async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
             return
         async with up:
             await ws.accept(subprotocol=up.subprotocol)
-            await carry_messages(ws, up, functools.partial(ws.app.state.logins.is_open, who.login_id))
+            await carry_messages(ws, up, functools.partial(still_opens, ws, sid=view.session_id))
+
+
+def _find(connection: Request | WebSocket, view_id: str, who: Identity) -> FigureView[Any] | None:
+    """A view that this person may look at and whose session may be opened."""
+    view = _views(connection).find(view_id, who.login_id, who.role)
+    return view if view is not None and opens(connection, who, {"sid": view.session_id}) else None
 
 
 async def _say_gone(ws: WebSocket) -> None:
@@ -173,7 +179,7 @@ async def replay(
             }
         )
         cursor = asyncio.create_task(_follow(ws, view, ViewActivity(lambda: logins.touch(who.login_id))))
-        over = asyncio.create_task(wait_for_sign_out(lambda: logins.is_open(who.login_id)))
+        over = asyncio.create_task(wait_for_sign_out(functools.partial(still_opens, ws)))
         await asyncio.wait((cursor, over), return_when=asyncio.FIRST_COMPLETED)
         ended = over.done()
         for task in (cursor, over):
@@ -225,7 +231,7 @@ async def _open(
         return replace(motion, ghosts=ghosts)
 
     shown = _state(this) if before is None else f"{_state(this)} over {_state(before)}"
-    return await _views(ws).open(who.login_id, tab, shown, load, dark)
+    return await _views(ws).open(who.login_id, tab, sid, shown, load, dark)
 
 
 def _replayable(c: Connection, sid: str) -> AnalysedSession | None:

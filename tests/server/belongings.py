@@ -10,6 +10,7 @@ from typing import Any, Final
 from sqlalchemy import insert
 
 from server.auth.tokens import token_hash
+from server.services import prescriptions, programmes
 from server.storage.live_tables import live_take
 from server.storage.person_tables import consent
 from server.storage.report_tables import report_link, signed_report
@@ -22,17 +23,19 @@ from server.storage.tables import (
     now,
     patient,
     patient_note,
-    planned_visit,
-    prescription,
-    programme,
     recording,
     reference_file,
     session,
     tuning,
 )
-from tests.server import crowd
+from tests.server import analysed, crowd
 from tests.server.clinic import Clinic
 
+TRAINING: Final = {
+    "parameter": "stance_pct",
+    "side": "left",
+    "target": {"source": "manual", "mean": 62.0, "sd": 2.0},
+}
 OF_NOBODY: Final = {
     "device_id": crowd.DEVICES[0],
     "view_id": "0" * 32,
@@ -45,10 +48,10 @@ OF_NOBODY: Final = {
 
 def add_belongings(clinic: Clinic, code: str) -> dict[str, str]:
     """Add a patient to whom one of everything belongs; returns values by the names in addresses."""
-    ((other, sid),) = crowd.fill(clinic, 1, 2, {"analysis.json": b"{}", "events.csv": b"side\n"})
+    ((other, sid),) = crowd.fill(clinic, 1, 2, analysed.files())
     at, later = now(), now() + dt.timedelta(days=1)
     ids = {name: new_id() for name in (
-        "note_id", "consent_id", "prescription_id", "programme_id", "visit_id", "upload_id", "tuning_id",
+        "note_id", "consent_id", "upload_id", "tuning_id",
         "run_id", "report_id", "link_id", "take_id",
     )}  # fmt: skip
     with clinic.db.write() as c:
@@ -56,6 +59,8 @@ def add_belongings(clinic: Clinic, code: str) -> dict[str, str]:
         took = c.execute(recording.select().where(recording.c.session_id == sid)).one().id
         done = c.execute(analysis.select().where(analysis.c.recording_id == took)).one()
         of_visit, of_patient = {"session_id": sid}, {"patient_id": pid}
+        written = prescriptions.write(c, clinic.app.state.reviewed, None, pid, TRAINING)
+        course = programmes.start(c, None, pid, starts_on=at.date())
         once = {"job_id": done.job_id, "created_at": at, "code_version": "1"}
         sha = token_hash(ids["link_id"])
         c.execute(patient.update().where(patient.c.id == pid).values(code=code, note=f"note of {code}"))
@@ -65,11 +70,6 @@ def add_belongings(clinic: Clinic, code: str) -> dict[str, str]:
                             "content": f"{code} limps"}),
             (consent, {"id": ids["consent_id"], **of_patient, "purpose": "sharing", "given_on": at.date(),
                        "evidence": f"form of {code}", "created_at": at}),
-            (prescription, {"id": ids["prescription_id"], **of_patient, "content": {}, "created_at": at}),
-            (programme, {"id": ids["programme_id"], **of_patient, "template": "retraining",
-                         "starts_on": at.date(), "created_at": at}),
-            (planned_visit, {"id": ids["visit_id"], "programme_id": ids["programme_id"], "position": 0,
-                             "label": "T1", "kind": "training", "week": 1, "planned_on": at.date()}),
             (file_upload, {"id": ids["upload_id"], **of_visit, "name": "b.csv", "size": 9, "created_at": at}),
             (reference_file, {**of_visit, "name": "optical.sto", "size": 1, "sha256": sha, "added_at": at}),
             (tuning, {"id": ids["tuning_id"], "recording_id": took, "input_sha256": sha, "result": {},
@@ -86,6 +86,9 @@ def add_belongings(clinic: Clinic, code: str) -> dict[str, str]:
         ):  # fmt: skip
             c.execute(insert(table).values(row))
     return ids | {
+        "prescription_id": written.id,
+        "programme_id": course.id,
+        "visit_id": course.visits[0].id,
         "pid": pid,
         "patient_id": pid,
         "sid": sid,
