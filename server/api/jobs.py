@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
 from server import context
-from server.auth.access import identify, require
+from server.auth.access import require, still_opens
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail
@@ -41,7 +41,7 @@ def list_jobs(
 ) -> list[jobs.ListedJob]:
     """Jobs, the newest first."""
     with db.read() as c:
-        rows = jobs.list_jobs(c, active_only=active, limit=limit)
+        rows = jobs.list_jobs(c, who, active_only=active, limit=limit)
     trail.record_watched(who, "job.listed", "job", None)
     return rows
 
@@ -72,7 +72,7 @@ async def watch_job(
             jobs.get(c, job_id)
 
     await run_in_threadpool(check)
-    events = _events(feed, job_id, lambda: identify(request, counts=False) is not None)
+    events = _events(feed, job_id, lambda: still_opens(request))
     return StreamingResponse(events, media_type="text/event-stream", headers={"X-Accel-Buffering": "no"})
 
 

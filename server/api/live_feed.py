@@ -16,7 +16,7 @@ from starlette.status import WS_1008_POLICY_VIOLATION
 from starlette.websockets import WebSocketDisconnect
 
 from core.errors import SagittalError
-from server.auth.access import require
+from server.auth.access import require, still_opens
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.auth.sessions import CHECK_EVERY_S
@@ -87,5 +87,5 @@ async def _until_signed_out(ws: WebSocket, hub: Hub, sid: str, who: Identity) ->
         take = hub.take_of(sid)
         streams = take is not None and take.tablet is not None
         check = logins.touch if streams else logins.is_open
-        if not await asyncio.to_thread(check, who.login_id):
+        if not await asyncio.to_thread(check, who.login_id) or not await asyncio.to_thread(still_opens, ws):
             return

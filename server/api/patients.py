@@ -15,7 +15,7 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Blobs, Config, Db, Id, LiveHub, OpenTrail, Reviewed
 from server.http.json_body import StrictJsonRoute
-from server.services import erasure, patient_export, patients, programmes, sessions
+from server.services import care_teams, erasure, patient_export, patients, programmes, sessions
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/patients", tags=["patients"])
 
@@ -31,7 +31,7 @@ def list_patients(
 ) -> list[patients.Patient]:
     """All patients, the latest visit first."""
     with db.read() as c:
-        found = patients.list_patients(c, search=q, limit=limit, offset=offset)
+        found = patients.list_patients(c, who, search=q, limit=limit, offset=offset)
     trail.record_watched(who, "patient.listed", "patient", None)
     return found
 
@@ -42,7 +42,9 @@ def add_patient(
 ) -> patients.Patient:
     """Add a patient."""
     with db.write() as c:
-        return patients.create(c, who, **body.values())
+        made = patients.create(c, who, **body.values())
+        care_teams.add_maker(c, who, made.id)
+        return made
 
 
 @router.get("/{patient_id}", response_model=patients.Patient)

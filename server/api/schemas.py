@@ -13,6 +13,7 @@ from core.frames import Protocol
 from server.jobs.queue import JobView
 from server.report.behind import StrideValue
 from server.services import report_links
+from server.services.care_teams import REASON, EmergencyAccess, TeamMember
 from server.services.notes import MOST_CHARACTERS
 from server.services.recordings import RecordedFile, RecordingState
 from server.services.tunings import MOST_OF_SWARM, Scheme
@@ -102,6 +103,41 @@ class ConsentNew(Request):
     purpose: Literal["recording", "research", "teaching", "sharing"]
     evidence: Line
     given_on: dt.date | None = None
+
+
+@dataclass(frozen=True)
+class CareTeams:
+    """Whether the clinic has care teams."""
+
+    on: bool
+
+
+class CareTeamsSwitch(Request):
+    """On or off; `begin_with_past` = whoever has opened or changed something of a patient is in the team."""
+
+    on: bool
+    begin_with_past: bool = False
+
+
+@dataclass(frozen=True)
+class CareTeam:
+    """Who is in the team of a patient, and who opened the patient in an emergency."""
+
+    members: list[TeamMember]
+    emergencies: list[EmergencyAccess]
+
+
+class CareTeamChange(Request):
+    """Who is in the team, by ids of accounts."""
+
+    users: Annotated[list[HexId], Field(max_length=1000)]
+
+
+class EmergencyOpening(Request):
+    """The exact code of a patient, and why somebody outside the team must open the patient."""
+
+    code: Code
+    reason: Annotated[str, StringConstraints(min_length=REASON[0], max_length=REASON[1], pattern=_TEXT)]
 
 
 class PatientNew(Request):

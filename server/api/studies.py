@@ -30,7 +30,7 @@ def make_study(
     who: Annotated[Identity, require(Action.EXPORT_STUDY)],
 ) -> Response:
     """All strides and all takes of the chosen visits as they count, as CSV and Parquet, by pseudonyms."""
-    content, visits = study_maker.fetch_study(db, settings, choice)
+    content, visits = study_maker.fetch_study(db, settings, who, choice)
     for visit in visits:
         trail.record_opened(who, "study.exported", "session", visit, {"visits": len(visits)})
     return attachment(content, "study.zip")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from fastapi import Depends
@@ -12,7 +13,9 @@ from server.auth.cookie import read_token
 from server.auth.identity import Identity
 from server.auth.roles import PUBLIC, Action
 from server.auth.sessions import Logins
+from server.auth.sight import OWNER, may_open
 from server.http.problems import SENTENCES, Problem
+from server.storage.db import Database
 
 
 class RouteAccess:
@@ -22,7 +25,10 @@ class RouteAccess:
         self.action = action
 
     def __call__(self, connection: HTTPConnection) -> Identity | None:
-        """Return who is asking; raise Problem 401 without a sign-in and 403 without the right."""
+        """Return who is asking; raise Problem 401 without a sign-in, 403 without the right.
+
+        404 where the clinic has care teams and the address names something of a patient of others.
+        """
         identity = identify(connection, counts=self.action is not Action.WATCH_SIGN_IN)
         connection.state.language = None if identity is None else identity.language
         if self.action in PUBLIC:
@@ -31,6 +37,8 @@ class RouteAccess:
             raise Problem(401, "not_signed_in", SENTENCES["not_signed_in"])
         if not identity.may(self.action):
             raise Problem(403, "forbidden", SENTENCES["forbidden"])
+        if not opens(connection, identity, connection.path_params):
+            raise Problem(404, "not_found", SENTENCES["not_found"])
         return identity
 
 
@@ -49,3 +57,21 @@ def identify(connection: HTTPConnection, *, counts: bool = True) -> Identity | N
         return None
     logins: Logins = connection.app.state.logins
     return logins.find(token) if counts else logins.look(token)
+
+
+def opens(connection: HTTPConnection, who: Identity, parts: Mapping[str, str]) -> bool:
+    """Whether a person may open what parts of an address name (server/auth/sight.py)."""
+    if who.is_admin or not OWNER.keys() & parts.keys():
+        return True
+    db: Database = connection.app.state.db
+    with db.read() as c:
+        return may_open(c, who, parts)
+
+
+def still_opens(connection: HTTPConnection, **parts: str) -> bool:
+    """Whether a sign-in goes on and still opens this, for what stays open; counts as no activity.
+
+    Without `parts`: what the address of the connection names.
+    """
+    who = identify(connection, counts=False)
+    return who is not None and opens(connection, who, parts or connection.path_params)

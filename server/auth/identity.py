@@ -31,6 +31,11 @@ class Identity:
         """The API token that asks, None = a person at a browser."""
         return None if self.allowed is None else self.login_id.removeprefix("token:")
 
+    @property
+    def is_admin(self) -> bool:
+        """Whether this person runs the clinic's accounts and care teams, and so sees every patient."""
+        return self.role is Role.ADMIN
+
     def may(self, action: Action) -> bool:
         """Tell whether this person's role allows the action; pages ask it what to offer."""
         return is_permitted(self.role, action) and (self.allowed is None or action in self.allowed)

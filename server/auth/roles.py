@@ -33,6 +33,8 @@ class Action(StrEnum):
     """Takes everything that is stored of a patient along."""
     EXPORT_STUDY = "export_study"
     """Takes the numbers of many patients along, by pseudonyms."""
+    OPEN_IN_EMERGENCY = "open_in_emergency"
+    """Opens a patient of another care team for a time, with a reason."""
     READ_SESSION = "read_session"
     CREATE_SESSION = "create_session"
     WRITE_SESSION = "write_session"
@@ -90,6 +92,7 @@ POLICY: dict[Action, frozenset[Role]] = {
     Action.DELETE_PATIENT: _CLINICAL,
     Action.EXPORT_PATIENT: _CLINICAL,
     Action.EXPORT_STUDY: _CLINICAL,
+    Action.OPEN_IN_EMERGENCY: _CLINICAL,
     Action.READ_SESSION: _ALL,
     Action.CREATE_SESSION: _UPLOADERS,
     Action.WRITE_SESSION: _CLINICAL,

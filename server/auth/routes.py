@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 
 import fastapi.routing
@@ -11,10 +12,11 @@ from starlette.routing import BaseRoute
 
 from server.auth.access import RouteAccess
 from server.auth.roles import Action
+from server.auth.sight import OF_NOBODY, OWNER
 
 
 class UndeclaredRouteError(RuntimeError):
-    """A route says not exactly one action; name it with `require(Action.…)`."""
+    """A route says not exactly one action, or not whose it is; name it with `require(Action.…)`."""
 
 
 def list_declared_actions(routes: Sequence[BaseRoute]) -> dict[str, Action]:
@@ -23,7 +25,7 @@ def list_declared_actions(routes: Sequence[BaseRoute]) -> dict[str, Action]:
     Raises
     ------
     UndeclaredRouteError
-        a route declares no action, or several.
+        a route declares no action, or several; or a part of its address is of nobody known.
     """
     found: dict[str, Action] = {}
     for path, route in _leaves(routes):
@@ -32,6 +34,11 @@ def list_declared_actions(routes: Sequence[BaseRoute]) -> dict[str, Action]:
         if len(actions) != 1:
             said = ", ".join(sorted(actions)) or "none"
             raise UndeclaredRouteError(f"Route {name}: expected one declared action, found {said}.")
+        unknown = set(re.findall(r"\{(\w+)", path)) - OWNER.keys() - OF_NOBODY
+        if unknown:
+            raise UndeclaredRouteError(
+                f"Route {name}: nothing says whose {', '.join(sorted(unknown))} is; see server/auth/sight.py."
+            )
         found[name] = actions.pop()
     return found
 

@@ -55,7 +55,7 @@ def plan_training(laps: int = LAPS, seed: int = 5) -> Simulation:
 def open_take(settings: Settings) -> str:
     """A session of the patient with an open take; returns its code."""
     with closing(Database(settings.database_source)) as db, db.write() as c:
-        patient = next(p for p in patients.list_patients(c) if p.code == STROKE.code)
+        patient = next(p for p in patients.list_patients(c, None) if p.code == STROKE.code)
         day = now().date()
         session = sessions.create(c, None, patient.id, title=TITLE, performed_on=day, **USUAL.stated)
         return live.open_take(c, None, session.id)[1]

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, Row, select
 
+from server.storage.care_tables import emergency_access
 from server.storage.tables import patient, session
 from web.words import day
 
@@ -33,6 +34,12 @@ DEEDS: Final[Mapping[str, str]] = {
     "patient.changed": "changed what is said of the patient",
     "patient.exported": "took along everything that is stored of the patient",
     "patient.deidentified": "took along results of the patient for research, without the name",
+    "care_teams.on": "switched care teams on",
+    "care_teams.off": "switched care teams off: everybody sees every patient",
+    "care_team.changed": "changed who is in the care team of the patient",
+    "care_team.opened": "looked at the care team of the patient",
+    "emergency.opened": "opened the patient in an emergency, from outside the care team",
+    "emergency.refused": "asked for a patient in an emergency by a code that nobody has",
     "patient.erased": "deleted the patient with all recordings",
     "note.added": "wrote a note",
     "note.removed": "removed a note",
@@ -147,7 +154,8 @@ class AuditSentence:
     Parameters
     ----------
     who, deed : "anna", "opened the visit". whom : code of the patient, None where it is about nobody or the
-        patient is deleted. of : the visit's day. href : where it is now, None where it is no more.
+        patient is deleted. of : the visit's day. href : where it is now, None where it is no more. why : the
+        reason that was given, None = none, or the patient is deleted.
     row : the row itself.
     """
 
@@ -156,6 +164,7 @@ class AuditSentence:
     whom: str | None
     of: str | None
     href: str | None
+    why: str | None
     row: Row[Any]
 
 
@@ -166,14 +175,20 @@ def describe_rows(c: Connection, rows: Sequence[Row[Any]]) -> list[AuditSentence
     codes = {row.id: row.code for row in people}
     query = select(session.c.id, session.c.performed_on, patient.c.code).join(patient)
     visits = {r.id: r for r in c.execute(query.where(session.c.id.in_(ids)))}
+    accesses = [row.detail.get("access") for row in rows if row.action == "emergency.opened"]
+    given = select(emergency_access.c.id, emergency_access.c.reason).where(
+        emergency_access.c.id.in_(accesses)
+    )
+    reasons = {r.id: r.reason for r in c.execute(given)} if accesses else {}
     found = []
     for row in rows:
+        why = reasons.get(row.detail.get("access"))
         visit = visits.get(row.resource_id)
         code = codes.get(row.resource_id)
         whom, of, href = code, None, None if code is None else f"/patients/{row.resource_id}"
         if visit is not None:
             whom, of, href = visit.code, day(visit.performed_on), f"/sessions/{visit.id}"
-        found.append(AuditSentence(_name(row), describe_deed(row.action), whom, of, href, row))
+        found.append(AuditSentence(_name(row), describe_deed(row.action), whom, of, href, why, row))
     return found
 
 

@@ -45,15 +45,15 @@ KIND_WORDS: Final = {
 def show_jobs(request: Request, db: Db, who: Annotated[Identity, require(Action.READ_JOB)]) -> Response:
     """What is being computed, and what was."""
     with db.read() as c:
-        rows = list_jobs(c)
+        rows = list_jobs(c, who)
     record_listing(request, who, "job")
     return render_page(request, db, who, "jobs.html", "jobs", jobs=rows)
 
 
-def list_jobs(c: Connection) -> list[dict[str, Any]]:
-    """The newest jobs, each with its visit."""
+def list_jobs(c: Connection, who: Identity) -> list[dict[str, Any]]:
+    """The newest jobs that a person may see, each with its visit."""
     rows = []
-    for view in jobs.list_jobs(c, limit=JOBS_SHOWN):
+    for view in jobs.list_jobs(c, who, limit=JOBS_SHOWN):
         shape, word = JOB_WORDS[view.state]
         ended = view.started_at and view.finished_at
         visit = {"id": view.session_id, "code": view.patient_code, "title": view.session_title}

@@ -29,6 +29,7 @@ from server.report.change_words import change_words
 from server.report.takes_chart import find_scale, takes_svg
 from server.report.trends import VisitKind
 from server.services import (
+    care_teams,
     consents,
     edit_log,
     histories,
@@ -78,6 +79,7 @@ def show_patient(
         written_down = notes.of_patient(c, pid)
         agreed = consents.of_patient(c, pid)
         written = prescriptions.of_patient(c, pid) if results else []
+        team = view_team(c, pid)
     record_opening(request, who, "patient", pid)
     trend = None
     if results:
@@ -92,8 +94,21 @@ def show_patient(
         notes=list_notes(written_down, rows, who),
         consents=[(one, PURPOSE_WORDS[one.purpose]) for one in agreed], purposes=list(PURPOSE_WORDS.items()),
         programme=view_programme(plans[0], now().date()) if plans else None,
-        trend=trend, comparable=len(done) > 1 and results, feedback=make_card(written),
+        team=team, trend=trend, comparable=len(done) > 1 and results, feedback=make_card(written),
     )  # fmt: skip
+
+
+def view_team(c: Connection, patient_id: str) -> dict[str, Any] | None:
+    """The care team and who opened the patient in an emergency; None where the clinic has no teams."""
+    if not care_teams.are_on(c):
+        return None
+    members = care_teams.list_team(c, patient_id)
+    known = {m.user_id for m in members}
+    return {
+        "members": members,
+        "emergencies": care_teams.list_accesses(c, patient_id),
+        "choices": members + [m for m in care_teams.list_colleagues(c) if m.user_id not in known],
+    }
 
 
 def list_facts(patient: patients.Patient, walks: str | None) -> list[tuple[str, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Sequence
 from typing import Annotated, Any, Final
 
@@ -20,7 +21,7 @@ from server.pages.shell import record_listing, render_page
 from server.pages.visit_state import judge_visit
 from server.pages.words import describe_person
 from server.report.change_words import change_words
-from server.services import analyses, edit_log, live, patients, programmes, sessions, visits
+from server.services import analyses, care_teams, edit_log, live, patients, programmes, sessions, visits
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.tables import now
@@ -29,6 +30,7 @@ from web.words import number
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 PATIENTS_SHOWN = 200
+HOUR: Final = dt.timedelta(hours=1)
 
 FILTERS: Final = (
     ("", "All"),
@@ -49,15 +51,16 @@ def show_patients(
 ) -> Response:
     """All patients, the latest visit first."""
     with db.read() as c:
-        found = patients.list_patients(c, search=q, limit=PATIENTS_SHOWN)
+        found = patients.list_patients(c, who, search=q, limit=PATIENTS_SHOWN)
         rows = list_patients(c, reviewed, found, results=who.may(Action.READ_RESULT))
-        total = patients.count(c)
+        total = patients.count(c, who)
+        in_teams = not who.is_admin and care_teams.are_on(c)
     record_listing(request, who, "patient")
     return render_page(
         request, db, who, "patients.html", "patients",
         patients=rows, query=q, total=total,
         filters=[(key, words, sum(not key or key in r["kinds"] for r in rows)) for key, words in FILTERS],
-        results=who.may(Action.READ_RESULT),
+        results=who.may(Action.READ_RESULT), in_teams=in_teams, hours=care_teams.EMERGENCY // HOUR,
     )  # fmt: skip
 
 

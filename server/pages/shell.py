@@ -45,7 +45,7 @@ def render_page(
 ) -> Response:
     """Render a page; `here` = its entry in the navigation."""
     with db.read() as c:
-        running = jobs.count_active(c)
+        running = jobs.count_active(c, who)
     return render_sheets(request, who, template, nav=NAVIGATION, here=here, running=running, **context)
 
 

@@ -29,7 +29,7 @@ def show_study(
 ) -> Response:
     """The visits that fit a choice, and their tables to download."""
     with db.read() as c:
-        found = studies.list_visits(c, choice)
+        found = studies.list_visits(c, who, choice)
     asked = {
         "q": choice.search,
         "protocol": choice.protocol or "",

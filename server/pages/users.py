@@ -16,6 +16,7 @@ from server.auth.roles import Action, Role
 from server.context import Db
 from server.pages.shell import render_page
 from server.pages.words import ROLE_WORDS
+from server.services import care_teams
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -25,11 +26,12 @@ def show_users(request: Request, db: Db, who: Annotated[Identity, require(Action
     """Who may sign in, and as what."""
     with db.read() as c:
         rows = accounts.list_accounts(c)
+        care_teams_on = care_teams.are_on(c)
         with_factor = second_factor.list_users(c)
     roles = [(role.value, ROLE_WORDS[role]) for role in Role]
     options = [(role.value, role.value) for role in Role]
     return render_page(
         request, db, who, "users.html", "users",
         users=rows, roles=roles, role_options=options, min_password=MIN_LENGTH,
-        with_factor=with_factor,
+        with_factor=with_factor, care_teams_on=care_teams_on,
     )  # fmt: skip

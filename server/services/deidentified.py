@@ -96,7 +96,7 @@ def open_key(path: Path) -> ResearchKey:
 
 def list_chosen(c: Connection, codes: Sequence[str]) -> list[Patient]:
     """Patients by their codes, all where none is given; raises NotFound for a code that nobody has."""
-    everybody = {p.code: p for p in patients.list_patients(c, limit=patients.count(c))}
+    everybody = {p.code: p for p in patients.list_patients(c, None, limit=patients.count(c, None))}
     for code in codes:
         if code not in everybody:
             raise NotFound("patient", code)

@@ -27,6 +27,7 @@ from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
 from server.storage import fs
 from server.storage.blobs import BlobStore
+from server.storage.care_tables import care_team_member, emergency_access
 from server.storage.db import Database
 from server.storage.live_tables import live_event, live_take
 from server.storage.person_tables import consent
@@ -91,7 +92,8 @@ def erase_patient(
         c.execute(delete(programme).where(programme.c.patient_id == patient_id))
         c.execute(delete(prescription).where(prescription.c.patient_id == patient_id))
         c.execute(delete(patient_note).where(patient_note.c.patient_id == patient_id))
-        c.execute(delete(consent).where(consent.c.patient_id == patient_id))
+        for table in (consent, care_team_member, emergency_access):
+            c.execute(delete(table).where(table.c.patient_id == patient_id))
         c.execute(delete(patient).where(patient.c.id == patient_id))
         audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": found.sessions})
         _note(settings, spaces=[patient_id], takes=takes, parts=parts)

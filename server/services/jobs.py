@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, func, select
+from sqlalchemy import Connection, func, join, select
 
 from server import audit
+from server.auth.identity import Identity
+from server.auth.sight import only_seen
 from server.jobs.queue import VIEW_COLUMNS, JobQueue, JobView
 from server.services.errors import NotFound
 from server.storage.tables import ACTIVE_STATES, job, patient, recording, session
@@ -23,9 +25,11 @@ class ListedJob(JobView):
     patient_code: str | None
 
 
-def list_jobs(c: Connection, *, active_only: bool = False, limit: int = 100) -> list[ListedJob]:
-    """Jobs, the newest first."""
-    query = _QUERY.order_by(job.c.seq.desc()).limit(limit)
+def list_jobs(
+    c: Connection, who: Identity | None, *, active_only: bool = False, limit: int = 100
+) -> list[ListedJob]:
+    """Jobs of the patients that a person may open, the newest first; None = the system, all."""
+    query = only_seen(_QUERY, who).order_by(job.c.seq.desc()).limit(limit)
     if active_only:
         query = query.where(job.c.state.in_(ACTIVE_STATES))
     return [_listed(row) for row in c.execute(query)]
@@ -39,9 +43,10 @@ def list_active(c: Connection) -> list[ListedJob]:
     ]
 
 
-def count_active(c: Connection) -> int:
-    """How many jobs wait or run."""
-    return c.execute(select(func.count()).select_from(job).where(job.c.state.in_(ACTIVE_STATES))).scalar_one()
+def count_active(c: Connection, who: Identity) -> int:
+    """How many jobs of the patients that a person may open wait or run."""
+    query = only_seen(select(func.count()).select_from(_JOBS), who)
+    return int(c.execute(query.where(job.c.state.in_(ACTIVE_STATES))).scalar_one())
 
 
 def of_session(c: Connection, session_id: str, *, kind: str | None = None) -> list[JobView]:
@@ -69,19 +74,18 @@ def cancel(c: Connection, queue: JobQueue, actor: audit.Actor | None, job_id: st
     return view
 
 
-_QUERY = (
-    select(
-        *VIEW_COLUMNS,
-        session.c.id.label("session_id"),
-        session.c.title.label("session_title"),
-        patient.c.id.label("patient_id"),
-        patient.c.code.label("patient_code"),
-    )
-    .select_from(job)
-    .outerjoin(recording, recording.c.id == job.c.recording_id)
+_JOBS = (
+    join(job, recording, recording.c.id == job.c.recording_id, isouter=True)
     .outerjoin(session, session.c.id == recording.c.session_id)
     .outerjoin(patient, patient.c.id == session.c.patient_id)
 )
+_QUERY = select(
+    *VIEW_COLUMNS,
+    session.c.id.label("session_id"),
+    session.c.title.label("session_title"),
+    patient.c.id.label("patient_id"),
+    patient.c.code.label("patient_code"),
+).select_from(_JOBS)
 
 
 def _listed(row: Any) -> ListedJob:

@@ -13,6 +13,8 @@ from sqlalchemy.exc import IntegrityError
 
 from core.frames import Side
 from server import audit
+from server.auth.identity import Identity
+from server.auth.sight import only_seen
 from server.jobs.queue import BESIDE
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.storage.tables import ACTIVE_STATES, job, new_id, now, patient, recording, session
@@ -113,14 +115,23 @@ def get(c: Connection, patient_id: str) -> Patient:
     return Patient(**row._asdict())
 
 
-def count(c: Connection) -> int:
-    """How many patients there are."""
-    return c.execute(select(func.count()).select_from(patient)).scalar_one()
+def count(c: Connection, who: Identity | None) -> int:
+    """How many patients there are that a person may open; None = the system, in all."""
+    return int(c.execute(only_seen(select(func.count()).select_from(patient), who)).scalar_one())
 
 
-def list_patients(c: Connection, *, search: str = "", limit: int = 200, offset: int = 0) -> list[Patient]:
-    """Patients whose code or note contains `search` (any case), the latest visit first."""
-    query = _listing().order_by(_LAST_VISIT.desc().nulls_last(), patient.c.created_at.desc(), patient.c.id)
+def list_patients(
+    c: Connection, who: Identity | None, *, search: str = "", limit: int = 200, offset: int = 0
+) -> list[Patient]:
+    """Patients whose code or note contains `search` (any case), the latest visit first.
+
+    Parameters
+    ----------
+    who : only those this person may open; None = the system, which sees everybody.
+    """
+    query = only_seen(_listing(), who).order_by(
+        _LAST_VISIT.desc().nulls_last(), patient.c.created_at.desc(), patient.c.id
+    )
     if search.strip():
         text = search.strip()
         query = query.where(

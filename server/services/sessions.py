@@ -12,6 +12,8 @@ from sqlalchemy import Connection, case, exists, func, insert, select, update
 from core.condition import CHOICES, Footwear, Orthosis, WalkingAid, WalkingCondition, WalkingPace
 from core.frames import PROTOCOLS, Protocol
 from server import audit
+from server.auth.identity import Identity
+from server.auth.sight import only_seen
 from server.jobs.queue import BESIDE
 from server.services.errors import NotFound, ServiceError
 from server.storage.tables import (
@@ -150,6 +152,7 @@ def of_patient(c: Connection, patient_id: str) -> list[Session]:
 
 def search(
     c: Connection,
+    who: Identity | None,
     *,
     search: str = "",
     protocol: Protocol | None = None,
@@ -157,13 +160,16 @@ def search(
     until: dt.date | None = None,
     ids: Collection[str] = (),
 ) -> list[Session]:
-    """Sessions of all patients whose code or note contains `search`, by patient and day.
+    """Sessions of all patients that a person may open whose code or note has `search`, by patient and day.
 
     Parameters
     ----------
+    who : None = the system, which sees everybody.
     since, until : days, both included, None = open. ids : only these of them; empty = all.
     """
-    query = _QUERY.order_by(patient.c.code, session.c.performed_on, session.c.created_at, session.c.id)
+    query = only_seen(_QUERY, who).order_by(
+        patient.c.code, session.c.performed_on, session.c.created_at, session.c.id
+    )
     if text := search.strip():
         query = query.where(
             patient.c.code.icontains(text, autoescape=True) | patient.c.note.icontains(text, autoescape=True)

@@ -17,6 +17,7 @@ from sqlalchemy import Connection
 
 from core.errors import SagittalError
 from core.frames import Protocol
+from server.auth.identity import Identity
 from server.export.ages import coarsen_age
 from server.report.analysis_json import parameter_row
 from server.report.exports import strides_csv
@@ -53,12 +54,13 @@ class StudyChoice:
     visits: frozenset[str] | None = None
 
 
-def list_visits(c: Connection, choice: StudyChoice) -> list[Session]:
-    """The visits of a choice, by patient and day."""
+def list_visits(c: Connection, who: Identity, choice: StudyChoice) -> list[Session]:
+    """The visits of a choice that a person may open, by patient and day."""
     if choice.visits is not None and not choice.visits:
         return []
     return sessions.search(
         c,
+        who,
         search=choice.search,
         protocol=choice.protocol,
         since=choice.since,
@@ -80,7 +82,7 @@ def check_size(chosen: Sequence[Session]) -> None:
 
 
 def make_study(
-    db: Database, reviewed: ReviewedAnalyses, choice: StudyChoice
+    db: Database, reviewed: ReviewedAnalyses, who: Identity, choice: StudyChoice
 ) -> tuple[StudyTables, list[str]]:
     """Write the tables of a choice, and say which visits are in them.
 
@@ -90,7 +92,7 @@ def make_study(
         no_visits, too_many_visits.
     """
     with db.read() as c:
-        chosen = list_visits(c, choice)
+        chosen = list_visits(c, who, choice)
         check_size(chosen)
         people = {p: patients.get(c, p) for p in dict.fromkeys(s.patient_id for s in chosen)}
         shown = analyses.latest_of(c, [s.id for s in chosen])

@@ -12,6 +12,7 @@ from contextlib import closing
 import msgspec
 
 from core.errors import SagittalError
+from server.auth.identity import Identity
 from server.export.zipping import zip_files
 from server.processes.child import enter_child
 from server.services.reviewed import ReviewedAnalyses
@@ -34,7 +35,7 @@ def main() -> None:
     """Make the tables of the one choice that comes over the line."""
     line, settings = enter_child()
     try:
-        reply = _make(settings, msgspec.msgpack.decode(line.receive(), type=StudyChoice))
+        reply = _make(settings, *msgspec.msgpack.decode(line.receive(), type=tuple[Identity, StudyChoice]))
     except SagittalError as error:
         reply = StudyReply(code=error.code, message=error.message)
     except Exception:
@@ -43,9 +44,9 @@ def main() -> None:
     line.send(msgspec.msgpack.encode(reply))
 
 
-def _make(settings: Settings, choice: StudyChoice) -> StudyReply:
+def _make(settings: Settings, who: Identity, choice: StudyChoice) -> StudyReply:
     with closing(Database(settings.database_source)) as db:
-        tables, visits = make_study(db, ReviewedAnalyses(BlobStore(settings.blobs)), choice)
+        tables, visits = make_study(db, ReviewedAnalyses(BlobStore(settings.blobs)), who, choice)
     return StudyReply(zip_files(tables.files), tuple(visits))
 
 

@@ -7,6 +7,7 @@ from typing import Final
 
 import msgspec
 
+from server.auth.identity import Identity
 from server.processes.errand import run_errand
 from server.services.errors import Conflict, ServiceError
 from server.services.studies import StudyChoice, check_size, list_visits
@@ -26,7 +27,9 @@ class StudyFailed(ServiceError):  # noqa: N818 - says what failed
     status = 503
 
 
-def fetch_study(db: Database, settings: Settings, choice: StudyChoice) -> tuple[bytes, tuple[str, ...]]:
+def fetch_study(
+    db: Database, settings: Settings, who: Identity, choice: StudyChoice
+) -> tuple[bytes, tuple[str, ...]]:
     """The tables of a choice as a zip, and which visits are in them.
 
     Raises
@@ -35,11 +38,11 @@ def fetch_study(db: Database, settings: Settings, choice: StudyChoice) -> tuple[
         no_visits, too_many_visits. StudyFailed: it took too long, or ended without a word.
     """
     with db.read() as c:
-        check_size(list_visits(c, choice))
+        check_size(list_visits(c, who, choice))
     with _turn:
         try:
             answer = run_errand(
-                "server.services.study_child", settings, msgspec.msgpack.encode(choice), LONGEST_S
+                "server.services.study_child", settings, msgspec.msgpack.encode((who, choice)), LONGEST_S
             )
         except TimeoutError as error:
             raise StudyFailed(

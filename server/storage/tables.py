@@ -15,6 +15,7 @@ patient ─< session ─< recording ─< recording_file          user ─< login
         └──< prescription ─< live_take >── session, recording (the one it became)
                                  └──< live_event (append-only)
 user ─< api_token, second_factor; patient ─< consent (storage/person_tables.py)
+patient ─< care_team_member, emergency_access >── user (storage/care_tables.py)
 
 Reports, live takes and what opens an account have modules of their own; `metadata` has the tables of all.
 """
@@ -38,7 +39,12 @@ from sqlalchemy import (
     text,
 )
 
-from server.storage import live_tables, person_tables, report_tables  # noqa: F401 - `metadata` has all tables
+from server.storage import (  # noqa: F401 - `metadata` has all tables
+    care_tables,
+    live_tables,
+    person_tables,
+    report_tables,
+)
 from server.storage.append_only import make_append_only
 from server.storage.columns import Json, Utc
 from server.storage.columns import describe_file as _describe_file

@@ -58,7 +58,7 @@ async def figure(
     def attend(view: FigureView[LiveFigure]) -> None:
         _attend(view, hub, sid, LiveReference(body, norm, lambda: _trained(hub, sid)))
 
-    view = await views.open_live(("live", sid, "dark" if dark else "light"), draw, attend)
+    view = await views.open_live(sid, "dark" if dark else "light", draw, attend)
     return JSONResponse({"src": f"/views/{view.id}/"}, headers={"Cache-Control": "no-store"})
 
 

@@ -38,7 +38,7 @@ from websockets.exceptions import WebSocketException
 
 from core.errors import SagittalError
 from core.formats.json_tree import read_json
-from server.auth.access import require
+from server.auth.access import opens, require, still_opens
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.http.compression import accepts
@@ -101,7 +101,7 @@ router = APIRouter(lifespan=_lifespan, include_in_schema=False)
 @router.get("/views/{view_id}/")
 def page(view_id: str, who: Reader, request: Request) -> RedirectResponse:
     """Lead to the document of the 3D view, which learns from its fragment which view it shows."""
-    if _views(request).find(view_id, who.login_id, who.role) is None:
+    if _find(request, view_id, who) is None:
         raise Problem(404, "view_not_found", "This 3D view has ended. Reload the session page.")
     return RedirectResponse(
         f"/views/client/{client_version()}#{view_id}", headers={"Cache-Control": "no-store"}
@@ -123,6 +123,8 @@ def client(version: str, request: Request) -> Response:
 async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
     """Carry viser's messages."""
     view = await _views(ws).find_soon(view_id, who.login_id, who.role)
+    if view is not None:
+        view = await asyncio.to_thread(_find, ws, view_id, who)
     if view is None:
         await _say_gone(ws)
         return
@@ -134,7 +136,13 @@ async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
             return
         async with up:
             await ws.accept(subprotocol=up.subprotocol)
-            await carry_messages(ws, up, functools.partial(ws.app.state.logins.is_open, who.login_id))
+            await carry_messages(ws, up, functools.partial(still_opens, ws, sid=view.session_id))
+
+
+def _find(connection: Request | WebSocket, view_id: str, who: Identity) -> FigureView[Any] | None:
+    """A view that this person may look at and whose session may be opened."""
+    view = _views(connection).find(view_id, who.login_id, who.role)
+    return view if view is not None and opens(connection, who, {"sid": view.session_id}) else None
 
 
 async def _say_gone(ws: WebSocket) -> None:
@@ -179,7 +187,7 @@ async def replay(
             }
         )
         cursor = asyncio.create_task(_follow(ws, opened, ViewActivity(lambda: logins.touch(who.login_id))))
-        over = asyncio.create_task(wait_for_sign_out(lambda: logins.is_open(who.login_id)))
+        over = asyncio.create_task(wait_for_sign_out(functools.partial(still_opens, ws)))
         await asyncio.wait((cursor, over), return_when=asyncio.FIRST_COMPLETED)
         ended = over.done()
         for task in (cursor, over):
@@ -231,7 +239,7 @@ async def _open(
         return replace(motion, ghosts=ghosts)
 
     shown = _state(this) if before is None else f"{_state(this)} over {_state(before)}"
-    return await _views(ws).open(who.login_id, tab, shown, load, **shown_first)
+    return await _views(ws).open(who.login_id, tab, sid, shown, load, **shown_first)
 
 
 def _replayable(c: Connection, sid: str) -> AnalysedSession | None:

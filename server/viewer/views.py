@@ -46,13 +46,14 @@ class FigureView(Generic[Drawn]):
 
     Parameters
     ----------
-    id : unguessable, part of the address. key : what is shown, to whom. login_id : who may look, None = all
-    whose role allows `action`. viewers : open connections. left_at : monotonic time since when there are
-    none. let_go : called once at its end.
+    id : unguessable, part of the address. key : what is shown, to whom. session_id : whose it is.
+    login_id : who may look, None = all whose role allows `action`. viewers : open connections. left_at :
+    monotonic time since when there are none. let_go : called once at its end.
     """
 
     id: str
     key: Key
+    session_id: str
     login_id: str | None
     action: Action
     server: viser.ViserServer
@@ -110,6 +111,7 @@ class FigureViews:
         self,
         login_id: str,
         tab: str,
+        session_id: str,
         source: str,
         load: Callable[[], ReplayMotion],
         *,
@@ -143,13 +145,16 @@ class FigureViews:
             server, figure = await asyncio.to_thread(
                 _start, lambda server: ReplayFigure(server, motion, dark, t_s)
             )
-            view = self._add((login_id, tab, source), login_id, Action.READ_RESULT, server, figure)
+            view = self._add(
+                (login_id, tab, source), session_id, login_id, Action.READ_RESULT, server, figure
+            )
             self._enter(name, view)
             return view
 
     async def open_live(
         self,
-        key: Key,
+        session_id: str,
+        theme: str,
         draw: Callable[[viser.ViserServer], LiveFigure],
         attend: Callable[[FigureView[LiveFigure]], None],
     ) -> FigureView[LiveFigure]:
@@ -165,11 +170,12 @@ class FigureViews:
             `too_many_views`, as `open`.
         """
         async with self._opening:
+            key = ("live", session_id, theme)
             view = self._known(key)
             if view is None:
                 await self._make_room()
                 server, figure = await asyncio.to_thread(_start, draw)
-                view = self._add(key, None, Action.RUN_LIVE, server, figure)
+                view = self._add(key, session_id, None, Action.RUN_LIVE, server, figure)
                 attend(view)
             return view
 
@@ -211,12 +217,13 @@ class FigureViews:
     def _add(
         self,
         key: Key,
+        session_id: str,
         login_id: str | None,
         action: Action,
         server: viser.ViserServer,
         figure: Drawn,
     ) -> FigureView[Drawn]:
-        view = FigureView(secrets.token_hex(16), key, login_id, action, server, figure)
+        view = FigureView(secrets.token_hex(16), key, session_id, login_id, action, server, figure)
         self._views[view.id] = view
         return view
 

@@ -11,7 +11,8 @@ from starlette.routing import Mount
 from server.auth.access import require
 from server.auth.roles import POLICY, PUBLIC, Action, Role, is_permitted
 from server.auth.routes import UndeclaredRouteError, list_declared_actions
-from tests.server.clinic import ORIGIN, Clinic
+from tests.server.clinic import Clinic
+from tests.server.sockets import ask_websocket
 
 pytestmark = pytest.mark.anyio
 
@@ -94,7 +95,9 @@ async def test_every_route_refuses_whom_the_policy_refuses_and_nobody_else(clini
                 continue
             expected = _expected(role, action)
             if method == "WEBSOCKET":
-                got = await _websocket(clinic, path, role)
+                cookie = {"Cookie": f"sid={clinic.token(role)}"} if role else {}
+                got = await ask_websocket(clinic.app, path, cookie)
+                got = got if got in {401, 403} else 200
             else:
                 async with clinic.client(role) as client:
                     answer = await client.request(method, path, json={} if method != "GET" else None)
@@ -112,35 +115,3 @@ def _expected(role: Role | None, action: Action) -> int:
     if role is None:
         return 401
     return 200 if role in POLICY[action] else 403
-
-
-async def _websocket(clinic: Clinic, path: str, role: Role | None) -> int:
-    sent: list[Any] = []
-
-    async def send(message: Any) -> None:
-        sent.append(message)
-
-    async def receive() -> Any:
-        accepted = any(m["type"] == "websocket.accept" for m in sent)
-        return {"type": "websocket.disconnect", "code": 1001} if accepted else {"type": "websocket.connect"}
-
-    headers = [(b"host", b"127.0.0.1"), (b"origin", ORIGIN.encode())]
-    if role:
-        headers.append((b"cookie", f"sid={clinic.token(role)}".encode()))
-    scope = {
-        "type": "websocket",
-        "path": path,
-        "raw_path": path.encode(),
-        "query_string": b"",
-        "scheme": "ws",
-        "root_path": "",
-        "headers": headers,
-        "subprotocols": [],
-        "client": ("127.0.0.1", 1),
-        "server": ("127.0.0.1", 80),
-        "extensions": {"websocket.http.response": {}},
-    }
-    await clinic.app(scope, receive, send)
-    first = sent[0]
-    status = first.get("status", 200) if first["type"] == "websocket.http.response.start" else 200
-    return status if status in {401, 403} else 200

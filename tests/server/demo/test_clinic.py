@@ -20,7 +20,7 @@ def test_the_clinic_is_full_of_people_who_say_they_are_simulated(tmp_path: Path)
     upgrade(settings.database)
     fill(settings)
     with closing(Database(settings.database)) as db, db.read() as c:
-        listed = patients.list_patients(c)
+        listed = patients.list_patients(c, None)
         visits = [v for p in listed for v in sessions.of_patient(c, p.id)]
         trained = [p.code for p in listed if prescriptions.in_force(c, p.id) is not None]
     assert sorted(v.title for v in visits) == sorted(v.title for v in VISITS)

@@ -44,7 +44,7 @@ def check(device_id: str, bias_dps: float = 0.0) -> DeviceCheck:
 def visit(clinic: Clinic, *, code: str = CODE, days_ago: int = 0) -> str:
     """A session with a file; its id."""
     with clinic.db.write() as c:
-        known = {p.code: p.id for p in patients.list_patients(c)}
+        known = {p.code: p.id for p in patients.list_patients(c, None)}
         pid = known.get(code) or patients.create(c, None, code=code).id
         sid = sessions.create(c, None, pid, performed_on=TODAY - dt.timedelta(days=days_ago)).id
     state = clinic.app.state
@@ -108,7 +108,7 @@ async def test_a_bias_that_moved_is_said_in_page_and_api_and_nobody_is_named(cli
     assert [round(k["gyro_bias_rad_s"][1], 3) for k in told.json()["checks"]] == [0.002, 0.0, 0.021]
     assert table.text.count("\n") == 5
     with clinic.db.read() as c:
-        (person,) = patients.list_patients(c)
+        (person,) = patients.list_patients(c, None)
         ids = {person.id, *(s.id for s in sessions.of_patient(c, person.id))}
     for a in answers:
         assert CODE not in a.text

@@ -136,10 +136,10 @@ def test_a_patient_is_made_renamed_and_found(clinic: Clinic) -> None:
         False,
     )
     with clinic.db.read() as c:
-        assert [p.code for p in patients.list_patients(c)] == ["P-9", "Q_2"]
-        assert [p.code for p in patients.list_patients(c, search="p-9")] == ["P-9"]
-        assert [p.code for p in patients.list_patients(c, search="_")] == ["Q_2"]  # no wildcard
-        assert patients.list_patients(c, search="%") == []
+        assert [p.code for p in patients.list_patients(c, None)] == ["P-9", "Q_2"]
+        assert [p.code for p in patients.list_patients(c, None, search="p-9")] == ["P-9"]
+        assert [p.code for p in patients.list_patients(c, None, search="_")] == ["Q_2"]  # no wildcard
+        assert patients.list_patients(c, None, search="%") == []
     assert clinic.trail() == ["patient.created"] * 2 + ["session.created"] * 2 + ["patient.changed"]
 
 
@@ -176,7 +176,7 @@ def test_a_session_knows_its_state(clinic: Clinic) -> None:
         analyses.submit(c, clinic.queue, None, session_id)
     assert state() == "running"
     with clinic.db.read() as c:
-        assert patients.list_patients(c)[0].running
+        assert patients.list_patients(c, None)[0].running
     claim = clinic.queue.claim("w", (recordings.ANALYSE,))
     assert claim is not None
     clinic.queue.fail(claim, "no_walking", "No walking was found.")
@@ -525,10 +525,10 @@ def test_jobs_are_listed_with_whose_they_are_and_cancelled_with_a_trail(clinic: 
     with clinic.db.write() as c:
         view = recordings.inspect(c, clinic.queue, None, session_id)
     with clinic.db.write() as c:
-        listed = jobs.list_jobs(c, active_only=True)
+        listed = jobs.list_jobs(c, None, active_only=True)
         assert [(x.id, x.session_id, x.patient_code) for x in listed] == [(view.id, session_id, "P-1")]
         assert jobs.cancel(c, clinic.queue, clinic.who, view.id).state == "cancelled"
-        assert jobs.list_jobs(c, active_only=True) == []
+        assert jobs.list_jobs(c, None, active_only=True) == []
         assert [v.id for v in jobs.of_session(c, session_id)] == [view.id]
         with pytest.raises(NotFound):
             jobs.cancel(c, clinic.queue, clinic.who, "0" * 32)

@@ -30,9 +30,9 @@ async def test_same_tab_shares_and_other_sign_in_does_not(motion: ReplayMotion) 
         return motion
 
     async with FigureViews().run() as views:
-        mine = await views.open("login-1", "tab", "analysis", load)
-        assert await views.open("login-1", "tab", "analysis", load) is mine
-        theirs = await views.open("login-2", "tab", "analysis", load)
+        mine = await views.open("login-1", "tab", "session", "analysis", load)
+        assert await views.open("login-1", "tab", "session", "analysis", load) is mine
+        theirs = await views.open("login-2", "tab", "session", "analysis", load)
         assert theirs.server is not mine.server
         assert views.find(mine.id, "login-1", Role.VIEWER) is mine
         assert views.find(mine.id, "login-2", Role.ADMIN) is None
@@ -42,7 +42,7 @@ async def test_same_tab_shares_and_other_sign_in_does_not(motion: ReplayMotion) 
 
 async def test_a_views_socket_is_for_this_user_alone_and_goes_with_it(motion: ReplayMotion) -> None:
     async with FigureViews(idle_s=0.0).run() as views:
-        view = await views.open("login", "tab", "analysis", lambda: motion)
+        view = await views.open("login", "tab", "session", "analysis", lambda: motion)
         assert view.socket.is_socket()
         folder = view.socket.parent.stat()
         assert (folder.st_mode & 0o777, folder.st_uid) == (0o700, os.getuid())
@@ -67,7 +67,7 @@ async def test_a_figure_that_cannot_be_drawn_leaves_nothing_behind(
     async with FigureViews().run() as views:
         threads = threading.active_count()
         with pytest.raises(InputError):
-            await views.open_live(("live",), draw, lambda _view: None)
+            await views.open_live("session", "light", draw, lambda _view: None)
         assert list(short_path.iterdir()) == []
         assert threading.active_count() <= threads + 1  # the one that to_thread keeps
 
@@ -80,14 +80,14 @@ async def test_a_folder_that_takes_no_sockets_is_told_and_not_waited_for(
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / folder))
     async with FigureViews().run() as views:
         with pytest.raises(EstimationError, match=f"{why}.*set TMPDIR") as told:
-            await views.open("login", "tab", "analysis", lambda: motion)
+            await views.open("login", "tab", "session", "analysis", lambda: motion)
     assert told.value.code == "no_place_for_views"
     assert list(tmp_path.rglob("sagittal-view-*")) == []
 
 
 async def test_unwatched_views_stop_and_watched_ones_stay(motion: ReplayMotion) -> None:
     async with FigureViews(idle_s=0.0).run() as views:
-        view = await views.open("login", "tab", "analysis", lambda: motion)
+        view = await views.open("login", "tab", "session", "analysis", lambda: motion)
         with view.keep_open():
             await views.sweep()
             assert len(views) == 1
@@ -97,19 +97,19 @@ async def test_unwatched_views_stop_and_watched_ones_stay(motion: ReplayMotion) 
 
 async def test_at_the_limit_the_longest_unwatched_view_gives_way(motion: ReplayMotion) -> None:
     async with FigureViews(limit=2).run() as views:
-        first = await views.open("login", "1", "analysis", lambda: motion)
-        second = await views.open("login", "2", "analysis", lambda: motion)
-        third = await views.open("login", "3", "analysis", lambda: motion)
+        first = await views.open("login", "1", "session", "analysis", lambda: motion)
+        second = await views.open("login", "2", "session", "analysis", lambda: motion)
+        third = await views.open("login", "3", "session", "analysis", lambda: motion)
         assert views.find(first.id, "login", Role.ADMIN) is None
         with second.keep_open(), third.keep_open(), pytest.raises(EstimationError) as refused:
-            await views.open("login", "4", "analysis", lambda: motion)
+            await views.open("login", "4", "session", "analysis", lambda: motion)
         assert refused.value.code == "too_many_views"
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts open files in /proc")
 async def test_views_leave_no_threads_and_no_files_behind(motion: ReplayMotion) -> None:
     async def one(views: FigureViews) -> None:
-        await views.open("login", "tab", "analysis", lambda: motion)
+        await views.open("login", "tab", "session", "analysis", lambda: motion)
         await views.close()
 
     async with FigureViews().run() as views:
@@ -126,6 +126,6 @@ async def test_views_leave_no_threads_and_no_files_behind(motion: ReplayMotion) 
 
 async def test_no_banner_is_printed(motion: ReplayMotion, capfd: pytest.CaptureFixture[str]) -> None:
     async with FigureViews().run() as views:
-        await views.open("login", "tab", "analysis", lambda: motion)
+        await views.open("login", "tab", "session", "analysis", lambda: motion)
     out, err = capfd.readouterr()
     assert (out, err) == ("", "")

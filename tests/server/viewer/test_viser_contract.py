@@ -58,7 +58,7 @@ def test_message_types_keep_their_names() -> None:
 @pytest.mark.anyio
 async def test_a_view_has_no_handler_for_requests_to_share(motion: ReplayMotion) -> None:
     async with FigureViews().run() as views:
-        view = await views.open("login", "tab", "analysis", lambda: motion)
+        view = await views.open("login", "tab", "session", "analysis", lambda: motion)
         assert _messages.ShareUrlRequest not in view.server._websock_server._incoming_handlers
 
 

@@ -1,0 +1,89 @@
+"""Care teams: who may open which patient, and opening one in an emergency."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Request
+
+from server.api import schemas
+from server.api.documents import refusals
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db, Failures, Id, OpenTrail, address_of
+from server.http.json_body import StrictJsonRoute
+from server.services import care_teams, patients
+from server.services.errors import NotFound
+
+router = APIRouter(route_class=StrictJsonRoute, tags=["care teams"])
+Admin = Annotated[Identity, require(Action.MANAGE_USERS)]
+
+
+@router.get("/care-teams", response_model=schemas.CareTeams)
+def read_option(db: Db, who: Admin) -> schemas.CareTeams:
+    """Whether the clinic has care teams."""
+    with db.read() as c:
+        return schemas.CareTeams(on=care_teams.are_on(c))
+
+
+@router.put("/care-teams", response_model=schemas.CareTeams)
+def switch(body: schemas.CareTeamsSwitch, db: Db, who: Admin) -> schemas.CareTeams:
+    """Let the team alone see a patient, or everybody again; the teams are kept meanwhile."""
+    with db.write() as c:
+        if body.on:
+            care_teams.switch_on(c, who, begin_with_past=body.begin_with_past)
+        else:
+            care_teams.switch_off(c, who)
+        return schemas.CareTeams(on=care_teams.are_on(c))
+
+
+@router.get("/patients/{patient_id}/care-team", response_model=schemas.CareTeam)
+def read_team(
+    patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_PATIENT)]
+) -> schemas.CareTeam:
+    """Who is in the team of a patient, and who opened the patient in an emergency of late."""
+    with db.read() as c:
+        patients.get(c, patient_id)
+        found = schemas.CareTeam(care_teams.list_team(c, patient_id), care_teams.list_accesses(c, patient_id))
+    trail.record_opened(who, "care_team.opened", "patient", patient_id)
+    return found
+
+
+@router.put("/patients/{patient_id}/care-team", response_model=schemas.CareTeam)
+def set_team(patient_id: Id, body: schemas.CareTeamChange, db: Db, who: Admin) -> schemas.CareTeam:
+    """Say who is in the team of a patient, by ids of accounts; all others leave it."""
+    with db.write() as c:
+        team = care_teams.set_team(c, who, patient_id, body.users)
+        return schemas.CareTeam(team, care_teams.list_accesses(c, patient_id))
+
+
+@router.post(
+    "/emergency-accesses",
+    status_code=201,
+    response_model=care_teams.EmergencyAccess,
+    responses=refusals(404, 409, 429),
+)
+def open_in_emergency(
+    request: Request,
+    body: schemas.EmergencyOpening,
+    db: Db,
+    trail: OpenTrail,
+    failures: Failures,
+    who: Annotated[Identity, require(Action.OPEN_IN_EMERGENCY)],
+) -> care_teams.EmergencyAccess:
+    """Open a patient whose exact code is known, for four hours; the team and the administrators see it."""
+    # counted, so that nobody looks for people by guessing codes
+    account, address = f"emergency of {who.user_id}", address_of(request)
+    attempt = failures.begin(account, address)
+    try:
+        with db.write() as c:
+            opened = care_teams.open_in_emergency(c, who, body.code, body.reason)
+    except NotFound:
+        trail.record_opened(who, "emergency.refused", "patient", None)
+        raise
+    except BaseException:
+        failures.withdraw(account, address, attempt)
+        raise
+    failures.withdraw(account, address, attempt)
+    return opened

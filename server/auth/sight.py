@@ -1,0 +1,118 @@
+"""Who may open which patient, where the clinic has care teams: the one rule that every read passes.
+
+An administrator sees everybody; all others see the patients whose care team they are in, and those whom they
+have opened in an emergency, until that ends. A route whose address names something of a patient asks through
+its door (server/auth/access.py); a list asks `only_seen`, and its service cannot be called without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from sqlalchemy import ColumnElement, Connection, Select, and_, exists, literal, select, union_all
+
+from server.auth.identity import Identity
+from server.storage.care_tables import care_team_member, clinic_option, emergency_access
+from server.storage.live_tables import live_take
+from server.storage.person_tables import consent
+from server.storage.report_tables import report_link, signed_report
+from server.storage.tables import (
+    analysis,
+    file_upload,
+    filter_run,
+    job,
+    now,
+    patient,
+    patient_note,
+    planned_visit,
+    prescription,
+    programme,
+    recording,
+    session,
+    tuning,
+)
+
+CARE_TEAMS: Final = "care_teams"
+"""Name of the option."""
+
+_OF_SESSION: Final = select(session.c.patient_id)
+_OF_RECORDING: Final = select(session.c.patient_id).join(recording, recording.c.session_id == session.c.id)
+_OF_ANALYSIS: Final = _OF_RECORDING.join(analysis, analysis.c.recording_id == recording.c.id)
+_OF_JOB: Final = _OF_RECORDING.join(job, job.c.recording_id == recording.c.id)
+_OF_REPORT: Final = _OF_SESSION.join(signed_report, signed_report.c.session_id == session.c.id)
+
+_Owner = tuple[Select[Any], ColumnElement[str]]
+OWNER: Final[Mapping[str, _Owner]] = {
+    **dict.fromkeys(("patient_id", "pid"), (select(patient.c.id.label("patient_id")), patient.c.id)),
+    **dict.fromkeys(("session_id", "sid", "other_id", "other"), (_OF_SESSION, session.c.id)),
+    **dict.fromkeys(("job_id", "sensitivity_id"), (_OF_JOB, job.c.id)),
+    "analysis_id": (_OF_ANALYSIS, analysis.c.id),
+    "run_id": (_OF_ANALYSIS.join(filter_run, filter_run.c.analysis_id == analysis.c.id), filter_run.c.id),
+    "tuning_id": (_OF_RECORDING.join(tuning, tuning.c.recording_id == recording.c.id), tuning.c.id),
+    "upload_id": (_OF_SESSION.join(file_upload, file_upload.c.session_id == session.c.id), file_upload.c.id),
+    "take_id": (_OF_SESSION.join(live_take, live_take.c.session_id == session.c.id), live_take.c.id),
+    "report_id": (_OF_REPORT, signed_report.c.id),
+    "link_id": (
+        _OF_REPORT.join(report_link, report_link.c.report_id == signed_report.c.id),
+        report_link.c.id,
+    ),
+    "note_id": (select(patient_note.c.patient_id), patient_note.c.id),
+    "consent_id": (select(consent.c.patient_id), consent.c.id),
+    "prescription_id": (select(prescription.c.patient_id), prescription.c.id),
+    "programme_id": (select(programme.c.patient_id), programme.c.id),
+    "visit_id": (
+        select(programme.c.patient_id).join(planned_visit, planned_visit.c.programme_id == programme.c.id),
+        planned_visit.c.id,
+    ),
+}
+"""Part of an address that names something of a patient → whose it is, and the column that the part names."""
+
+OF_NOBODY: Final = frozenset(
+    {
+        "user_id",
+        "token_id",
+        "token",  # is itself the door
+        "device_id",
+        "view_id",  # its viewer asks of the session it shows (server/viewer/proxy.py)
+        "name",  # of a file or a value of what stands before it
+        "number",
+        "language",
+        "version",
+    }
+)
+"""Parts of addresses that name nothing of a patient by themselves."""
+
+
+def only_seen(query: Select[Any], who: Identity | None) -> Select[Any]:
+    """Leave of a query over `patient` what a person may open; None = the system, which sees everybody."""
+    return query if who is None or who.is_admin else query.where(_may_open(who, patient.c.id))
+
+
+def may_open(c: Connection, who: Identity, parts: Mapping[str, str]) -> bool:
+    """Whether a person may open all that parts of an address name; of what is not there False as well."""
+    named = [(OWNER[name], value) for name, value in parts.items() if name in OWNER]
+    if who.is_admin or not named:
+        return True
+    owners = [
+        exists(query.where(own == value, _seen(who, query.selected_columns[0])))
+        for (query, own), value in named
+    ]
+    return bool(c.execute(select(~TEAMS_ARE_ON | and_(*owners))).scalar_one())
+
+
+def _may_open(who: Identity, patient_id: ColumnElement[str]) -> ColumnElement[bool]:
+    return ~TEAMS_ARE_ON | _seen(who, patient_id)
+
+
+def _seen(who: Identity, patient_id: ColumnElement[str]) -> ColumnElement[bool]:
+    at = literal(now(), emergency_access.c.ends_at.type)
+    member = select(care_team_member.c.patient_id).where(care_team_member.c.user_id == who.user_id)
+    opened = select(emergency_access.c.patient_id).where(
+        emergency_access.c.user_id == who.user_id, emergency_access.c.ends_at > at
+    )
+    return patient_id.in_(union_all(member, opened))
+
+
+TEAMS_ARE_ON: Final = exists().where(clinic_option.c.name == CARE_TEAMS)
+"""Whether the clinic has care teams, as a condition of a statement."""

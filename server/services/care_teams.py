@@ -1,0 +1,201 @@
+"""Care teams: who is in the team of which patient, and who opened somebody in an emergency.
+
+Off until an administrator switches them on; what they decide is server/auth/sight.py.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Final
+from unicodedata import normalize
+
+from sqlalchemy import Connection, delete, insert, select, union
+
+from server import audit
+from server.auth.identity import Identity
+from server.auth.roles import Role
+from server.auth.sight import CARE_TEAMS, TEAMS_ARE_ON, may_open
+from server.services import patients
+from server.services.errors import Conflict, NotFound, ServiceError
+from server.storage.care_tables import care_team_member, clinic_option, emergency_access
+from server.storage.tables import audit as audit_table
+from server.storage.tables import new_id, now, patient, session, user
+
+EMERGENCY: Final = dt.timedelta(hours=4)
+"""How long a patient stays open to who opened him or her in an emergency (our choice)."""
+SHOWN: Final = dt.timedelta(days=90)
+"""How long the patient's page shows that; the audit log keeps it."""
+REASON: Final = (10, 500)
+"""Characters of a reason, at least and at most."""
+
+
+@dataclass(frozen=True)
+class TeamMember:
+    """Somebody who may be or is in a team."""
+
+    user_id: str
+    name: str
+    role: Role
+
+
+@dataclass(frozen=True)
+class EmergencyAccess:
+    """Somebody outside the team opened the patient: by whom, why, from when to when."""
+
+    id: str
+    patient_id: str
+    by: str
+    reason: str
+    opened_at: dt.datetime
+    ends_at: dt.datetime
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it goes on."""
+        return self.ends_at > now()
+
+
+def are_on(c: Connection) -> bool:
+    """Whether the clinic has care teams."""
+    return bool(c.execute(select(TEAMS_ARE_ON)).scalar_one())
+
+
+def switch_on(c: Connection, actor: audit.Actor, *, begin_with_past: bool) -> None:
+    """From now on a patient is seen by the team only; without effect where they are on.
+
+    Parameters
+    ----------
+    begin_with_past : whoever has opened or changed something of a patient so far is in the team.
+    """
+    if are_on(c):
+        return
+    at, added = now(), 0
+    if begin_with_past:
+        there = {(m.patient_id, m.user_id) for m in c.execute(select(care_team_member))}
+        rows = [(p, u) for p, u in _list_past(c) if (p, u) not in there]
+        added = len(rows)
+        if rows:
+            c.execute(
+                insert(care_team_member), [{"patient_id": p, "user_id": u, "since": at} for p, u in rows]
+            )
+    c.execute(insert(clinic_option).values(name=CARE_TEAMS, since=at))
+    audit.record(c, actor, "care_teams.on", "clinic", None, {"members": added})
+
+
+def switch_off(c: Connection, actor: audit.Actor) -> None:
+    """From now on everybody sees every patient; the teams are kept."""
+    if c.execute(delete(clinic_option).where(clinic_option.c.name == CARE_TEAMS)).rowcount:
+        audit.record(c, actor, "care_teams.off", "clinic", None)
+
+
+def list_colleagues(c: Connection) -> list[TeamMember]:
+    """Everybody who can be in a team: open accounts but administrators, who see everybody."""
+    query = select(user).where(user.c.active, user.c.role != Role.ADMIN).order_by(user.c.name)
+    return [TeamMember(u.id, u.display_name or u.name, Role(u.role)) for u in c.execute(query)]
+
+
+def list_team(c: Connection, patient_id: str) -> list[TeamMember]:
+    """The team of a patient, by name."""
+    query = (
+        select(user)
+        .join(care_team_member, care_team_member.c.user_id == user.c.id)
+        .where(care_team_member.c.patient_id == patient_id)
+        .order_by(user.c.name)
+    )
+    return [TeamMember(u.id, u.display_name or u.name, Role(u.role)) for u in c.execute(query)]
+
+
+def set_team(
+    c: Connection, actor: audit.Actor, patient_id: str, user_ids: Collection[str]
+) -> list[TeamMember]:
+    """Say who is in the team of a patient; raises NotFound, of no open account too."""
+    patients.get(c, patient_id)
+    wanted = set(user_ids)
+    before = {m.user_id for m in list_team(c, patient_id)}
+    unknown = wanted - before - {m.user_id for m in list_colleagues(c)}
+    if unknown:
+        raise NotFound("account for a team", min(unknown))
+    gone = care_team_member.c.user_id.in_(before - wanted)
+    c.execute(delete(care_team_member).where(care_team_member.c.patient_id == patient_id, gone))
+    for user_id in sorted(wanted - before):
+        c.execute(insert(care_team_member).values(patient_id=patient_id, user_id=user_id, since=now()))
+    if wanted != before:
+        detail = {"added": sorted(wanted - before), "removed": sorted(before - wanted)}
+        audit.record(c, actor, "care_team.changed", "patient", patient_id, detail)
+    return list_team(c, patient_id)
+
+
+def add_maker(c: Connection, who: Identity, patient_id: str) -> None:
+    """Put whoever adds a patient into the team, or nobody but administrators would see the patient."""
+    if who.role is not Role.ADMIN and are_on(c):
+        c.execute(insert(care_team_member).values(patient_id=patient_id, user_id=who.user_id, since=now()))
+        audit.record(
+            c, who, "care_team.changed", "patient", patient_id, {"added": [who.user_id], "removed": []}
+        )
+
+
+def open_in_emergency(c: Connection, who: Identity, code: str, reason: str) -> EmergencyAccess:
+    """Open a patient to somebody outside the team for a time.
+
+    The code must be known: it is no way to look for people.
+
+    Raises
+    ------
+    NotFound : no patient has exactly this code. ServiceError bad_value : no reason to speak of. Conflict
+    care_teams_off, seen_already.
+    """
+    if not are_on(c):
+        raise Conflict("care_teams_off", "This clinic has no care teams: you see every patient in the list.")
+    why = " ".join(reason.split())
+    if not REASON[0] <= len(why) <= REASON[1]:
+        raise ServiceError(
+            "bad_value", f"The reason has {len(why)} characters. Expected {REASON[0]} to {REASON[1]}."
+        )
+    wanted = normalize("NFKC", code).strip()
+    found = c.execute(select(patient.c.id).where(patient.c.code == wanted)).scalar()
+    if found is None:
+        raise NotFound("patient", wanted)
+    if may_open(c, who, {"patient_id": found}):
+        raise Conflict("seen_already", "You may open this patient already; look in the list of patients.")
+    at = now()
+    row = {"id": new_id(), "patient_id": found, "reason": why, "opened_at": at, "ends_at": at + EMERGENCY}
+    c.execute(insert(emergency_access).values(**row, user_id=who.user_id))
+    # the reason stays with the patient, and goes when the patient is erased; the row of the log does not
+    detail = {"access": row["id"], "hours": EMERGENCY / dt.timedelta(hours=1)}
+    audit.record(c, who, "emergency.opened", "patient", found, detail)
+    return EmergencyAccess(**row, by=who.display_name or who.name)
+
+
+def list_accesses(c: Connection, patient_id: str) -> list[EmergencyAccess]:
+    """Who opened a patient in an emergency of late, the newest first."""
+    query = (
+        select(emergency_access, user.c.name, user.c.display_name)
+        .join(user, user.c.id == emergency_access.c.user_id)
+        .where(emergency_access.c.patient_id == patient_id, emergency_access.c.opened_at > now() - SHOWN)
+        .order_by(emergency_access.c.opened_at.desc())
+    )
+    return [
+        EmergencyAccess(
+            row.id, row.patient_id, row.display_name or row.name, row.reason, row.opened_at, row.ends_at
+        )
+        for row in c.execute(query)
+    ]
+
+
+def _list_past(c: Connection) -> list[tuple[str, str]]:
+    """Patient and person, of who has opened or changed something of a patient and still has an account."""
+    of_patient = select(patient.c.id, audit_table.c.user_id).join(
+        audit_table, (audit_table.c.resource == "patient") & (audit_table.c.resource_id == patient.c.id)
+    )
+    of_session = (
+        select(session.c.patient_id, audit_table.c.user_id)
+        .select_from(session)
+        .join(
+            audit_table, (audit_table.c.resource == "session") & (audit_table.c.resource_id == session.c.id)
+        )
+    )
+    done = union(of_patient, of_session).subquery()
+    colleagues = (user.c.id == done.c.user_id) & user.c.active & (user.c.role != Role.ADMIN)
+    return [(row[0], row[1]) for row in c.execute(select(done).join(user, colleagues))]

@@ -1,0 +1,115 @@
+"""One row of everything that belongs to a patient, and what the addresses of the routes need of it."""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+from collections.abc import Mapping
+from typing import Any, Final
+
+from sqlalchemy import insert
+
+from server.auth.tokens import token_hash
+from server.services import prescriptions, programmes
+from server.storage.live_tables import live_take
+from server.storage.person_tables import consent
+from server.storage.report_tables import report_link, signed_report
+from server.storage.tables import (
+    analysis,
+    analysis_file,
+    file_upload,
+    filter_run,
+    new_id,
+    now,
+    patient,
+    patient_note,
+    recording,
+    reference_file,
+    session,
+    tuning,
+)
+from tests.server import analysed, crowd
+from tests.server.clinic import Clinic
+
+TRAINING: Final = {
+    "parameter": "stance_pct",
+    "side": "left",
+    "target": {"source": "manual", "mean": 62.0, "sd": 2.0},
+}
+OF_NOBODY: Final = {
+    "device_id": crowd.DEVICES[0],
+    "view_id": "0" * 32,
+    "number": "0",
+    "language": "en",
+    "version": "none",
+}
+"""Parts of addresses that name nothing of a patient."""
+
+
+def add_belongings(clinic: Clinic, code: str) -> dict[str, str]:
+    """Add a patient to whom one of everything belongs; returns values by the names in addresses."""
+    ((other, sid),) = crowd.fill(clinic, 1, 2, analysed.files())
+    at, later = now(), now() + dt.timedelta(days=1)
+    ids = {name: new_id() for name in (
+        "note_id", "consent_id", "upload_id", "tuning_id",
+        "run_id", "report_id", "link_id", "take_id",
+    )}  # fmt: skip
+    with clinic.db.write() as c:
+        pid = c.execute(session.select().where(session.c.id == sid)).one().patient_id
+        took = c.execute(recording.select().where(recording.c.session_id == sid)).one().id
+        done = c.execute(analysis.select().where(analysis.c.recording_id == took)).one()
+        of_visit, of_patient = {"session_id": sid}, {"patient_id": pid}
+        written = prescriptions.write(c, clinic.app.state.reviewed, None, pid, TRAINING)
+        course = programmes.start(c, None, pid, starts_on=at.date())
+        once = {"job_id": done.job_id, "created_at": at, "code_version": "1"}
+        sha = token_hash(ids["link_id"])
+        c.execute(patient.update().where(patient.c.id == pid).values(code=code, note=f"note of {code}"))
+        c.execute(session.update().where(session.c.patient_id == pid).values(title=f"visit of {code}"))
+        for table, row in (
+            (patient_note, {"id": ids["note_id"], **of_patient, "written_on": at.date(), "created_at": at,
+                            "content": f"{code} limps"}),
+            (consent, {"id": ids["consent_id"], **of_patient, "purpose": "sharing", "given_on": at.date(),
+                       "evidence": f"form of {code}", "created_at": at}),
+            (file_upload, {"id": ids["upload_id"], **of_visit, "name": "b.csv", "size": 9, "created_at": at}),
+            (reference_file, {**of_visit, "name": "optical.sto", "size": 1, "sha256": sha, "added_at": at}),
+            (tuning, {"id": ids["tuning_id"], "recording_id": took, "input_sha256": sha, "result": {},
+                      **once}),
+            (filter_run, {"id": ids["run_id"], "analysis_id": done.id, "settings": {}, **once}),
+            (signed_report, {"id": ids["report_id"], **of_visit, "number": 1, "analysis_id": done.id,
+                             "language": "en", "signed_at": at}),
+            (report_link, {"id": ids["link_id"], "report_id": ids["report_id"], "token_sha256": sha,
+                           "made_at": at, "expires_at": later, "openings": 0}),
+            (live_take, {"id": ids["take_id"], **of_visit, "state": "open", "created_at": at,
+                         "token_sha256": sha, "token_expires_at": later}),
+            (analysis_file, {"analysis_id": done.id, "name": f"sensitivity-{done.job_id[:8]}.json", "size": 2,
+                             "sha256": sha}),
+        ):  # fmt: skip
+            c.execute(insert(table).values(row))
+    return ids | {
+        "prescription_id": written.id,
+        "programme_id": course.id,
+        "visit_id": course.visits[0].id,
+        "pid": pid,
+        "patient_id": pid,
+        "sid": sid,
+        "session_id": sid,
+        "other": other,
+        "other_id": other,
+        "analysis_id": done.id,
+        "job_id": done.job_id,
+        "sensitivity_id": done.job_id,
+    }
+
+
+def fill_address(route: str, values: Mapping[str, str]) -> str:
+    """The address of a route with its parts filled; KeyError for a part that this does not know."""
+    path = route.partition(" ")[2]
+    named: Mapping[str, Any] = {"references": "optical.sto", "files": "walk.txt", "signals": "foot_pitch"}
+
+    def value(found: re.Match[str]) -> str:
+        before = path[: found.start()].rstrip("/").rsplit("/", 1)[-1]
+        if found[1] == "name":
+            return str(named.get(before, "stance_pct"))
+        return values[found[1]]
+
+    return re.sub(r"\{(\w+)(?::path)?\}", value, path)
