@@ -26,6 +26,8 @@ LABEL: Final = "Axivity CWA"
 MAGIC: Final = b"MD\xfc\x03"
 HEADER: Final = 1024
 BLOCK: Final = 512
+MOST_SAMPLES: Final = 120
+"""Of a block: packed ones."""
 AT_ONCE: Final = 128
 """Blocks that are decoded together, some ten thousand samples."""
 
@@ -99,12 +101,19 @@ def open_long(source: str, opener: Opener) -> LongStream:
 def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draft, ...]:
     """A short CWA file at once, as any other reader gives it; raises as `open_long`."""
     stream = open_long(source, lambda: BytesIO(data))
-    blocks = list(stream.open_blocks())
-    if not blocks:
+    most = _count_most(data)
+    ticks, acc = np.empty(most), np.empty((most, 3))
+    gyr = np.empty((most, 3)) if stream.has_gyro else None
+    n = 0
+    for block in stream.open_blocks():
+        rows = slice(n, n := n + len(block.t_s))
+        ticks[rows], acc[rows] = block.t_s, block.acc
+        if gyr is not None:
+            gyr[rows] = block.gyr
+    if not n:
         raise FormatError("empty", f"{source} holds no whole block; copy it from the device again.")
-    gyr = [b.gyr for b in blocks if b.gyr is not None]
     notices: tuple[Notice, ...] = ()
-    if not gyr:
+    if gyr is None:
         notices = (
             Notice(
                 "missing_gyro",
@@ -116,15 +125,22 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
         device_id=stream.device_id,
         source=source,
         clock="device",
-        ticks=np.concatenate([b.t_s for b in blocks]),
-        acc=np.concatenate([b.acc for b in blocks]),
-        gyr=np.concatenate(gyr) if gyr else None,
+        ticks=ticks[:n],
+        acc=acc[:n],
+        gyr=None if gyr is None else gyr[:n],
         mag=None,
         quat=None,
         rate_hz=stream.rate_hz,
         notices=notices,
     )
     return (draft,)
+
+
+def _count_most(data: bytes) -> int:
+    """How many samples all blocks hold together, damaged ones included."""
+    blocks = max(0, len(data) - HEADER) // BLOCK
+    count = np.frombuffer(data, _BLOCK, blocks, min(HEADER, len(data)))["count"]
+    return int(np.minimum(count, MOST_SAMPLES).sum())
 
 
 def _rate(code: int, offset: int) -> float:
@@ -180,19 +196,16 @@ def _read_blocks(source: str, opener: Opener, origin_s: float) -> Iterator[Sampl
     """Samples from the start; a block that is damaged is a hole."""
     with opener() as file:
         file.seek(HEADER)
-        held: _Decoded | None = None
+        held = b""  # the last whole block: how long it lasts shows the one behind it
         while len(data := file.read(BLOCK * AT_ONCE)) >= BLOCK:
-            heads, raw = _whole_blocks(data)
-            if not len(heads):
+            heads, raw = _whole_blocks(held + data)
+            if len(heads) == bool(held):
                 continue
             rate = _rate(int(heads[0]["rate"]), int(heads[0]["offset"]))
-            decoded = _decode(heads, raw, source)
-            joined = decoded if held is None else _append(held, decoded)
-            # how long the last block lasts shows the one behind it
-            yield _time(joined, len(joined.count) - 1, rate, origin_s)
-            held = _last(joined)
-        if held is not None:
-            yield _time(held, 1, rate, origin_s)
+            yield _time(_decode(heads, raw, source), len(heads) - 1, rate, origin_s)
+            held = raw[-1].tobytes()
+        if held:
+            yield _time(_decode(*_whole_blocks(held), source), 1, rate, origin_s)
 
 
 def _decode(heads: NDArray[Any], raw: NDArray[np.uint8], source: str) -> _Decoded:
@@ -210,47 +223,36 @@ def _decode(heads: NDArray[Any], raw: NDArray[np.uint8], source: str) -> _Decode
         raise FormatError(
             "bad_cwa", f"{source} has blocks of {axes} axes in packing {packing}; expected 3 or 6 axes."
         )
-    there = np.arange(room) < count[:, None]
+    there = None if count.min() == room else np.arange(room) < count[:, None]
     body = np.ascontiguousarray(raw[:, _DATA : _DATA + 480])
     gyr = None
     light = heads["light"].astype(np.int64)
     if packing == 0:
-        acc = np.asarray(_unpack(body.view("<u4"))[there] * (GRAVITY / 256.0))
+        acc = np.asarray(_select(_unpack(body.view("<u4")), there) * (GRAVITY / 256.0))
     else:
         values = body.view("<i2").reshape(len(heads), room, axes)
         per_g = 2.0 ** (8 + (light >> 13))
-        acc = np.asarray(values[:, :, -3:][there] * np.repeat(GRAVITY / per_g, count)[:, None])
+        acc = np.asarray(_select(values[:, :, -3:], there) * np.repeat(GRAVITY / per_g, count)[:, None])
         if axes == 6:
             full_dps = 8000.0 / 2.0 ** ((light >> 10) & 7)
-            gyr = values[:, :, :3][there] * np.repeat(np.radians(full_dps) / 32768.0, count)[:, None]
+            scale = np.repeat(np.radians(full_dps) / 32768.0, count)[:, None]
+            gyr = np.asarray(_select(values[:, :, :3], there) * scale)
     return _Decoded(_starts(heads), count, acc, gyr)
+
+
+def _select(values: NDArray[Any], there: NDArray[np.bool_] | None) -> NDArray[Any]:
+    """Samples (n, 3) of blocks (b, room, 3), those that are there; None = all are."""
+    return values.reshape(-1, 3) if there is None else values[there]
 
 
 def _unpack(words: NDArray[np.uint32]) -> NDArray[np.int32]:
     """x, y, z (b, n, 3) of 32-bit words (b, n): three signed numbers of 10 bits and a common exponent."""
     signed = words.view(np.int32)
     exponent = (words >> 30).astype(np.int32)
-    parts = [((signed << (22 - 10 * i)) >> 22) << exponent for i in range(3)]
-    return np.stack(parts, axis=-1)
-
-
-def _append(first: _Decoded, more: _Decoded) -> _Decoded:
-    gyr = None
-    if first.gyr is not None and more.gyr is not None:
-        gyr = np.concatenate((first.gyr, more.gyr))
-    return _Decoded(
-        np.concatenate((first.start_s, more.start_s)),
-        np.concatenate((first.count, more.count)),
-        np.concatenate((first.acc, more.acc)),
-        gyr,
-    )
-
-
-def _last(blocks: _Decoded) -> _Decoded:
-    n = int(blocks.count[-1])
-    rows = slice(len(blocks.acc) - n, None)
-    gyr = None if blocks.gyr is None else blocks.gyr[rows]
-    return _Decoded(blocks.start_s[-1:], blocks.count[-1:], blocks.acc[rows], gyr)
+    out = np.empty((*words.shape, 3), np.int32)
+    for i in range(3):
+        np.left_shift((signed << (22 - 10 * i)) >> 22, exponent, out=out[..., i])
+    return out
 
 
 def _time(blocks: _Decoded, number: int, rate: float, origin_s: float) -> SampleBlock:
@@ -263,7 +265,12 @@ def _time(blocks: _Decoded, number: int, rate: float, origin_s: float) -> Sample
     follows = (measured > 0.0) & (measured < GAP * nominal[:upto])
     lasts[:upto] = np.where(follows, measured, nominal[:upto])
     n = int(count.sum())
-    first = np.cumsum(count) - count
-    within = (np.arange(n) - np.repeat(first, count)) / np.repeat(np.maximum(count, 1), count)
-    t_s = np.repeat(blocks.start_s[:number] - origin_s, count) + within * np.repeat(lasts, count)
+    start = blocks.start_s[:number] - origin_s
+    if n and count.min() == count.max():
+        within = np.arange(count[0]) / count[0]
+        t_s = (start[:, None] + within * lasts[:, None]).ravel()
+    else:
+        first = np.cumsum(count) - count
+        within = (np.arange(n) - np.repeat(first, count)) / np.repeat(np.maximum(count, 1), count)
+        t_s = np.repeat(start, count) + within * np.repeat(lasts, count)
     return SampleBlock(t_s, blocks.acc[:n], None if blocks.gyr is None else blocks.gyr[:n])

@@ -27,7 +27,7 @@ def read(data: bytes, source: str) -> dict[str, Segment | None]:
     """
     try:
         root = fromstring(data, forbid_dtd=True)
-    except (ParseError, DefusedXmlException, ValueError) as e:
+    except (ParseError, DefusedXmlException, ValueError, LookupError) as e:  # LookupError: of its encoding
         raise FormatError(
             "bad_xml", f"{source} is not readable XML ({type(e).__name__}); export it again."
         ) from e

@@ -7,14 +7,12 @@ into the next: the mean over the intervals before and behind a frame, so fast tu
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator
-from typing import Final
-from xml.etree.ElementTree import Element, ParseError
+from collections.abc import Mapping
+from typing import Final, NoReturn
+from xml.parsers import expat
 
 import numpy as np
-from defusedxml import DefusedXmlException
-from defusedxml.ElementTree import iterparse
+from defusedxml import DTDForbidden
 
 from core import rotation
 from core.errors import FormatError, Notice
@@ -45,33 +43,27 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
     FormatError `bad_xml` (not well formed, or with a DTD, which is refused), `missing_acc`, `empty`.
     """
     reader = _Reader(source)
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    # without a DTD there are no entities to expand
+    parser.StartDoctypeDeclHandler = _refuse_dtd
+    parser.StartElementHandler, parser.EndElementHandler = reader.begin, reader.end
+    parser.CharacterDataHandler = reader.add_text
     try:
-        for element in _elements(data):
-            reader.take(element)
-    except (ParseError, DefusedXmlException, ValueError) as e:
+        parser.Parse(data, True)
+    except (expat.ExpatError, DTDForbidden, ValueError, LookupError) as e:  # LookupError: of its encoding
         raise FormatError(
             "bad_xml", f"{source} is not readable XML ({type(e).__name__}); export it again."
         ) from e
     return reader.finish(spec)
 
 
-def _elements(data: bytes) -> Iterator[Element]:
-    """Elements as they end; a frame is emptied behind its reader, so that memory does not grow with it."""
-    parents: list[Element] = []
-    for event, element in iterparse(io.BytesIO(data), events=("start", "end"), forbid_dtd=True):
-        if event == "start":
-            parents.append(element)
-            continue
-        parents.pop()
-        yield element
-        if _name(element) == "frame":
-            element.clear()
-            if parents:
-                parents[-1].remove(element)
+def _refuse_dtd(name: str, system_id: str | None, public_id: str | None, _: bool) -> NoReturn:
+    raise DTDForbidden(name, system_id, public_id)
 
 
-def _name(element: Element) -> str:
-    return element.tag.rsplit("}", 1)[-1]
+def _local(tag: str) -> str:
+    return tag.rsplit(":", 1)[-1]
 
 
 class _Reader:
@@ -83,24 +75,48 @@ class _Reader:
         self._rate: float | None = None
         self._rows: list[str] = []
         self._broken = 0
+        self._frame: Mapping[str, str] | None = None
+        self._said: dict[str, str] = {}
+        self._part: str | None = None
+        self._depth = 0
 
-    def take(self, element: Element) -> None:
-        """Look at an element that has ended."""
-        name = _name(element)
-        if name == "sensor" and (label := element.get("label")):
+    def begin(self, tag: str, given: Mapping[str, str]) -> None:
+        """An element begins."""
+        name = _local(tag)
+        if self._frame is not None:
+            self._depth += 1
+            # what is inside of a part of a frame is not read
+            self._part = name if self._depth == 1 and name in _WIDTHS else None
+            if self._part is not None:
+                self._said[name] = ""
+        elif name == "frame":
+            self._frame, self._said, self._part, self._depth = given, {}, None, 0
+        elif name == "sensor" and (label := given.get("label")):
             self._labels.append(label)
             if len(self._labels) > _MOST_SENSORS:
                 raise FormatError("bad_table", f"{self._source} names more than {_MOST_SENSORS} sensors.")
         elif name == "subject":
-            self._rate = _number(element.get("frameRate"))
-        elif name == "frame" and element.get("type", "normal") == "normal":
-            self._take_frame(element)
+            self._rate = _number(given.get("frameRate"))
 
-    def _take_frame(self, frame: Element) -> None:
-        index = _number(frame.get("index"))
-        said = {
-            name: child.text.split() for child in frame if (name := _name(child)) in _WIDTHS and child.text
-        }
+    def add_text(self, content: str) -> None:
+        """Text of the innermost element."""
+        if self._part is not None:
+            self._said[self._part] += content
+
+    def end(self, tag: str) -> None:
+        """An element ends."""
+        if self._frame is None:
+            return
+        self._part = None
+        if self._depth:
+            self._depth -= 1
+            return
+        frame, self._frame = self._frame, None
+        if frame.get("type", "normal") == "normal":
+            self._take_frame(_number(frame.get("index")))
+
+    def _take_frame(self, index: float | None) -> None:
+        said = {name: content.split() for name, content in self._said.items()}
         said.setdefault("sensorMagneticField", ["NaN"] * (3 * len(self._labels)))
         cells = [cell for name in _WIDTHS for cell in said.get(name, ())]
         if index is None or len(cells) != len(self._labels) * sum(_WIDTHS.values()):

@@ -76,18 +76,17 @@ def _find_place(
     """The place that touches least; of equal ones the least outwards, then the leftmost."""
     long, begin = first[2] - first[0], round(first[0])
     places = range(begin, max(int(width - long), begin) + 1, STEP_PX)
-    return min(
-        (
-            _Place(
-                _count_touches((x, first[1] + out, x + long, first[3] + out), curves, uprights),
-                x,
-                first[3] - BELOW_PX + out,
-            )
-            for out in outwards
-            for x in places
-        ),
-        key=lambda place: place.touched,
-    )
+    best: _Place | None = None
+    for out in outwards:
+        for x in places:
+            box = x, first[1] + out, x + long, first[3] + out
+            touched = _count_touches(box, curves, uprights)
+            if best is None or touched < best.touched:
+                best = _Place(touched, x, first[3] - BELOW_PX + out)
+            if not touched:
+                return best
+    assert best is not None  # noqa: S101 - both have at least one
+    return best
 
 
 def _count_touches(box: Box, curves: Sequence[tuple[float, float]], uprights: Sequence[float]) -> int:

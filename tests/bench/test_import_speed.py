@@ -1,18 +1,20 @@
-"""MT Manager text costs at most twice what pyarrow's compiled CSV reader spends on the same bytes alone."""
+"""What reading costs beside the least that any reader has to do with the same bytes, format by format."""
 
 from __future__ import annotations
 
 import io
 import json
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from pyarrow import csv
 
-from core.formats import SourceFile, device_motion, read_recording, write_recording
+from core.formats import SourceFile, cwa, device_motion, read_recording, write_recording
 from core.formats.text import to_utf8
 from core.formats.vendors import find_vendor
+from tests.bench.long_cwa import write_long_cwa
 from tests.bench.pairs import in_pairs
 from tests.core.formats.making import mt_text
 from tests.core.formats.vendor_files import VENDOR_SAMPLES, N
@@ -92,6 +94,28 @@ def test_a_stored_take_is_smaller_and_faster_than_its_text(files: list[SourceFil
     )
     assert packed < 0.5 * plain
     assert ratio < 1.0
+
+
+@pytest.mark.bench
+def test_binary_blocks_cost_at_most_three_times_what_unpacking_them_does(tmp_path: Path) -> None:
+    data = write_long_cwa(tmp_path / "long.cwa", 0.5).read_bytes()
+
+    def unpack() -> None:
+        """What any reader has to do at least: the packed numbers as floats, and a time for each."""
+        blocks = np.frombuffer(data[cwa.HEADER :], np.uint8).reshape(-1, cwa.BLOCK)
+        words = np.ascontiguousarray(blocks[:, 30:510]).view("<i4")
+        out = np.empty((*words.shape, 3))
+        for i in range(3):
+            np.multiply(((words << (22 - 10 * i)) >> 22) << (words >> 30 & 3), 0.038, out=out[..., i])
+        assert len(np.arange(words.size) * 0.02) == len(out.reshape(-1, 3))
+
+    ours, theirs, ratio = in_pairs(lambda: cwa.read(data, "long.cwa"), unpack)
+    size = len(data) / 1e6
+    sys.stdout.write(
+        f"\nAxivity CWA: {size:.1f} MB at {size / ours:.0f} MB/s of CPU, unpacking alone at "
+        f"{size / theirs:.0f} MB/s: {ratio:.2f} times its CPU\n"
+    )
+    assert ratio <= 3.0
 
 
 @pytest.mark.bench

@@ -80,6 +80,12 @@ def test_an_xml_bomb_is_not_expanded() -> None:
     assert dict(recording.segments) == {}
 
 
+def test_an_encoding_that_nobody_knows_is_refused() -> None:
+    named = '<?xml version="1.0" encoding="no-such-code"?>' + MAPPING.partition("?>")[2]
+    recording = read_recording([mt_file(), source("map.xml", named)])
+    assert [n.code for n in recording.notices] == ["file_not_read"]
+
+
 def test_readme_and_system_files_are_ignored_and_said() -> None:
     junk = [
         source("readme.txt", "my walk"),

@@ -112,6 +112,8 @@ def test_without_h5py_the_answer_says_how_to_install_it(monkeypatch: pytest.Monk
 def test_mvnx_with_entities_is_refused_and_lost_frames_are_holes() -> None:
     bomb = '<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]>\n'
     assert code_of(made.mvnx(head=bomb)) == "bad_xml"
+    assert code_of(made.mvnx().replace(b"UTF-8", b"no-such-code")) == "bad_xml"
+    assert code_of(made.mvnx()[:-9]) == "bad_xml"
     assert code_of(made.mvnx().replace(b"sensorFreeAcceleration", b"acceleration")) == "missing_acc"
     stream = only(read(made.mvnx(skip=(50, 51))))
     assert len(stream.t_s) == made.N - 2
