@@ -51,12 +51,14 @@ def measure_angles(
     passes 80° a notice `gimbal`, one without signal while standing is left out with `no_standing_zero`.
     """
     kernel = AngleKernel.between(tuple(orientations.q), () if poses is None else tuple(poses.q))
-    raw = np.empty((len(orientations.t_s), len(kernel.names)))
-    for first in range(0, len(raw), STACKED):
+    # by angle: each is a row of it in the end, and none is held twice
+    raw = np.empty((len(kernel.names), len(orientations.t_s)))
+    for first in range(0, raw.shape[1], STACKED):
         part = slice(first, first + STACKED)
-        raw[part] = kernel.measure(*_stack(orientations, poses, part))
+        raw[:, part] = kernel.measure(*_stack(orientations, poses, part)).T
     notices = _find_missing_joints(orientations, kernel) + _find_gimbal(raw, kernel, orientations.t_s)
-    standing = raw[index_window(zero, orientations.rate_hz)]
+    # in the order of time, which decides how their sums round
+    standing = np.ascontiguousarray(raw[:, index_window(zero, orientations.rate_hz)].T)
     known = [bool(x.any()) for x in np.isfinite(standing).T]
     for name in sorted(name for name, x in zip(kernel.names, known, strict=True) if not x):
         message = (
@@ -67,9 +69,11 @@ def measure_angles(
         notices.append(Notice("no_standing_zero", message, t_s=zero[0]))
     offset = mean_angles(standing)
     kept = [i for i, x in enumerate(known) if x]
+    for i in kept:
+        raw[i] = subtract_zero(raw[i], offset[i])
     return JointAngles(
         orientations.t_s,
-        {kernel.names[i]: subtract_zero(raw[:, i], offset[i]) for i in kept},
+        {kernel.names[i]: raw[i] for i in kept},
         {kernel.names[i]: float(offset[i]) for i in kept},
         notices=tuple(notices),
         diagnostics={"estimated": tuple(kernel.names[i] for i in kept if kernel.estimated[i])},
@@ -105,14 +109,14 @@ def _find_missing_joints(orientations: Orientations, kernel: AngleKernel) -> lis
 
 
 def _find_gimbal(raw: Floats, kernel: AngleKernel, t_s: Floats) -> list[Notice]:
-    """A notice for every joint whose frontal angle in raw (n, names) passes the limit."""
+    """A notice for every joint whose frontal angle in raw (names, n) passes the limit."""
     notices: list[Notice] = []
     for side in SIDES:
         for joint, _, _ in list_leg_joints(side):
             frontal = f"{SIGNS[joint][1][0]}_{SUFFIX[side]}"
             if frontal not in kernel.names:
                 continue
-            beyond = np.abs(raw[:, kernel.names.index(frontal)]) > GIMBAL_LIMIT
+            beyond = np.abs(raw[kernel.names.index(frontal)]) > GIMBAL_LIMIT
             if beyond.any():
                 message = (
                     f"{side} {joint}: the frontal angle passes 80° in {beyond.mean():.1%} of the take; there "

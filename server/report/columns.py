@@ -6,8 +6,8 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 import pyarrow as pa
@@ -64,19 +64,42 @@ def repeat_words(words: Sequence[str], times: int) -> pa.Array[Any]:
     return pa.DictionaryArray.from_arrays(places, pa.array(known, pa.string()))
 
 
-def parquet_file(
-    t_s: Floats, columns: Mapping[str, np.ndarray | pa.Array[Any]], meta: Mapping[str, object]
-) -> bytes:
+ParquetColumn: TypeAlias = "np.ndarray | pa.Array[Any] | Callable[[slice], np.ndarray]"
+"""Of every row, or what gives those of some rows when they are written."""
+
+GROUP: Final = 1 << 20
+"""Rows that are laid out and written together."""
+
+
+def parquet_file(t_s: Floats, columns: Mapping[str, ParquetColumn], meta: Mapping[str, object]) -> bytes:
     """Columns over time as Parquet with `meta` as JSON under "sagittal"; NaN becomes null."""
-    arrays = {"t_s": pa.array(t_s)} | {
-        k: v if isinstance(v, pa.Array) else pa.array(v, from_pandas=True) for k, v in columns.items()
-    }
-    table = pa.table(arrays).replace_schema_metadata({"sagittal": json.dumps(reduce_to_plain(meta))})
-    # neighbouring samples share their high bytes: splitting the bytes halves the file
-    split = [k for k, a in arrays.items() if pa.types.is_floating(a.type)]
-    sink = io.BytesIO()
-    pq.write_table(table, sink, compression="zstd", use_dictionary=False, use_byte_stream_split=split)  # type: ignore[arg-type] # the stubs know bool only
+    kept = {"sagittal": json.dumps(reduce_to_plain(meta))}
+    sink, writer = io.BytesIO(), None
+    for first in range(0, max(1, len(t_s)), GROUP):
+        table = _lay_out(t_s, columns, slice(first, first + GROUP)).replace_schema_metadata(kept)
+        if writer is None:
+            # neighbouring samples share their high bytes: splitting the bytes halves the file
+            split = [f.name for f in table.schema if pa.types.is_floating(f.type)]
+            writer = pq.ParquetWriter(
+                sink, table.schema, compression="zstd", use_dictionary=False, use_byte_stream_split=split
+            )
+        writer.write_table(table)
+    if writer is not None:
+        writer.close()
     return sink.getvalue()
+
+
+def single_precision(values: Floats, column: int) -> Callable[[slice], np.ndarray]:
+    """A column of (n, k) as `parquet_file` takes it, float32."""
+    return lambda rows: values[rows, column].astype(np.float32)
+
+
+def _lay_out(t_s: Floats, columns: Mapping[str, ParquetColumn], rows: slice) -> pa.Table:
+    arrays: dict[str, pa.Array[Any]] = {"t_s": pa.array(t_s[rows])}
+    for name, column in columns.items():
+        part = column(rows) if callable(column) else column[rows]
+        arrays[name] = part if isinstance(part, pa.Array) else pa.array(part, from_pandas=True)
+    return pa.table(arrays)
 
 
 def read_table(data: bytes) -> tuple[pa.Table, dict[str, Any]]:

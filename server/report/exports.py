@@ -35,7 +35,14 @@ from core.parameters.rows import Column
 from server.report import signals, tracks
 from server.report.activity_files import write_activity
 from server.report.analysis_json import summarise_analysis
-from server.report.columns import SCHEMA, parquet_file, reduce_to_plain, write_csv
+from server.report.columns import (
+    SCHEMA,
+    ParquetColumn,
+    parquet_file,
+    reduce_to_plain,
+    single_precision,
+    write_csv,
+)
 
 if TYPE_CHECKING:
     # these packages bring numba, which the web process does without
@@ -92,11 +99,11 @@ def angles_parquet(angles: JointAngles) -> bytes:
 
 def poses_parquet(poses: Poses) -> bytes:
     """Segment poses as Parquet: per segment `<segment>_q_w…z`, `<segment>_p_x…z` (float32), masks (bool)."""
-    columns: dict[str, np.ndarray] = {}
+    columns: dict[str, ParquetColumn] = {}
     for segment, q in poses.q.items():
         p = poses.p[segment]
-        columns |= {f"{segment}_q_{c}": q[:, i].astype(np.float32) for i, c in enumerate("wxyz")}
-        columns |= {f"{segment}_p_{c}": p[:, i].astype(np.float32) for i, c in enumerate("xyz")}
+        columns |= {f"{segment}_q_{c}": single_precision(q, i) for i, c in enumerate("wxyz")}
+        columns |= {f"{segment}_p_{c}": single_precision(p, i) for i, c in enumerate("xyz")}
     columns["valid"] = poses.valid
     columns |= {f"contact_{segment.removeprefix('foot_')}": c for segment, c in poses.contact.items()}
     body = {name: getattr(poses.body, name) for name in poses.body.__dataclass_fields__}

@@ -25,7 +25,15 @@ from core.events.turns import Turn
 from core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
 from core.measure import Tracks
 from core.parameters import Surface
-from server.report.columns import SCHEMA, bools_of, floats_of, parquet_file, read_table
+from server.report.columns import (
+    SCHEMA,
+    ParquetColumn,
+    bools_of,
+    floats_of,
+    parquet_file,
+    read_table,
+    single_precision,
+)
 
 NAME = "tracks.parquet"
 
@@ -34,7 +42,7 @@ _Made = TypeVar("_Made")
 
 def tracks_parquet(tracks: Tracks) -> bytes:
     """Write what `core.measure.measure_gait` needs beside angles.parquet and events.csv."""
-    columns: dict[str, np.ndarray] = {}
+    columns: dict[str, ParquetColumn] = {}
     for segment, q in tracks.q.items():
         columns |= _spread(f"{segment}_q", q, "wxyz")
         columns[f"{segment}_valid"] = tracks.valid[segment]
@@ -160,8 +168,8 @@ def _made(kind: type[_Made], values: Mapping[str, Any]) -> _Made:
     return kind(**{k: v for k, v in values.items() if k in names})
 
 
-def _spread(name: str, values: Floats, axes: str) -> dict[str, np.ndarray]:
-    return {f"{name}_{c}": values[:, i].astype(np.float32) for i, c in enumerate(axes)}
+def _spread(name: str, values: Floats, axes: str) -> dict[str, ParquetColumn]:
+    return {f"{name}_{c}": single_precision(values, i) for i, c in enumerate(axes)}
 
 
 def _gathered(table: pa.Table, name: str, axes: str) -> Floats:
