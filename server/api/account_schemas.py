@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints
 
@@ -20,13 +20,58 @@ SignInName = Annotated[
 Password = Annotated[str, StringConstraints(min_length=MIN_LENGTH, max_length=MAX_LENGTH)]
 
 
-class SignIn(Request):
+class SignInForm(Request):
     """Name and password, and a code where the account has a second factor."""
 
     name: Annotated[str, StringConstraints(max_length=200)]
     password: Annotated[str, StringConstraints(max_length=1000)]
     code: Annotated[str, StringConstraints(max_length=40)] | None = None
     next: str | None = Field(default=None, max_length=2000, description="page to go on to (forms)")
+
+
+class SignIn(SignInForm):
+    """The same with what a security key answered in place of the code."""
+
+    key: dict[str, Any] | None = Field(default=None, description="as PublicKeyCredential.toJSON gives it")
+
+
+class KeyQuestion(Request):
+    """Name and password, before a security key is asked for."""
+
+    name: Annotated[str, StringConstraints(max_length=200)]
+    password: Annotated[str, StringConstraints(max_length=1000)]
+
+
+@dataclass(frozen=True)
+class KeyOptions:
+    """What the browser needs of this server to ask a security key (WebAuthn, as JSON)."""
+
+    options: dict[str, Any]
+
+
+class KeyNew(Request):
+    """A new security key: its name, and what it answered."""
+
+    name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=40)]
+    key: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class SecurityKey:
+    """A security key of one's own."""
+
+    id: str
+    name: str
+    host: str
+    created_at: dt.datetime
+    used_at: dt.datetime | None
+
+
+class KeysOnly(Request):
+    """Whether security keys and recovery codes alone are taken, and one's password."""
+
+    on: bool
+    password: Annotated[str, StringConstraints(max_length=1000)]
 
 
 class SetUp(Request):

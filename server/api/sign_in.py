@@ -25,6 +25,7 @@ from server.auth.cookie import clear_token, read_token, set_token
 from server.auth.identity import Identity
 from server.auth.passwords import hash_password
 from server.auth.roles import POLICY, Action, Role
+from server.auth.security_keys import begin_sign_in, site_of
 from server.auth.sessions import Logins
 from server.auth.tokens import token_hash
 from server.context import Config, Db, Failures, OpenLogins, OpenTrail, address_of
@@ -39,6 +40,7 @@ address_router = APIRouter(include_in_schema=False)
 _USER = TypeAdapter(account_schemas.User)
 _FORM = "application/x-www-form-urlencoded"
 _BODY = {"schema": account_schemas.SignIn.model_json_schema()}
+_FORM_BODY = {"schema": account_schemas.SignInForm.model_json_schema()}
 
 
 async def _credentials(request: Request) -> account_schemas.SignIn:
@@ -50,7 +52,8 @@ async def _credentials(request: Request) -> account_schemas.SignIn:
         raise Problem(400, "bad_request", SENTENCES["bad_request"]) from None
     try:
         if is_form:
-            return account_schemas.SignIn.model_validate(dict(await request.form()))
+            form = account_schemas.SignInForm.model_validate(dict(await request.form()))
+            return account_schemas.SignIn(**form.model_dump())
         return account_schemas.SignIn.model_validate(await request.json())
     except json.JSONDecodeError as error:
         told = {"type": "json_invalid", "loc": ("body", error.pos), "msg": error.msg}
@@ -66,7 +69,7 @@ async def _credentials(request: Request) -> account_schemas.SignIn:
     response_model=account_schemas.User,
     responses=refusals(401, 429),
     openapi_extra=PUBLIC
-    | {"requestBody": {"required": True, "content": {"application/json": _BODY, _FORM: _BODY}}},
+    | {"requestBody": {"required": True, "content": {"application/json": _BODY, _FORM: _FORM_BODY}}},
 )
 def sign_in(
     request: Request,
@@ -81,7 +84,8 @@ def sign_in(
     address = address_of(request)
     row = accounts.check_password(db, failures, trail, body.name, body.password, address)
     key = settings.second_factor_key
-    by_recovery = accounts.check_code(db, key, failures, trail, row.id, body.code, address)
+    proof = None if body.key is None else (site_of(request, behind_tls=settings.behind_tls), body.key)
+    by_recovery = accounts.check_code(db, key, failures, trail, row.id, body.code, proof, address)
     try:
         with db.write() as c:
             if by_recovery:
@@ -101,6 +105,30 @@ def sign_in(
         response = JSONResponse(_USER.dump_python(user_answer(row), mode="json"))
     set_token(response, request, token)
     return response
+
+
+@router.post(
+    "/sign-in/security-key",
+    dependencies=[require(Action.SIGN_IN)],
+    response_model=account_schemas.KeyOptions,
+    responses=refusals(401, 404, 429),
+    openapi_extra=PUBLIC,
+)
+def ask_for_key(
+    request: Request,
+    body: account_schemas.KeyQuestion,
+    db: Db,
+    settings: Config,
+    trail: OpenTrail,
+    failures: Failures,
+) -> account_schemas.KeyOptions:
+    """After the right name and password: what the browser needs to ask a key; 404 without one for here."""
+    row = accounts.check_password(db, failures, trail, body.name, body.password, address_of(request))
+    with db.write() as c:
+        options = begin_sign_in(c, site_of(request, behind_tls=settings.behind_tls), row.id)
+    if options is None:
+        raise Problem(404, "no_key", "No security key is set up for this account at this address.")
+    return account_schemas.KeyOptions(options)
 
 
 @router.post("/sign-out", status_code=204)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, Row, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
-from server.auth import second_factor
+from server.auth import second_factor, security_keys
 from server.auth.passwords import verify_password
 from server.auth.roles import Role
+from server.auth.security_keys import Site
 from server.auth.throttle import Throttle
 from server.http.problems import Problem
 from server.storage.db import Database
@@ -109,9 +110,10 @@ def check_code(
     trail: AuditTrail,
     user_id: str,
     code: str | None,
+    key: tuple[Site, Mapping[str, Any]] | None,
     address: str,
 ) -> bool:
-    """After the password: require the code of an account with a second factor.
+    """After the password: require a code, or the answer of a security key, where there is a second factor.
 
     Returns
     -------
@@ -125,6 +127,14 @@ def check_code(
     with db.read() as c:
         if not second_factor.is_on(c, user_id):
             return False
+    if key is not None:
+        with count_wrong_codes(throttle, user_id):
+            with db.write() as c:
+                is_right = security_keys.use(c, key[0], user_id, key[1])
+            if not is_right:
+                trail.record_refused("sign_in.failed", "user", user_id, address)
+                raise security_keys.KeyRefused(401)
+        return False
     if not (code or "").strip():
         raise second_factor.CodeNeeded
     with count_wrong_codes(throttle, user_id):
@@ -145,7 +155,7 @@ def count_wrong_codes(throttle: Throttle, user_id: str) -> Iterator[None]:
     begun = throttle.begin(key, key)
     try:
         yield
-    except second_factor.CodeWrong:
+    except (second_factor.CodeWrong, security_keys.KeyRefused):
         raise
     except BaseException:
         throttle.withdraw(key, key, begun)

@@ -21,7 +21,7 @@ from sqlalchemy import Connection, delete, insert, select, update
 from server.auth.tokens import token_hash
 from server.http.problems import Problem
 from server.storage.archive import ClinicKey, make_key, read_key
-from server.storage.person_tables import second_factor
+from server.storage.person_tables import second_factor, security_key, security_key_challenge
 from server.storage.tables import now
 
 STEP_S: Final = 30
@@ -102,8 +102,25 @@ def list_users(c: Connection) -> set[str]:
 
 
 def use(c: Connection, key_file: Path, user_id: str, code: str, at_s: float | None = None) -> bool:
-    """Take a code of this moment or a recovery code, once; False when it is neither (writes)."""
-    return _take_code(c, key_file, user_id, code, at_s) or _take_recovery(c, user_id, code)
+    """Take a code of this moment or a recovery code, once; False when it is neither (writes).
+
+    Of an account that takes security keys only, recovery codes alone.
+    """
+    if not takes_keys_only(c, user_id) and _take_code(c, key_file, user_id, code, at_s):
+        return True
+    return _take_recovery(c, user_id, code)
+
+
+def takes_keys_only(c: Connection, user_id: str) -> bool:
+    """Whether figures of the authenticator are not taken: a page that pretends could ask for them."""
+    query = select(second_factor.c.keys_only).where(second_factor.c.user_id == user_id)
+    return bool(c.execute(query).scalar())
+
+
+def take_keys_only(c: Connection, user_id: str, only: bool) -> None:
+    """Take security keys and recovery codes only, or the figures of the authenticator as well."""
+    mine = second_factor.c.user_id == user_id
+    c.execute(update(second_factor).where(mine).values(keys_only=only))
 
 
 def count_recovery(c: Connection, user_id: str) -> int:
@@ -113,7 +130,9 @@ def count_recovery(c: Connection, user_id: str) -> int:
 
 
 def remove(c: Connection, user_id: str) -> bool:
-    """Ask for no code any more; False when none was asked for."""
+    """Ask for no code and no security key any more; False when none was asked for."""
+    for table in (security_key, security_key_challenge):
+        c.execute(delete(table).where(table.c.user_id == user_id))
     return bool(c.execute(delete(second_factor).where(second_factor.c.user_id == user_id)).rowcount)
 
 

@@ -72,6 +72,7 @@ OF_NOBODY: Final = frozenset(
     {
         "user_id",
         "token_id",
+        "key_id",
         "token",  # is itself the door
         "device_id",
         "view_id",  # its viewer asks of the session it shows (server/viewer/proxy.py)

@@ -8,13 +8,14 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from server.auth import api_tokens, second_factor
+from server.auth import api_tokens, second_factor, security_keys
 from server.auth.access import require
 from server.auth.api_tokens import Scope
 from server.auth.identity import Identity
 from server.auth.passwords import MIN_LENGTH
 from server.auth.roles import Action
-from server.context import Db
+from server.auth.security_keys import site_of
+from server.context import Config, Db
 from server.pages.shell import render_page
 from server.pages.words import ROLE_WORDS
 from server.storage.tables import now
@@ -30,14 +31,22 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 @router.get("/account")
-def show_account(request: Request, db: Db, who: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> Response:
-    """One's own password, second factor and tokens, and signing out."""
+def show_account(
+    request: Request, db: Db, settings: Config, who: Annotated[Identity, require(Action.USE_ACCOUNT)]
+) -> Response:
+    """One's own password, second factor, keys and tokens, and signing out."""
     with db.read() as c:
         tokens = api_tokens.list_tokens(c, who.user_id)
         has_factor, codes = second_factor.is_on(c, who.user_id), second_factor.count_recovery(c, who.user_id)
+        keys, keys_only = (
+            security_keys.list_keys(c, who.user_id),
+            second_factor.takes_keys_only(c, who.user_id),
+        )
+    keys_work = site_of(request, behind_tls=settings.behind_tls).has_keys
     return render_page(
         request, db, who, "account.html", "account",
         user=who, role_text=ROLE_WORDS[who.role], min_password=MIN_LENGTH, tokens=tokens, at=now(),
         scopes=[(scope.value, word) for scope, word in SCOPE_WORDS.items()],
+        keys=keys, keys_only=keys_only, keys_work=keys_work,
         has_factor=has_factor, codes=codes, most_days=api_tokens.MOST_DAYS,
     )  # fmt: skip

@@ -5,7 +5,18 @@ By the rules of storage/tables.py.
 
 from __future__ import annotations
 
-from sqlalchemy import CheckConstraint, Column, Date, Integer, LargeBinary, String, Table
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    CheckConstraint,
+    Column,
+    Date,
+    Integer,
+    LargeBinary,
+    String,
+    Table,
+    false,
+)
 
 from server.storage.columns import Json, Utc, id_column, metadata, one_of, owner, reference
 
@@ -47,4 +58,29 @@ second_factor = Table(
     Column("recovery", Json, nullable=False),  # hashes of the codes that have not been used
     Column("last_step", Integer, nullable=False),  # of the newest code that was taken: none is taken twice
     Column("confirmed_at", Utc),  # None: set up, and not yet proved by a code
+    Column("keys_only", Boolean, nullable=False, server_default=false()),  # codes of it are not taken
+)
+
+security_key = Table(
+    "security_key",
+    metadata,
+    id_column(),
+    reference("user_id", "user"),
+    Column("name", String(40), nullable=False),
+    Column("host", String(255), nullable=False),  # the name of this server that the key signs for
+    Column("credential_id", LargeBinary, nullable=False, unique=True),
+    Column("public_key", LargeBinary, nullable=False),
+    Column("sign_count", Integer().with_variant(BigInteger(), "postgresql"), nullable=False),
+    Column("created_at", Utc, nullable=False),
+    Column("used_at", Utc),
+)
+
+security_key_challenge = Table(
+    "security_key_challenge",  # given out and not yet answered
+    metadata,
+    Column("challenge_sha256", String(64), primary_key=True),
+    reference("user_id", "user"),
+    Column("purpose", String(16), nullable=False),
+    Column("expires_at", Utc, nullable=False),
+    one_of("purpose", ("register", "sign_in")),
 )

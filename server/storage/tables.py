@@ -14,7 +14,7 @@ patient ─< session ─< recording ─< recording_file          user ─< login
         ├──< programme ─< planned_visit ─── session (at most one each)
         └──< prescription ─< live_take >── session, recording (the one it became)
                                  └──< live_event (append-only)
-user ─< api_token, second_factor; patient ─< consent (storage/person_tables.py)
+user ─< api_token, second_factor, security_key; patient ─< consent (storage/person_tables.py)
 patient ─< care_team_member, emergency_access >── user (storage/care_tables.py)
 
 Reports, live takes and what opens an account have modules of their own; `metadata` has the tables of all.

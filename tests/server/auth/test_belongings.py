@@ -21,10 +21,10 @@ from server.auth.sight import OWNER
 from server.auth.throttle import MAX_PER_PAIR
 from server.auth.tokens import new_token, token_hash
 from server.storage.care_tables import emergency_access
-from server.storage.person_tables import api_token, second_factor
-from server.storage.tables import login_session, metadata, user
+from server.storage.person_tables import api_token, second_factor, security_key
+from server.storage.tables import login_session, metadata, new_id, user
 from tests.server.belongings import OF_NOBODY, add_belongings, fill_address
-from tests.server.clinic import ORIGIN, Clinic, open_clinic
+from tests.server.clinic import ORIGIN, PASSWORD, Clinic, open_clinic
 from tests.server.sockets import ask_websocket
 
 pytestmark = pytest.mark.anyio
@@ -73,7 +73,12 @@ async def ward(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> 
                     user_id=owner, secret=b"sealed", recovery=[], last_step=0, confirmed_at=LONG_AGO
                 )
             )
-        of_owner = {"user_id": owner, "token_id": row.id, "token": new_token()}
+            key = new_id()
+            kept = {"host": "localhost", "credential_id": b"1", "public_key": b"2", "sign_count": 0}
+            c.execute(
+                insert(security_key).values(id=key, user_id=owner, name="blue", created_at=LONG_AGO, **kept)
+            )
+        of_owner = {"user_id": owner, "token_id": row.id, "key_id": key, "token": new_token()}
         one, two = (add_belongings(clinic, code) | OF_NOBODY | of_owner for code in ("Alder", "Birch"))
         actions = {k: a for k, a in list_declared_actions(clinic.app.routes).items() if "MOUNT" not in k}
         yield Ward(clinic, one, two, actions)
@@ -211,6 +216,10 @@ async def test_nobody_touches_what_opens_the_account_of_another(ward: Ward, role
         assert ward.one["token_id"] not in listed.text
         revoked = await client.delete(f"/api/v1/account/tokens/{ward.one['token_id']}")
         assert revoked.status_code == 404
+        keys = "/api/v1/account/security-keys"
+        assert (await client.get(keys)).json() == []
+        forgotten = await client.post(f"{keys}/{ward.one['key_id']}/remove", json={"password": PASSWORD})
+        assert forgotten.status_code == 404
         if role is not Role.ADMIN:
             taken = await client.delete(f"/api/v1/users/{ward.one['user_id']}/second-factor")
             assert taken.status_code == 403
@@ -306,7 +315,9 @@ async def test_no_list_shows_a_patient_of_another_team(guarded: Ward, role: Role
 
 
 NAMES_NOBODY = {
-    "GET /api/v1/sign-in", "GET /api/v1/account", "GET /api/v1/account/tokens", "GET /api/v1/estimators",
+    "GET /api/v1/sign-in", "GET /api/v1/account", "GET /api/v1/account/tokens",
+    "GET /api/v1/account/security-keys",
+    "GET /api/v1/estimators",
     "GET /api/v1/filters", "GET /api/v1/openapi.json", "GET /health/live", "GET /health/ready",
     "GET /capture", "GET /", "GET /sign-in",
     "GET /api/v1/study.zip",  # pseudonyms; asked below

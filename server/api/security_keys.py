@@ -1,0 +1,101 @@
+"""One's own security keys: set up, listed, removed, and whether they alone are taken."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Request
+
+from server import audit
+from server.api import account_schemas, schemas
+from server.api.documents import refusals
+from server.auth import accounts, second_factor, security_keys
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.auth.security_keys import site_of
+from server.context import Config, Db, Failures, Id, OpenTrail, address_of
+from server.http.json_body import StrictJsonRoute
+from server.http.problems import Problem
+
+router = APIRouter(route_class=StrictJsonRoute, prefix="/account", tags=["account"])
+Self = Annotated[Identity, require(Action.USE_ACCOUNT)]
+
+
+@router.get("/security-keys", response_model=list[account_schemas.SecurityKey])
+def list_keys(db: Db, who: Self) -> list[account_schemas.SecurityKey]:
+    """One's own keys, the oldest first."""
+    with db.read() as c:
+        rows = security_keys.list_keys(c, who.user_id)
+    return [schemas.make_answer(account_schemas.SecurityKey, row) for row in rows]
+
+
+@router.post(
+    "/security-keys/options", response_model=account_schemas.KeyOptions, responses=refusals(409, 429)
+)
+def begin(
+    body: account_schemas.PasswordProof,
+    request: Request,
+    db: Db,
+    settings: Config,
+    trail: OpenTrail,
+    failures: Failures,
+    who: Self,
+) -> account_schemas.KeyOptions:
+    """What the browser needs to set up a key; it is answered within five minutes."""
+    accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
+    site = site_of(request, behind_tls=settings.behind_tls)
+    with db.write() as c:
+        return account_schemas.KeyOptions(security_keys.begin_registration(c, site, who.user_id, who.name))
+
+
+@router.post(
+    "/security-keys",
+    status_code=201,
+    response_model=account_schemas.SecurityKey,
+    responses=refusals(403, 409),
+)
+def add(
+    body: account_schemas.KeyNew, request: Request, db: Db, settings: Config, who: Self
+) -> account_schemas.SecurityKey:
+    """Keep a key by what it answered."""
+    site = site_of(request, behind_tls=settings.behind_tls)
+    with db.write() as c:
+        row = security_keys.register(c, site, who.user_id, body.name, body.key)
+        audit.record(c, who, "user.security_key_added", "user", who.user_id, {"key": row.id})
+    return schemas.make_answer(account_schemas.SecurityKey, row)
+
+
+@router.post("/security-keys/{key_id}/remove", status_code=204, responses=refusals(404, 429))
+def remove(
+    key_id: Id,
+    body: account_schemas.PasswordProof,
+    request: Request,
+    db: Db,
+    trail: OpenTrail,
+    failures: Failures,
+    who: Self,
+) -> None:
+    """Forget a key; with the last one the figures of the authenticator are taken again."""
+    accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
+    with db.write() as c:
+        security_keys.remove(c, who.user_id, key_id)
+        audit.record(c, who, "user.security_key_removed", "user", who.user_id, {"key": key_id})
+
+
+@router.put("/second-factor/keys-only", status_code=204, responses=refusals(409, 429))
+def choose_keys_only(
+    body: account_schemas.KeysOnly,
+    request: Request,
+    db: Db,
+    trail: OpenTrail,
+    failures: Failures,
+    who: Self,
+) -> None:
+    """Take security keys and recovery codes only, or the figures of the authenticator as well."""
+    accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
+    with db.write() as c:
+        if body.on and not security_keys.list_keys(c, who.user_id):
+            raise Problem(409, "no_key", "Set up a security key first.")
+        second_factor.take_keys_only(c, who.user_id, body.on)
+        audit.record(c, who, "user.keys_only" if body.on else "user.codes_again", "user", who.user_id)

@@ -1,0 +1,247 @@
+"""Security keys beside the password (WebAuthn, W3C Level 2): registered, asked for at sign-in, removed.
+
+A key signs a challenge for the name of this host alone, so a page that pretends to be this server gets
+nothing it can use. A challenge is random, of one account and one purpose, has five minutes and one use; the
+database has its hash. Keys stand beside the codes of server/auth/second_factor.py, which come first: whoever
+loses a key gets in by a recovery code.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime as dt
+import json
+import logging
+import secrets
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+from sqlalchemy import Connection, Row, delete, insert, select, update
+from starlette.requests import HTTPConnection
+
+from server.auth import second_factor
+from server.auth.tokens import token_hash
+from server.http.hosts import host_name
+from server.http.problems import Problem
+from server.storage.person_tables import security_key, security_key_challenge
+from server.storage.tables import new_id, now
+
+log = logging.getLogger(__name__)
+
+CHALLENGE_LIFE: Final = dt.timedelta(minutes=5)
+MOST_KEYS: Final = 10
+"""Of one account."""
+_MOST_WAITING: Final = 20
+"""Challenges of one account at a time; the oldest ends."""
+Purpose = Literal["register", "sign_in"]
+
+
+@dataclass(frozen=True)
+class Site:
+    """Under what name the browser knows this server: host name, and origin with scheme and port."""
+
+    host: str
+    origin: str
+
+    @property
+    def has_keys(self) -> bool:
+        """Whether browsers offer keys here: over HTTPS or on localhost, and for no address in figures."""
+        is_figures = ":" in self.host or self.host.replace(".", "").isdigit()
+        return not is_figures and (self.origin.startswith("https:") or self.host == "localhost")
+
+
+def site_of(connection: HTTPConnection, *, behind_tls: bool) -> Site:
+    """The name by which a browser came; the hosts it may be are checked before (server/http/hosts.py)."""
+    host = connection.headers.get("host", "").strip().lower()
+    return Site(host_name(host), f"{'https' if behind_tls else 'http'}://{host}")
+
+
+class KeyRefused(Problem):
+    """What a key answered does not prove that it is one of this account."""
+
+    def __init__(self, status: int) -> None:
+        super().__init__(
+            status,
+            "key_refused",
+            "The security key was not accepted. Use one that is set up for you, and try again.",
+        )
+
+
+def list_keys(c: Connection, user_id: str) -> Sequence[Row[Any]]:
+    """The keys of an account, the oldest first."""
+    mine = select(security_key).where(security_key.c.user_id == user_id)
+    return c.execute(mine.order_by(security_key.c.created_at, security_key.c.id)).all()
+
+
+def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> dict[str, Any]:
+    """What the browser needs to set up a key; raises Problem 409 without a second factor, or beyond ten."""
+    from webauthn import generate_registration_options, options_to_json
+    from webauthn.helpers.structs import PublicKeyCredentialDescriptor
+
+    if not site.has_keys:
+        raise Problem(
+            409,
+            "no_keys_here",
+            "Keys work where the address is a name and begins with https, or on localhost.",
+        )
+    if not second_factor.is_on(c, user_id):
+        raise Problem(
+            409,
+            "second_factor_off",
+            "Set up the authenticator first: its recovery codes help when a key is lost.",
+        )
+    known = list_keys(c, user_id)
+    if len(known) >= MOST_KEYS:
+        raise Problem(409, "too_many_keys", f"An account has at most {MOST_KEYS} keys. Remove one first.")
+    options = generate_registration_options(
+        rp_id=site.host,
+        rp_name="Sagittal",
+        user_name=name,
+        user_id=bytes.fromhex(user_id),
+        challenge=_new_challenge(c, user_id, "register"),
+        exclude_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in known],
+    )
+    return _as_tree(options_to_json(options))
+
+
+def register(c: Connection, site: Site, user_id: str, name: str, answer: Mapping[str, Any]) -> Row[Any]:
+    """Keep a key by what it answered; raises KeyRefused 403, Problem 409 beyond MOST_KEYS."""
+    from webauthn import verify_registration_response
+
+    challenge = _take_challenge(c, user_id, "register", answer)
+    if challenge is None or not second_factor.is_on(c, user_id):
+        raise KeyRefused(403)
+    with _refusals(403):
+        made = verify_registration_response(
+            credential=dict(answer),
+            expected_challenge=challenge,
+            expected_rp_id=site.host,
+            expected_origin=site.origin,
+        )
+    same = select(security_key.c.id).where(security_key.c.credential_id == made.credential_id)
+    if c.execute(same).first() is not None:
+        raise KeyRefused(403)
+    if len(list_keys(c, user_id)) >= MOST_KEYS:
+        raise Problem(409, "too_many_keys", f"An account has at most {MOST_KEYS} keys. Remove one first.")
+    row = {
+        "id": new_id(),
+        "user_id": user_id,
+        "name": name,
+        "host": site.host,
+        "credential_id": made.credential_id,
+        "public_key": made.credential_public_key,
+        "sign_count": made.sign_count,
+        "created_at": now(),
+    }
+    c.execute(insert(security_key).values(row))
+    return c.execute(select(security_key).where(security_key.c.id == row["id"])).one()
+
+
+def begin_sign_in(c: Connection, site: Site, user_id: str) -> dict[str, Any] | None:
+    """What the browser needs to ask a key of this account for; None when it has none under this host name."""
+    from webauthn import generate_authentication_options, options_to_json
+    from webauthn.helpers.structs import PublicKeyCredentialDescriptor, UserVerificationRequirement
+
+    known = [k for k in list_keys(c, user_id) if k.host == site.host]
+    if not known or not second_factor.is_on(c, user_id):
+        return None
+    options = generate_authentication_options(
+        rp_id=site.host,
+        challenge=_new_challenge(c, user_id, "sign_in"),
+        allow_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in known],
+        # the password is what one knows; the key is what one has
+        user_verification=UserVerificationRequirement.DISCOURAGED,
+    )
+    return _as_tree(options_to_json(options))
+
+
+def use(c: Connection, site: Site, user_id: str, answer: Mapping[str, Any]) -> bool:
+    """Take what a key of this account answered, once (writes)."""
+    from webauthn import base64url_to_bytes, verify_authentication_response
+
+    challenge = _take_challenge(c, user_id, "sign_in", answer)
+    if challenge is None:
+        return False
+    try:
+        with _refusals(401):
+            credential_id = base64url_to_bytes(str(answer.get("rawId", "")))
+            mine = (security_key.c.user_id == user_id, security_key.c.credential_id == credential_id)
+            key = c.execute(select(security_key).where(*mine)).one_or_none()
+            if key is None or key.host != site.host:
+                return False
+            proof = verify_authentication_response(
+                credential=dict(answer),
+                expected_challenge=challenge,
+                expected_rp_id=site.host,
+                expected_origin=site.origin,
+                credential_public_key=key.public_key,
+                credential_current_sign_count=key.sign_count,
+            )
+    except KeyRefused:
+        return False
+    c.execute(
+        update(security_key)
+        .where(security_key.c.id == key.id)
+        .values(sign_count=proof.new_sign_count, used_at=now())
+    )
+    return True
+
+
+def remove(c: Connection, user_id: str, key_id: str) -> None:
+    """Forget one key of an account; with the last one codes are taken again. Raises Problem 404."""
+    mine = (security_key.c.id == key_id, security_key.c.user_id == user_id)
+    if not c.execute(delete(security_key).where(*mine)).rowcount:
+        raise Problem(404, "key_not_found", "There is no such key; it may have been removed already.")
+    if not list_keys(c, user_id):
+        second_factor.take_keys_only(c, user_id, only=False)
+
+
+def _new_challenge(c: Connection, user_id: str, purpose: Purpose) -> bytes:
+    """Make a challenge and forget those that are over, or too many of this account."""
+    at, made = now(), secrets.token_bytes(32)
+    table = security_key_challenge
+    c.execute(delete(table).where(table.c.expires_at <= at))
+    mine = select(table.c.challenge_sha256).where(table.c.user_id == user_id)
+    waiting = c.execute(mine.order_by(table.c.expires_at.desc()).offset(_MOST_WAITING - 1)).scalars().all()
+    c.execute(delete(table).where(table.c.challenge_sha256.in_(waiting)))
+    row = {"challenge_sha256": token_hash(made.hex()), "user_id": user_id, "purpose": purpose}
+    c.execute(insert(table).values(**row, expires_at=at + CHALLENGE_LIFE))
+    return made
+
+
+def _take_challenge(c: Connection, user_id: str, purpose: Purpose, answer: Mapping[str, Any]) -> bytes | None:
+    """The challenge that was answered, if it was given to this account for this and waits; it ends here."""
+    from webauthn import base64url_to_bytes
+
+    try:
+        said = json.loads(base64url_to_bytes(str(answer["response"]["clientDataJSON"])))
+        challenge = base64url_to_bytes(str(said["challenge"]))
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
+    table = security_key_challenge
+    given = (
+        table.c.challenge_sha256 == token_hash(challenge.hex()),
+        table.c.user_id == user_id,
+        table.c.purpose == purpose,
+        table.c.expires_at > now(),
+    )
+    # of two that come at once one deletes the row
+    return challenge if c.execute(delete(table).where(*given)).rowcount else None
+
+
+@contextlib.contextmanager
+def _refusals(status: int) -> Iterator[None]:
+    """Whatever the library finds wrong is a refusal: an answer comes from outside and may be anything."""
+    try:
+        yield
+    except Problem:
+        raise
+    except Exception as error:
+        log.info("a security key was refused: %s", type(error).__name__)
+        raise KeyRefused(status) from error
+
+
+def _as_tree(text: str) -> dict[str, Any]:
+    tree: dict[str, Any] = json.loads(text)
+    return tree

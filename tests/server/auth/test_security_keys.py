@@ -1,0 +1,230 @@
+"""A security key beside the password, and what an intruder would try with one."""
+
+from __future__ import annotations
+
+import asyncio
+import datetime as dt
+from collections.abc import AsyncIterator, Callable, Mapping
+from typing import Any
+
+import httpx
+import pyotp
+import pytest
+from sqlalchemy import select, update
+
+from server.auth import second_factor
+from server.auth.throttle import Throttle
+from server.storage.person_tables import security_key, security_key_challenge
+from tests.server.auth.soft_key import SoftKey
+from tests.server.clinic import PASSWORD, Clinic
+
+pytestmark = pytest.mark.anyio
+API, HERE = "/api/v1", "http://localhost"
+
+
+@pytest.fixture
+async def person(clinic: Clinic) -> AsyncIterator[tuple[httpx.AsyncClient, list[str]]]:
+    """A clinician with a second factor who came by the name localhost, and the recovery codes."""
+    clinic.app.state.throttle = Throttle()
+    user_id = clinic.user("clinician")
+    key = clinic.settings.second_factor_key
+    with clinic.db.write() as c:
+        second_factor.remove(c, user_id)
+        made = second_factor.begin(c, key, user_id, "clinician")
+        codes = second_factor.confirm(c, key, user_id, pyotp.TOTP(made.secret).now())
+    cookie = {"Cookie": f"sid={clinic.token('clinician')}"}
+    async with clinic.client(headers=cookie) as client:
+        client.base_url = httpx.URL(HERE)
+        yield client, codes
+
+
+async def ask(client: httpx.AsyncClient) -> dict[str, Any]:
+    answer = await client.post(f"{API}/account/security-keys/options", json={"password": PASSWORD})
+    assert answer.status_code == 200, answer.text
+    options: dict[str, Any] = answer.json()["options"]
+    return options
+
+
+async def set_up(client: httpx.AsyncClient) -> SoftKey:
+    key = SoftKey()
+    body = {"name": "blue", "key": key.create(await ask(client), HERE)}
+    answer = await client.post(f"{API}/account/security-keys", json=body)
+    assert answer.status_code == 201, answer.text
+    return key
+
+
+async def challenge(clinic: Clinic, name: str = "clinician", at: str = HERE) -> httpx.Response:
+    async with clinic.client() as client:
+        client.base_url = httpx.URL(at)
+        return await client.post(f"{API}/sign-in/security-key", json={"name": name, "password": PASSWORD})
+
+
+async def sign_in(
+    clinic: Clinic, key: Mapping[str, Any] | None = None, code: str | None = None, name: str = "clinician"
+) -> httpx.Response:
+    body = {"name": name, "password": PASSWORD, "key": key, "code": code}
+    async with clinic.client() as client:
+        client.base_url = httpx.URL(HERE)
+        return await client.post(f"{API}/sign-in", json=body)
+
+
+async def test_a_key_takes_the_place_of_the_code(
+    clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
+) -> None:
+    client, _ = person
+    key = await set_up(client)
+    assert (await sign_in(clinic)).json()["code"] == "code_needed"
+    options = (await challenge(clinic)).json()["options"]
+    assert options["rpId"] == "localhost"
+    answer = key.get(options, HERE)
+    assert (await sign_in(clinic, answer)).status_code == 200
+    assert (await sign_in(clinic, answer)).json()["code"] == "key_refused"  # a challenge is answered once
+    (listed,) = (await client.get(f"{API}/account/security-keys")).json()
+    assert (listed["name"], listed["host"], bool(listed["used_at"])) == ("blue", "localhost", True)
+    assert "blue" in (await client.get("/account")).text
+    path = f"{API}/account/security-keys/{listed['id']}/remove"
+    async with clinic.client("viewer") as other:
+        assert (await other.post(path, json={"password": PASSWORD})).status_code == 404
+    assert (await client.post(path, json={"password": "wrong"})).status_code == 403
+    assert (await client.post(path, json={"password": PASSWORD})).status_code == 204
+    assert (await challenge(clinic)).status_code == 404
+    async with clinic.client("admin") as admin:
+        actions = [row["action"] for row in (await admin.get(f"{API}/audit")).json()]
+    assert {"user.security_key_added", "user.security_key_removed", "sign_in.failed"} <= set(actions)
+
+
+async def test_what_an_intruder_answers_is_refused(
+    clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
+) -> None:
+    client, _ = person
+    key, stranger = await set_up(client), SoftKey()
+
+    async def given() -> dict[str, Any]:
+        options: dict[str, Any] = (await challenge(clinic)).json()["options"]
+        return options
+
+    def same_id(options: dict[str, Any]) -> dict[str, Any]:
+        return SoftKey(key.id, stranger.private, 9).get(options, HERE)
+
+    def as_registered(options: dict[str, Any]) -> dict[str, Any]:
+        return key.create({**options, "rp": {"id": "localhost"}}, HERE)
+
+    lies: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {
+        "another origin": lambda o: key.get(o, "https://localhost.evil.example"),
+        "another port": lambda o: key.get(o, "http://localhost:81"),
+        "another host": lambda o: key.get(o, HERE, host="evil.example"),
+        "nobody touched it": lambda o: key.get(o, HERE, flags=0),
+        "made-up challenge": lambda o: key.get({**o, "challenge": "AAAA"}, HERE),
+        "another key": lambda o: stranger.get(o, HERE),
+        "another key by its id": same_id,
+        "a set-up": as_registered,
+        "nothing": lambda o: {},
+        "no text": lambda o: {"response": {"clientDataJSON": 5}, "rawId": []},
+        "deep": lambda o: {**key.get(o, HERE), "rawId": "\u0000"},
+    }
+    for name, lie in lies.items():
+        clinic.app.state.throttle = Throttle()
+        answer = await sign_in(clinic, lie(await given()))
+        assert (answer.status_code, answer.json()["code"]) == (401, "key_refused"), name
+    # a challenge for setting up does not sign in, nor one of another account
+    clinic.app.state.throttle = Throttle()
+    options = await ask(client)
+    assert (await sign_in(clinic, key.get({**options, "rpId": "localhost"}, HERE))).status_code == 401
+    # a challenge that was answered wrongly is spent
+    options = await given()
+    assert (await sign_in(clinic, key.get(options, "http://evil.example"))).status_code == 401
+    assert (await sign_in(clinic, key.get(options, HERE))).status_code == 401
+    # one that is over, too
+    options = await given()
+    with clinic.db.write() as c:
+        c.execute(update(security_key_challenge).values(expires_at=dt.datetime.now(dt.UTC)))
+    assert (await sign_in(clinic, key.get(options, HERE))).status_code == 401
+    # a copy of the key that has signed less often
+    assert (await sign_in(clinic, key.get(await given(), HERE))).status_code == 200
+    key.count -= 3
+    assert (await sign_in(clinic, key.get(await given(), HERE))).status_code == 401
+
+
+async def test_of_two_answers_at_once_one_signs_in(
+    clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
+) -> None:
+    client, _ = person
+    key = await set_up(client)
+    answer = key.get((await challenge(clinic)).json()["options"], HERE)
+    got = await asyncio.gather(*(sign_in(clinic, answer) for _ in range(5)))
+    assert sorted(g.status_code for g in got) == [200, 401, 401, 401, 401]
+
+
+async def test_guessing_is_counted_as_for_codes(
+    clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
+) -> None:
+    client, codes = person
+    await set_up(client)
+    got = [(await sign_in(clinic, {})).status_code for _ in range(11)]
+    assert got[-1] == 429
+    assert (await sign_in(clinic, code=codes[0])).status_code == 429
+    wrong = {"name": "clinician", "password": "not this one"}
+    async with clinic.client() as stranger:
+        stranger.base_url = httpx.URL(HERE)
+        assert (await stranger.post(f"{API}/sign-in/security-key", json=wrong)).status_code == 401
+
+
+async def test_keys_alone_when_asked_for_and_a_way_back(
+    clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    client, codes = person
+    choose = f"{API}/account/second-factor/keys-only"
+    assert (await client.put(choose, json={"on": True, "password": PASSWORD})).json()["code"] == "no_key"
+    key = await set_up(client)
+    assert (await client.put(choose, json={"on": True, "password": "wrong"})).status_code == 403
+    assert (await client.put(choose, json={"on": True, "password": PASSWORD})).status_code == 204
+    monkeypatch.setattr(second_factor, "_take_code", lambda *_: True)  # whatever the figures are
+    assert (await sign_in(clinic, code="123456")).json()["code"] == "wrong_code"
+    assert (
+        await sign_in(clinic, key.get((await challenge(clinic)).json()["options"], HERE))
+    ).status_code == 200
+    assert (await sign_in(clinic, code=codes[0])).status_code == 200  # the key is lost
+    (listed,) = (await client.get(f"{API}/account/security-keys")).json()
+    path = f"{API}/account/security-keys/{listed['id']}/remove"
+    assert (await client.post(path, json={"password": PASSWORD})).status_code == 204
+    assert (await sign_in(clinic, code="123456")).status_code == 200  # without a key figures count again
+
+
+async def test_with_the_second_factor_its_keys_go(
+    clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
+) -> None:
+    client, _ = person
+    key = await set_up(client)
+    options = (await challenge(clinic)).json()["options"]
+    async with clinic.client("admin") as admin:
+        gone = await admin.delete(f"{API}/users/{clinic.user('clinician')}/second-factor")
+        assert gone.status_code == 204
+    with clinic.db.read() as c:
+        assert c.execute(select(security_key)).all() == []
+        assert c.execute(select(security_key_challenge)).all() == []
+    assert (await challenge(clinic)).status_code == 404
+    # the password alone is enough now; what an old key says is not looked at
+    assert (await sign_in(clinic, key.get(options, HERE))).status_code == 200
+
+
+async def test_a_key_is_set_up_once_for_one_account_and_one_name(
+    clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
+) -> None:
+    client, _ = person
+    key, add = await set_up(client), f"{API}/account/security-keys"
+    for lie in (
+        key.create(await ask(client), HERE),  # there already
+        SoftKey().create(await ask(client), "http://evil.example"),
+        SoftKey().create(await ask(client), HERE, host="evil.example"),
+        SoftKey().create({**await ask(client), "challenge": "AAAA"}, HERE),
+        {},
+    ):
+        assert (await client.post(add, json={"name": "x", "key": lie})).status_code == 403
+    client.base_url = httpx.URL("http://127.0.0.1")
+    refused = await client.post(f"{add}/options", json={"password": PASSWORD})
+    assert refused.json()["code"] == "no_keys_here"
+    assert (await challenge(clinic, at="http://127.0.0.1")).status_code == 404
+    async with clinic.client("viewer") as other:
+        other.base_url = httpx.URL(HERE)
+        refused = await other.post(f"{add}/options", json={"password": PASSWORD})
+        assert refused.status_code in {401, 409}
