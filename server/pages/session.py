@@ -10,7 +10,6 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
-from core.events.result import Strides
 from core.parameters.catalogue.entry import SQUAT
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -25,6 +24,7 @@ from server.pages.charts import (
     PAPER_HEIGHTS,
     draw_chart,
 )
+from server.pages.figures import draw_beginning, draw_contact
 from server.pages.first_sheet import has_room_for_profile
 from server.pages.profile import view_profile
 from server.pages.report_rows import (
@@ -39,7 +39,6 @@ from server.pages.session_context import lead_to_days, read_measured_context
 from server.pages.shell import FRAGMENT, record_opening, render_page, render_sheets
 from server.pages.takes import view_takes
 from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
-from server.report.bundle import read_poses
 from server.report.curves import GLANCE_STRIDES, strip_svg
 from server.report.model import ReportModel
 from server.report.profile import BAR_HEIGHT, PAPER_BAR_HEIGHT
@@ -47,7 +46,6 @@ from server.report.trend_strip import LEAST_VISITS, TrendStrip, trend_strip
 from server.report.trends import VisitKind
 from server.report.wording import speak_places
 from server.services import (
-    analyses,
     comparisons,
     feedback,
     histories,
@@ -62,10 +60,6 @@ from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
 from server.storage.db import Database
-from server.viewer.client import client_version
-from server.viewer.first_picture import draw_first_picture
-from server.viewer.motion import prepare_motion
-from server.viewer.still import draw_still
 from web.words import day, seconds
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -77,11 +71,9 @@ NO_STRIDE_CODES: Final = ("foot_missing", "no_strides", "few_steps")
 
 OVERVIEW, CURVES, PAPER, VALUES = "session.html", "kinematics.html", "print.html", "_values.html"
 
-STRIP_STRIDES: Final = 64
-"""A longer walk has too many strides to be told apart beside the figure; the timeline shows them."""
-
-MOST_FRAMES: Final = 120_000
-"""A page would wait too long for the first picture of a walk of more, 20 min at 100 Hz."""
+STRIP_STRIDES: Final = {OVERVIEW: 64, CURVES: 150}
+"""A longer walk has too many strides to be told apart beside the figure, and for the overview's 80 kB; the
+timeline shows them."""
 
 FIRST_CURVES: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 
@@ -287,9 +279,11 @@ def _draw_report(
             for p in model.panels
             if (overview or paper) and p.variable.name in FIRST_CURVES and p.sides
         ],
-        "still": _draw_still(reviewed, this, bundle.strides, patient) if paper and used else None,
-        "first_picture": _draw_first(reviewed, this, model) if page in (OVERVIEW, CURVES) else None,
-        "strip": strip_svg(bundle.strides, model.duration_s) if 0 < total <= STRIP_STRIDES else "",
+        "still": draw_contact(reviewed, this, bundle.strides, patient) if paper and used else None,
+        "first_picture": draw_beginning(reviewed, this, model) if page in (OVERVIEW, CURVES) else None,
+        "strip": strip_svg(bundle.strides, model.duration_s)
+        if 0 < total <= STRIP_STRIDES.get(page, 0)
+        else "",
         "drawn": "some strides" if overview and max(model.used.values()) > GLANCE_STRIDES else "",
         "stride_words": f"{used} of {total} used",
         "empty_reason": explain_emptiness(model),
@@ -315,36 +309,6 @@ def _follow(reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str
         return None
     visits = [histories.read_visit(reviewed, a, kind) for a, kind in alike]
     return trend_strip(visits, context["patient"].affected_side)
-
-
-def _draw_still(
-    reviewed: ReviewedAnalyses, this: AnalysedSession, strides: Strides, patient: Patient
-) -> dict[str, str] | None:
-    """The figure at a contact in the middle of the walk, with its caption; None where it has no poses."""
-    if "poses.parquet" not in this.found.files:
-        return None
-    counted = [s for s in strides.strides if s.excluded_reason is None]
-    mine = [s for s in counted if s.side == patient.affected_side] or counted
-    middle = mine[len(mine) // 2]
-    caption = f"Contact, {middle.side} foot"
-    poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))
-    svg = draw_still(poses, middle.start_s, middle.side, caption)
-    return None if svg is None else {"svg": svg, "caption": caption}
-
-
-def _draw_first(
-    reviewed: ReviewedAnalyses, this: AnalysedSession, model: ReportModel
-) -> dict[str, str] | None:
-    """What the replay will show first, where the page's clock begins, and the client that will show it."""
-    if "poses.parquet" not in this.found.files:
-        return None
-    poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))
-    if not poses.q or not 0 < len(poses.t_s) <= MOST_FRAMES:
-        return None
-    spans: Sequence[Mapping[str, Any]] = model.replay["strides"]  # type: ignore[assignment]
-    first = next((s for s in spans if s["used"]), next(iter(spans), {"start_s": 0.0}))
-    svg = draw_first_picture(prepare_motion(poses), first["start_s"])
-    return None if svg is None else {"svg": svg, "client": f"/views/client/{client_version()}"}
 
 
 def _draw_panels(model: ReportModel, heights: Mapping[bool, int]) -> list[dict[str, Any]]:

@@ -175,18 +175,17 @@ async def replay(
     name = view if view and _views(ws).find(view, who.login_id, who.role) is opened else opened.id
     with opened.keep_open():
         motion = opened.figure.motion
-        await ws.send_json(
-            {
-                "view": name,
-                "src": f"/views/{name}/",
-                "start_s": float(motion.t_s[0]),
-                "duration_s": motion.duration_s,
-                "placed": motion.placed,
-                "measured": motion.measured,
-                "hidden": motion.hidden,
-            }
-        )
-        cursor = asyncio.create_task(_follow(ws, opened, ViewActivity(lambda: logins.touch(who.login_id))))
+        answer = {
+            "view": name,
+            "src": f"/views/{name}/",
+            "start_s": float(motion.t_s[0]),
+            "duration_s": motion.duration_s,
+            "placed": motion.placed,
+            "measured": motion.measured,
+            "hidden": motion.hidden,
+        }
+        activity = ViewActivity(lambda: logins.touch(who.login_id))
+        cursor = asyncio.create_task(_follow(ws, opened, activity, answer))
         over = asyncio.create_task(wait_for_sign_out(functools.partial(still_opens, ws)))
         await asyncio.wait((cursor, over), return_when=asyncio.FIRST_COMPLETED)
         ended = over.done()
@@ -258,8 +257,14 @@ def _motion(blobs: BlobStore, a: AnalysedSession) -> ReplayMotion:
     return prepare_motion(read_poses(analyses.file_bytes(blobs, a.found, "poses.parquet")))
 
 
-async def _follow(ws: WebSocket, view: FigureView[ReplayFigure], activity: ViewActivity) -> None:
-    """Pose the figure at every {"t"} and answer with what is shown."""
+async def _follow(
+    ws: WebSocket, view: FigureView[ReplayFigure], activity: ViewActivity, answer: Mapping[str, Any]
+) -> None:
+    """Say which view it is, pose the figure at every {"t"} and answer with what is shown."""
+    try:
+        await ws.send_json(answer)
+    except WebSocketDisconnect:  # the page was left while the view was being opened
+        return
     while True:
         try:
             message = await ws.receive_text()

@@ -4,6 +4,10 @@ const read = () => {
   return el ? JSON.parse(el.textContent) : { duration_s: 0, strides: [], curves: {} };
 };
 
+// Where a drawing stands for the figure, what asks for sizes and loads 3D waits until that is seen; a page that nobody
+// looks at paints nothing.
+if (document.querySelector("[data-first]") && !document.hidden) await new Promise((done) => { requestAnimationFrame(() => setTimeout(done)); });
+
 class Clock extends EventTarget {
   constructor(data) {
     super();

@@ -27,9 +27,6 @@ const SEGMENTS = {
 // 32 hexadecimal digits, the page's own name for a view that the server is still opening
 const makeName = () => Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 
-// What would delay the first picture of the page waits for it; a page that nobody sees paints none.
-const afterPaint = (then) => (document.hidden ? then() : requestAnimationFrame(() => setTimeout(then)));
-
 const setting = (button) => ({ [button.dataset.switch]: button.ariaPressed === "true" });
 
 class GaitView extends HTMLElement {
@@ -79,9 +76,9 @@ class GaitView extends HTMLElement {
     const query = new URLSearchParams({ tab: tabId(), dark: String(isDark()), t: String(clock.t) });
     const client = this.tries ? null : this.getAttribute("client");
     if (client) {
-      const view = this.view = makeName();
-      query.set("view", view);
-      afterPaint(() => this.load(`${client}#${view}${isDark() ? ",dark" : ""}`));
+      this.view = makeName();
+      query.set("view", this.view);
+      this.load(`${client}#${this.view}${isDark() ? ",dark" : ""}`);
     }
     if (this.dataset.ghost) query.set("ghost", this.dataset.ghost);
     this.socket = new WebSocket(`${scheme}://${location.host}${this.getAttribute("replay")}?${query}`);

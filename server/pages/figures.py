@@ -1,0 +1,51 @@
+"""The figure as drawings: in the middle of the walk for paper, and where the replay begins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from core.events.result import Strides
+from server.report.bundle import read_poses
+from server.report.model import ReportModel
+from server.services import analyses
+from server.services.histories import AnalysedSession
+from server.services.patients import Patient
+from server.services.reviewed import ReviewedAnalyses
+from server.viewer.client import client_version
+from server.viewer.first_picture import draw_first_picture
+from server.viewer.motion import prepare_motion
+from server.viewer.still import draw_still
+
+MOST_FRAMES: Final = 120_000
+"""A page would wait too long for the first picture of a walk of more, 20 min at 100 Hz."""
+
+
+def draw_contact(
+    reviewed: ReviewedAnalyses, this: AnalysedSession, strides: Strides, patient: Patient
+) -> dict[str, str] | None:
+    """The figure at a contact in the middle of the walk, with its caption; None where it has no poses."""
+    if "poses.parquet" not in this.found.files:
+        return None
+    counted = [s for s in strides.strides if s.excluded_reason is None]
+    mine = [s for s in counted if s.side == patient.affected_side] or counted
+    middle = mine[len(mine) // 2]
+    caption = f"Contact, {middle.side} foot"
+    poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))
+    svg = draw_still(poses, middle.start_s, middle.side, caption)
+    return None if svg is None else {"svg": svg, "caption": caption}
+
+
+def draw_beginning(
+    reviewed: ReviewedAnalyses, this: AnalysedSession, model: ReportModel
+) -> dict[str, str] | None:
+    """What the replay will show first, where the page's clock begins, and the client that will show it."""
+    if "poses.parquet" not in this.found.files:
+        return None
+    poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))
+    if not poses.q or not 0 < len(poses.t_s) <= MOST_FRAMES:
+        return None
+    spans: Sequence[Mapping[str, Any]] = model.replay["strides"]  # type: ignore[assignment]
+    first = next((s for s in spans if s["used"]), next(iter(spans), {"start_s": 0.0}))
+    svg = draw_first_picture(prepare_motion(poses), first["start_s"])
+    return None if svg is None else {"svg": svg, "client": f"/views/client/{client_version()}"}
