@@ -21,6 +21,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -62,6 +63,10 @@ def analysis_files(analysis: TakeAnalysis) -> dict[str, bytes]:
         written = {} if analysis.activity is None else write_activity(analysis.activity)
         return {"analysis.json": _json_bytes(summarise_analysis(analysis)), **written}
     files = {"analysis.json": _json_bytes(summarise_analysis(analysis))}
+    if analysis.poses is not None:
+        files["poses.parquet"] = poses_parquet(analysis.poses)
+        # the most that is held: free from here on, where the caller keeps no name for the analysis
+        analysis = replace(analysis, posed=None)
     if analysis.measured is not None:
         files["events.csv"] = events_csv(analysis.measured.events)
         files["strides.csv"] = strides_csv(analysis.measured.strides, analysis.measured.columns)
@@ -71,8 +76,6 @@ def analysis_files(analysis: TakeAnalysis) -> dict[str, bytes]:
         files["repetitions.csv"] = repetitions_csv(analysis.squats)
     if analysis.angles is not None:
         files["angles.parquet"] = angles_parquet(analysis.angles)
-    if analysis.poses is not None:
-        files["poses.parquet"] = poses_parquet(analysis.poses)
     if analysis.tracks is not None:
         files[tracks.NAME] = tracks.tracks_parquet(analysis.tracks)
     # also where a later stage stopped: who asks why looks at the signals

@@ -28,12 +28,14 @@ def run(
     from core.formats.json_tree import read_json
     from server.report.exports import analysis_files
 
-    result = analyse_files(files, manifest, config, progress, resumable=False)
-    found = analysis_files(result)
-    if result.setup is not None and result.setup.can_be_applied:
+    results = [analyse_files(files, manifest, config, progress, resumable=False)]
+    setup = results[0].setup
+    # by no name here: what is written is let go of
+    found = analysis_files(results.pop())
+    if setup is not None and setup.can_be_applied:
         declared = read_json(manifest) if manifest is not None else {}
         assert isinstance(declared, dict)  # noqa: S101 - `parse_manifest` has read it
-        repaired = result.setup.complete_manifest(declared)
+        repaired = setup.complete_manifest(declared)
         found[REPAIRED] = json.dumps(repaired, ensure_ascii=False, indent=1).encode()
     return found
 

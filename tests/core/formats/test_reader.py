@@ -9,6 +9,7 @@ import pytest
 
 from core.errors import ArchiveError, FormatError, ManifestError
 from core.formats import SourceFile, manifest_of, read_recording, write_recording
+from core.formats.reader import is_too_long
 from tests.core.formats.making import mt_file, source, zipped
 
 MAPPING = """<?xml version="1.0"?><OpenSimDocument><XsensDataReaderSettings><ExperimentalSensors>
@@ -146,3 +147,11 @@ def test_the_order_of_the_files_does_not_change_the_signals() -> None:
     for device in a.streams:
         np.testing.assert_array_equal(a.streams[device].t_s, b.streams[device].t_s)
         assert a.streams[device].digest == b.streams[device].digest
+
+
+def test_a_take_is_too_long_by_what_its_analysis_needs() -> None:
+    hour = 3600.0 * 100.0
+    assert not is_too_long(6.0 * hour, 2)
+    assert not is_too_long(5.5 * hour, 7)
+    assert is_too_long(7.0 * hour, 7)
+    assert is_too_long(24.0 * hour, 1)
