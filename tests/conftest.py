@@ -18,6 +18,7 @@ from server.processes.compile_cache import has_compiled_filters, share_compile_c
 from server.processes.compiling import compile_filters
 from server.processes.environment import ONE_THREAD
 from tests.accuracy.report import WRITE
+from tests.data import ENGINE
 from tests.passed import Passed
 
 # before anything imports numba: every process that a test starts inherits it
@@ -63,6 +64,19 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--write-figures", action="store_true", help="write docs/accuracy.md instead of comparing with it"
     )
     parser.addoption(
+        "--engine",
+        choices=("sqlite", "postgresql"),
+        default="sqlite",
+        help="the database of every clinic whose test names none",
+    )
+    parser.addoption(
+        "--recordings",
+        type=int,
+        default=0,
+        metavar="N",
+        help="how many recordings the load test queues (none: it is left out); from 200 on four workers",
+    )
+    parser.addoption(
         "--passed",
         type=Path,
         metavar="FILE",
@@ -73,6 +87,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Tell every test process whether figures are written; run what is named, be it long or not."""
+    os.environ.setdefault(ENGINE, config.getoption("--engine"))
     if config.getoption("--write-figures"):
         os.environ[WRITE] = "1"
     if config.option.markexpr == _usual_marks(config) and any(map(_names_a_file, _named(config))):

@@ -11,9 +11,27 @@ import pytest
 
 from server.storage.db import Source
 from tests.databases import write_database
-from tests.postgres import NoPostgresError, make_database, start_server
+from tests.marks import ON_POSTGRES
+from tests.postgres import NoPostgresError, make_database, make_lasting_database, start_server
 
 ENGINES: Final = ("sqlite", pytest.param("postgresql", marks=pytest.mark.postgres))
+
+_lasting: dict[Path, str] = {}
+
+
+def choose_url(folder: Path) -> str:
+    """The `database_url` of a clinic on this folder: "" = a file in it; the same for who opens it again.
+
+    Skips the test where PostgreSQL is wanted and is not there.
+    """
+    if not ON_POSTGRES:
+        return ""
+    if folder not in _lasting:
+        try:
+            _lasting[folder] = make_lasting_database()
+        except NoPostgresError as error:
+            pytest.skip(str(error))
+    return _lasting[folder]
 
 
 @pytest.fixture(params=ENGINES)

@@ -55,7 +55,7 @@ def find_programs() -> Path:
 def start_server() -> str:
     """The URL of the server's first database; raises NoPostgresError."""
     try:
-        import psycopg
+        import psycopg  # noqa: F401
     except ModuleNotFoundError as error:
         raise NoPostgresError("psycopg is not installed (extra postgres)") from error
 
@@ -84,23 +84,70 @@ def start_server() -> str:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     options = [part for option in FASTER for part in ("-c", option)]
-    with (folder / "log").open("wb") as log:
-        server = subprocess.Popen(
-            [programs / "postgres", "-D", data, "-p", str(port), *options],
-            stdout=log, stderr=log, cwd=folder, **runs_as,
-        )  # fmt: skip
-    atexit.register(_stop, server, folder)
+    command: list[str | Path] = [programs / "postgres", "-D", data, "-p", str(port), *options]
     url = f"postgresql://sagittal:{PASSWORD.replace(' ', '%20')}@127.0.0.1:{port}/postgres"
-    until = time.monotonic() + 60
-    while True:
+    server = PostgresProcess(folder, command, runs_as, url)
+    _servers[url] = server
+    atexit.register(server.remove)
+    server.start()
+    return url
+
+
+class PostgresProcess:
+    """The server's own process, which a test may stop and start again."""
+
+    def __init__(self, folder: Path, command: list[str | Path], runs_as: dict[str, Any], url: str) -> None:
+        self._folder, self._command, self._runs_as, self._url = folder, command, runs_as, url
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Start it and wait until it answers; raises NoPostgresError."""
+        import psycopg
+
+        with (self._folder / "log").open("ab") as log:
+            self._process = subprocess.Popen(
+                self._command, stdout=log, stderr=log, cwd=self._folder, **self._runs_as
+            )
+        until = time.monotonic() + 60
+        while True:
+            try:
+                psycopg.connect(self._url).close()
+            except psycopg.OperationalError as error:
+                if self._process.poll() is not None or time.monotonic() > until:
+                    raise NoPostgresError((self._folder / "log").read_text()) from error
+                time.sleep(0.05)
+            else:
+                return
+
+    def stop(self) -> None:
+        """End it as an administrator's restart does: what is under way is cut off and undone."""
+        if self._process is None:
+            return
+        self._process.send_signal(signal.SIGINT)
         try:
-            psycopg.connect(url).close()
-        except psycopg.OperationalError as error:
-            if server.poll() is not None or time.monotonic() > until:
-                raise NoPostgresError((folder / "log").read_text()) from error
-            time.sleep(0.05)
-        else:
-            return url
+            self._process.wait(30)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def remove(self) -> None:
+        """Stop it for good."""
+        self.stop()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+_servers: dict[str, PostgresProcess] = {}
+
+
+@contextlib.contextmanager
+def stopped_server() -> Iterator[None]:
+    """While the block runs PostgreSQL is away; afterwards it answers again at its address."""
+    server = _servers[start_server()]
+    server.stop()
+    try:
+        yield
+    finally:
+        server.start()
 
 
 def run_sql(statement: str, url: str | None = None) -> list[Any]:
@@ -131,6 +178,14 @@ def make_database(*, migrated: bool = True) -> Iterator[str]:
         yield _url_of(name)
     finally:
         run_sql(f"DROP DATABASE {name} WITH (FORCE)")
+
+
+def make_lasting_database() -> str:
+    """A migrated database without rows that stays until the server ends."""
+    _migrate_one()
+    name = f"lasting_{next(_numbers)}"
+    run_sql(f"CREATE DATABASE {name} TEMPLATE migrated")
+    return _url_of(name)
 
 
 _EMPTY: Final = """DO $$
@@ -169,13 +224,3 @@ def _choose_user(folder: Path) -> dict[str, Any]:
             os.chown(folder, who.pw_uid, who.pw_gid)
             return {"user": who.pw_uid, "group": who.pw_gid, "extra_groups": []}
     raise NoPostgresError(f"PostgreSQL does not run as root, and there is no user {' or '.join(USERS)}")
-
-
-def _stop(server: subprocess.Popen[bytes], folder: Path) -> None:
-    server.send_signal(signal.SIGINT)
-    try:
-        server.wait(30)
-    except subprocess.TimeoutExpired:
-        server.kill()
-        server.wait()
-    shutil.rmtree(folder, ignore_errors=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, Final
 
 from sqlalchemy import Connection
@@ -32,11 +32,14 @@ def find_newest_job(c: Connection, session_id: str) -> JobView | None:
 
 
 def find_active_jobs(
-    c: Connection, whose: Callable[[jobs.ListedJob], str | None]
+    c: Connection, patient_ids: Collection[str], whose: Callable[[jobs.ListedJob], str | None]
 ) -> dict[str | None, dict[str, Any]]:
-    """The running job, else the newest that waits, by what `whose` takes of it (patient or session)."""
+    """The running job of these patients, else the newest that waits, by what `whose` takes of it.
+
+    Not of others: as many as one likes may wait.
+    """
     found: dict[str | None, dict[str, Any]] = {}
-    for listed in jobs.list_active(c):
+    for listed in jobs.list_active(c, patient_ids):
         if listed.kind in BESIDE:
             continue
         found.setdefault(whose(listed), view_job(listed))

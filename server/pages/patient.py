@@ -162,7 +162,7 @@ def list_visits(
         of a programme that it was.
     """
     streaming = {take.session_id for take in live.list_streaming(c)}
-    running = find_active_jobs(c, lambda j: j.session_id)
+    running = find_active_jobs(c, [patient_id], lambda j: j.session_id)
     found = {a.session.id: a for a in done}
     kinds = {key: v.kind for key, v in planned.items()}
     edits = edit_log.edits_of_all(c, [a.found.id for a in done])

@@ -76,7 +76,7 @@ def list_patients(
     rows = []
     streaming = {take.patient_id: take.session_id for take in live.list_streaming(c)}
     newest = sessions.newest_of(c, [p.id for p in found])
-    running = find_active_jobs(c, lambda j: j.patient_id)
+    running = find_active_jobs(c, [p.id for p in found], lambda j: j.patient_id)
     shown = analyses.latest_of(c, [s.id for s in newest.values()]) if results else {}
     edits = edit_log.edits_of_all(c, [a.id for a in shown.values()])
     speeds = visits.read_newest_speeds(c, reviewed, [p.id for p in found]) if results else {}

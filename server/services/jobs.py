@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,9 +36,9 @@ def list_jobs(
     return [_listed(row) for row in c.execute(query)]
 
 
-def list_active(c: Connection) -> list[ListedJob]:
-    """All jobs that run or wait, those that run first, then the newest."""
-    query = _QUERY.where(job.c.state.in_(ACTIVE_STATES))
+def list_active(c: Connection, patient_ids: Collection[str]) -> list[ListedJob]:
+    """All jobs of these patients that run or wait, those that run first, then the newest."""
+    query = _QUERY.where(job.c.state.in_(ACTIVE_STATES), session.c.patient_id.in_(patient_ids))
     return [
         _listed(row) for row in c.execute(query.order_by((job.c.state == "running").desc(), job.c.seq.desc()))
     ]

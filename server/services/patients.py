@@ -164,17 +164,13 @@ def _listing() -> Any:
         .correlate(patient)
         .scalar_subquery()
     )
-    running = (
-        select(job.c.seq)
-        .join(recording, recording.c.id == job.c.recording_id)
-        .join(session, session.c.id == recording.c.session_id)
-        .where(
-            session.c.patient_id == patient.c.id,
-            job.c.state.in_(ACTIVE_STATES),
-            job.c.kind.not_in(BESIDE),
-        )
-        .correlate(patient)
-        .exists()
+    # read once for all patients: asked for each, it would look through every job that waits each time
+    running = patient.c.id.in_(
+        select(session.c.patient_id)
+        .join(recording, recording.c.session_id == session.c.id)
+        .join(job, job.c.recording_id == recording.c.id)
+        .where(job.c.state.in_(ACTIVE_STATES), job.c.kind.not_in(BESIDE))
+        .correlate(None)
     )
     return select(
         patient, visits.label("sessions"), _LAST_VISIT.label("last_visit"), running.label("running")

@@ -221,8 +221,15 @@ _JOBS = (
     .join(recording, recording.c.id == job.c.recording_id)
     .where(_MINE, job.c.kind.not_in(BESIDE))
 )
+_ACTIVE = (
+    select(recording.c.session_id)
+    .join(job, job.c.recording_id == recording.c.id)
+    .where(job.c.state.in_(ACTIVE_STATES), job.c.kind.not_in(BESIDE))
+    .correlate(None)
+)
+"""Read once for all sessions: asked for each, it would look through every job that waits each time."""
 _STATE = case(
-    (_JOBS.where(job.c.state.in_(ACTIVE_STATES)).correlate(session).exists(), "running"),
+    (session.c.id.in_(_ACTIVE), "running"),
     (exists().where(analysis.c.recording_id == recording.c.id, _MINE).correlate(session), "done"),
     (_JOBS.order_by(job.c.seq.desc()).limit(1).correlate(session).scalar_subquery() == "failed", "failed"),
     (exists().where(recording_file.c.recording_id == recording.c.id, _MINE).correlate(session), "uploaded"),

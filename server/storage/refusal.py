@@ -47,16 +47,16 @@ _POSTGRES = {
     "53100": Refusal.FULL,  # disk_full
     "25006": Refusal.NOT_WRITABLE,  # read_only_sql_transaction: a standby
 }
-_WAITED = "55P03"
-"""PostgreSQL's lock_not_available."""
+_PASSING = {"55P03", "57P01", "57P03", None}
+"""PostgreSQL's lock_not_available, admin_shutdown, cannot_connect_now; None = there is no connection."""
 
 
 def is_busy(error: BaseException) -> bool:
     """Whether another writer held the database for too long, or PostgreSQL is away: trying again may help."""
     if not isinstance(error, OperationalError):
         return False
-    waited = getattr(error.orig, "sqlstate", None) == _WAITED
-    return waited or error.connection_invalidated or "locked" in str(error.orig)
+    passes = getattr(error.orig, "sqlstate", "of SQLite") in _PASSING
+    return passes or error.connection_invalidated or "locked" in str(error.orig)
 
 
 def refusal_of(error: BaseException) -> Refusal | None:

@@ -6,6 +6,8 @@ Started by server/worker/runner.py as `python -m server.worker.child <socket> <p
 from __future__ import annotations
 
 import logging
+import os
+from typing import Final
 
 from core.errors import SagittalError
 from core.formats.source import SourceFile
@@ -28,10 +30,14 @@ from server.worker.task import TASKS, load
 
 log = logging.getLogger("server.worker.child")
 
+NICENESS: Final = 10
+"""Pages and live takes, for which people wait by the second, have the processor first."""
+
 
 def main() -> None:
     """Answer orders until the worker closes the socket."""
     line, settings = enter_child()
+    os.nice(NICENESS)
     load(settings.task_modules)
     for task in TASKS.values():
         task.warm()

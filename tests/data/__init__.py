@@ -13,6 +13,8 @@ import pytest
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+ENGINE = "SAGITTAL_TEST_ENGINE"
+"""Environment variable of every test process: where the databases of its clinics are (`--engine`)."""
 
 
 @cache

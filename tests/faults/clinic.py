@@ -16,8 +16,10 @@ from server.services import analyses, patients, recordings, sessions
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.storage.high_water import set_mark
 from server.storage.tables import job
 from tests.databases import write_database
+from tests.engines import choose_url
 
 PATIENCE_S = 60.0
 """Longest wait for what must happen: far beyond what it takes, so that a loaded machine is no failure."""
@@ -47,7 +49,8 @@ def alive(pid: int) -> bool:
 class Clinic:
     """One data folder with a patient, a session and a recording."""
 
-    def __init__(self, folder: Path, lease_s: float, database_url: str = "") -> None:
+    def __init__(self, folder: Path, lease_s: float, database_url: str | None = None) -> None:
+        database_url = choose_url(folder) if database_url is None else database_url
         self.settings = Settings(
             data_dir=folder,
             workers=1,
@@ -69,6 +72,8 @@ class Clinic:
         with recordings.receive(self.db, self.blobs, self.settings, None, self.session.id, "a.txt") as upload:
             upload.write(b"signals")
             upload.keep()
+        if isinstance(self.db.source, str):
+            set_mark(self.db, self.settings.mark)  # as a server leaves it: workers look for it
         self._number = itertools.count()
 
     def submit(self, **params: Any) -> JobView:

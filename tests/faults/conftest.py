@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from server.processes.supervisor import Workers
-from tests.engines import source  # noqa: F401 - a fixture
+from tests.engines import postgres, source  # noqa: F401 - fixtures
 from tests.faults.clinic import Clinic, alive
 
 

@@ -16,7 +16,6 @@ from sqlalchemy import func, select
 
 from server.processes.supervisor import Workers
 from server.storage.db import Source
-from server.storage.high_water import set_mark
 from server.storage.tables import analysis, job
 from tests.faults.clinic import PATIENCE_S, Clinic
 
@@ -29,7 +28,6 @@ def test_every_job_ends_once_on_four_workers_that_are_killed_at_random(
     monkeypatch.setenv("PYTHONWARNINGS", "error")
     clinic = Clinic(tmp_path, lease_s=1.5, database_url=source if isinstance(source, str) else "")
     with closing(clinic.db):
-        set_mark(clinic.db, clinic.settings.mark)  # as a server leaves it: workers look for it
         views = [clinic.submit() for _ in range(JOBS)]
         workers = Workers(replace(clinic.settings, workers=WORKERS))
         workers.start()

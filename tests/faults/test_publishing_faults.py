@@ -17,6 +17,7 @@ from server.worker.task import load
 from server.worker.worker import Worker
 from tests.faults.clinic import Clinic
 from tests.faults.failing import FailingSystem
+from tests.marks import about_the_file
 
 
 def fail_at_every_call(
@@ -108,6 +109,7 @@ def write_notes(clinic: Clinic, times: int) -> None:
             c.exec_driver_sql("UPDATE patient SET note = ?", (f"{i:08}" * 8000,))
 
 
+@about_the_file
 def test_a_reader_that_holds_its_snapshot_stops_nobody_and_the_log_shrinks_after(clinic: Clinic) -> None:
     log = clinic.settings.database.with_name("sagittal.db-wal")
     with clinic.db.read() as reader:

@@ -19,6 +19,7 @@ from server.auth.roles import Role
 from server.settings import Settings
 from server.storage.db import Database
 from tests.databases import write_database
+from tests.engines import choose_url
 
 PASSWORD = "correct horse battery"
 ORIGIN = "http://127.0.0.1"
@@ -71,8 +72,12 @@ class Clinic:
 
 @contextlib.asynccontextmanager
 async def open_clinic(folder: Path, **settings: Any) -> AsyncIterator[Clinic]:
-    """Start an application on a folder and stop it again; estimators only if `live_workers` says so."""
-    options = Settings(data_dir=folder, **{"live_workers": 0, **settings})
+    """Start an application on a folder and stop it again; estimators only if `live_workers` says so.
+
+    Its database is a file, or PostgreSQL's where the tests were started with `--engine postgresql`.
+    """
+    defaults: dict[str, Any] = {"live_workers": 0, "database_url": choose_url(folder)}
+    options = Settings(data_dir=folder, **{**defaults, **settings})
     if not options.database_url and not options.database.exists():
         write_database(options.database)
     app = create_app(options)

@@ -322,7 +322,7 @@ def cue_rows_of(folder: Path, clinic: Clinic, take: str) -> list[dict[str, Any]]
     """From the database of a clinic that has stopped."""
     from server.storage.db import Database
 
-    db = Database(clinic.settings.database)
+    db = Database(clinic.settings.database_source)
     try:
         with db.read() as c:
             query = select(live_event.c.content).where(

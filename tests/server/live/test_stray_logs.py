@@ -38,7 +38,7 @@ def put_stray(folder: Path, content: bytes = WHOLE) -> Path:
 
 
 def findings(settings: Settings) -> list[str]:
-    with closing(Database(settings.database)) as db:
+    with closing(Database(settings.database_source)) as db:
         found = checks.check(db, BlobStore(settings.blobs), settings)
     return [f"{f.area}: {f.message}" for f in found]
 
@@ -195,7 +195,7 @@ async def test_a_log_without_a_readable_sample_is_not_thrown_away(tmp_path: Path
     clinic, session, take = await interrupted(tmp_path)
     path = live_recordings.log_path(clinic.settings.live, take)
     hurt = flip(path, len(FILE_MARK) + 20)
-    with closing(Database(clinic.settings.database)) as db, db.write() as c:
+    with closing(Database(clinic.settings.database_source)) as db, db.write() as c:
         live.end(c, None, take, "closed", count=0)
     async with open_clinic(tmp_path, live_workers=0) as clinic:
         assert not path.exists()
