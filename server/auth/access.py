@@ -13,7 +13,7 @@ from server.auth.cookie import read_token
 from server.auth.identity import Identity
 from server.auth.roles import PUBLIC, Action
 from server.auth.sessions import Logins
-from server.auth.sight import OWNER, may_open
+from server.auth.sight import may_open
 from server.http.problems import SENTENCES, Problem
 from server.storage.db import Database
 
@@ -29,7 +29,8 @@ class RouteAccess:
 
         404 where the clinic has care teams and the address names something of a patient of others.
         """
-        identity = identify(connection, counts=self.action is not Action.WATCH_SIGN_IN)
+        counts = self.action is not Action.WATCH_SIGN_IN
+        identity = identify(connection, connection.path_params, counts=counts)
         connection.state.language = None if identity is None else identity.language
         if self.action in PUBLIC:
             return identity
@@ -37,7 +38,7 @@ class RouteAccess:
             raise Problem(401, "not_signed_in", SENTENCES["not_signed_in"])
         if not identity.may(self.action):
             raise Problem(403, "forbidden", SENTENCES["forbidden"])
-        if not opens(connection, identity, connection.path_params):
+        if not identity.opens:
             raise Problem(404, "not_found", SENTENCES["not_found"])
         return identity
 
@@ -47,22 +48,25 @@ def require(action: Action) -> Any:
     return Depends(RouteAccess(action))
 
 
-def identify(connection: HTTPConnection, *, counts: bool = True) -> Identity | None:
-    """Return who asks on this connection, None when nobody is known; `counts` = as activity."""
+def identify(connection: HTTPConnection, parts: Mapping[str, str], *, counts: bool = True) -> Identity | None:
+    """Return who asks on this connection for what parts of an address name, None when nobody is known.
+
+    Parameters
+    ----------
+    counts : it is activity.
+    """
     bearer = read_bearer(connection)
     if bearer is not None:
-        return find_bearer(connection.app.state.db, bearer)
+        return find_bearer(connection.app.state.db, bearer, parts)
     token = read_token(connection)
     if token is None:
         return None
     logins: Logins = connection.app.state.logins
-    return logins.find(token) if counts else logins.look(token)
+    return logins.find(token, parts) if counts else logins.look(token, parts)
 
 
 def opens(connection: HTTPConnection, who: Identity, parts: Mapping[str, str]) -> bool:
     """Whether a person may open what parts of an address name (server/auth/sight.py)."""
-    if who.is_admin or not OWNER.keys() & parts.keys():
-        return True
     db: Database = connection.app.state.db
     with db.read() as c:
         return may_open(c, who, parts)
@@ -73,5 +77,5 @@ def still_opens(connection: HTTPConnection, **parts: str) -> bool:
 
     Without `parts`: what the address of the connection names.
     """
-    who = identify(connection, counts=False)
-    return who is not None and opens(connection, who, parts or connection.path_params)
+    who = identify(connection, parts or connection.path_params, counts=False)
+    return who is not None and who.opens

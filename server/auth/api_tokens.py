@@ -20,6 +20,7 @@ from starlette.requests import HTTPConnection
 
 from server.auth.identity import Identity
 from server.auth.roles import Action, Role
+from server.auth.sight import NOTHING, opens_parts
 from server.auth.tokens import new_token, token_hash
 from server.http.problems import Problem
 from server.storage.db import Database
@@ -124,11 +125,17 @@ def read_bearer(connection: HTTPConnection) -> str | None:
     return token.strip() if connection.url.path.startswith(_DOORS) else None
 
 
-def find_bearer(db: Database, token: str) -> Identity | None:
+def find_bearer(db: Database, token: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
     """Who asks with this token; None when it is unknown, over or revoked, or its account is closed."""
     at = now()
     query = (
-        select(user, api_token.c.scopes, api_token.c.used_at, api_token.c.id.label("token_id"))
+        select(
+            user,
+            api_token.c.scopes,
+            api_token.c.used_at,
+            api_token.c.id.label("token_id"),
+            opens_parts(parts).label("opens"),
+        )
         .join(api_token, api_token.c.user_id == user.c.id)
         .where(api_token.c.token_sha256 == token_hash(token), api_token.c.expires_at > at, user.c.active)
     )
@@ -140,7 +147,9 @@ def find_bearer(db: Database, token: str) -> Identity | None:
         _write_used(db, row.token_id, at)
     allowed = frozenset[Action]().union(*(SCOPES[Scope(scope)] for scope in row.scopes))
     login_id = f"token:{row.token_id}"
-    return Identity(row.id, row.name, row.display_name, Role(row.role), login_id, row.language, allowed)
+    return Identity(
+        row.id, row.name, row.display_name, Role(row.role), login_id, row.language, allowed, bool(row.opens)
+    )
 
 
 def _write_used(db: Database, token_id: str, at: dt.datetime) -> None:

@@ -16,6 +16,7 @@ class Identity:
     user_id, name, display_name, role : the account. language : of the pages, None = the browser's.
     login_id : which sign-in this is (two browsers of one person are two); the hash of its token.
     allowed : the actions of the API token that asks, None = a person at a browser.
+    opens : whether this person may open what the address of the request names (server/auth/sight.py).
     """
 
     user_id: str
@@ -25,6 +26,7 @@ class Identity:
     login_id: str
     language: str | None = None
     allowed: frozenset[Action] | None = None
+    opens: bool = True
 
     @property
     def token_id(self) -> str | None:

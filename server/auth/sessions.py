@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import datetime as dt
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from sqlalchemy import Connection, delete, insert, select, update
@@ -12,6 +12,7 @@ from sqlalchemy.exc import OperationalError
 
 from server.auth.identity import Identity
 from server.auth.roles import Role
+from server.auth.sight import NOTHING, opens_parts
 from server.auth.tokens import new_token, token_hash
 from server.storage.db import Database
 from server.storage.refusal import refusal_of
@@ -93,13 +94,18 @@ class Logins:
         self._kept[token_hash(token)] = _Login(user_id, at, at + self._absolute)
         return token
 
-    def find(self, token: str) -> Identity | None:
-        """Return who holds this token and count the visit as activity; None when it is unknown or over."""
-        return self.touch(token_hash(token))
+    def find(self, token: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
+        """Return who holds this token and count the visit as activity; None when it is unknown or over.
 
-    def look(self, token: str) -> Identity | None:
-        """Return who holds this token without counting it as activity; None when it is unknown or over."""
-        found = self._open(token_hash(token), self._clock())
+        Parameters
+        ----------
+        parts : of the address that is asked for, to tell whether they may be opened.
+        """
+        return self.touch(token_hash(token), parts)
+
+    def look(self, token: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
+        """Return the same without counting it as activity."""
+        found = self._open(token_hash(token), self._clock(), parts)
         return None if found is None else found[1]
 
     def seconds_left(self, login_id: str) -> float:
@@ -111,10 +117,10 @@ class Logins:
         login, _ = found
         return (min(login.expires_at, login.last_seen_at + self._idle) - at).total_seconds()
 
-    def touch(self, login_id: str) -> Identity | None:
+    def touch(self, login_id: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
         """Count a running view or replay as activity; None when the sign-in is over, so the view must end."""
         at = self._clock()
-        found = self._open(login_id, at)
+        found = self._open(login_id, at, parts)
         if found is None:
             return None
         login, identity = found
@@ -152,18 +158,21 @@ class Logins:
             )
         )
 
-    def _open(self, login_id: str, at: dt.datetime) -> tuple[_Login, Identity] | None:
+    def _open(
+        self, login_id: str, at: dt.datetime, parts: Mapping[str, str] = NOTHING
+    ) -> tuple[_Login, Identity] | None:
         """The sign-in with who it is, None when it is unknown or over."""
         if login_id in self._ended:
             return None
         kept = self._kept.get(login_id)
-        stored = select(login_session.c.last_seen_at, login_session.c.expires_at, user).join(
+        opens = opens_parts(parts).label("opens")
+        stored = select(login_session.c.last_seen_at, login_session.c.expires_at, user, opens).join(
             user, user.c.id == login_session.c.user_id
         )
         query = (
             stored.where(login_session.c.token_sha256 == login_id)
             if kept is None
-            else select(user).where(user.c.id == kept.user_id)
+            else select(user, opens).where(user.c.id == kept.user_id)
         )
         with self._db.read() as c:
             person = c.execute(query.where(user.c.active)).one_or_none()
@@ -174,7 +183,13 @@ class Logins:
         if login.expires_at <= at or seen <= at - self._idle:
             return None
         identity = Identity(
-            person.id, person.name, person.display_name, Role(person.role), login_id, person.language
+            person.id,
+            person.name,
+            person.display_name,
+            Role(person.role),
+            login_id,
+            person.language,
+            opens=bool(person.opens),
         )
         return dataclasses.replace(login, last_seen_at=seen), identity
 

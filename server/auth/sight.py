@@ -8,11 +8,13 @@ its door (server/auth/access.py); a list asks `only_seen`, and its service canno
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Final
 
-from sqlalchemy import ColumnElement, Connection, Select, and_, exists, literal, select, union_all
+from sqlalchemy import ColumnElement, Connection, Select, and_, exists, literal, or_, select, true
 
 from server.auth.identity import Identity
+from server.auth.roles import Role
 from server.storage.care_tables import care_team_member, clinic_option, emergency_access
 from server.storage.live_tables import live_take
 from server.storage.person_tables import consent
@@ -31,6 +33,7 @@ from server.storage.tables import (
     recording,
     session,
     tuning,
+    user,
 )
 
 CARE_TEAMS: Final = "care_teams"
@@ -85,34 +88,44 @@ OF_NOBODY: Final = frozenset(
 """Parts of addresses that name nothing of a patient by themselves."""
 
 
+NOTHING: Final[Mapping[str, str]] = MappingProxyType({})
+"""Parts of an address that names nothing."""
+
+
 def only_seen(query: Select[Any], who: Identity | None) -> Select[Any]:
     """Leave of a query over `patient` what a person may open; None = the system, which sees everybody."""
-    return query if who is None or who.is_admin else query.where(_may_open(who, patient.c.id))
+    if who is None or who.is_admin:
+        return query
+    return query.where(~TEAMS_ARE_ON | _is_seen(who.user_id, patient.c.id))
 
 
 def may_open(c: Connection, who: Identity, parts: Mapping[str, str]) -> bool:
     """Whether a person may open all that parts of an address name; of what is not there False as well."""
+    return bool(c.execute(select(opens_parts(parts)).where(user.c.id == who.user_id)).scalar())
+
+
+def opens_parts(parts: Mapping[str, str]) -> ColumnElement[bool]:
+    """The same as a column of a statement over `user`: the one that tells who asks answers this too."""
     named = [(OWNER[name], value) for name, value in parts.items() if name in OWNER]
-    if who.is_admin or not named:
-        return True
-    owners = [
-        exists(query.where(own == value, _seen(who, query.selected_columns[0])))
+    if not named:
+        return true()
+    owned = [
+        exists(query.where(own == value, _is_seen(user.c.id, query.selected_columns[0])))
         for (query, own), value in named
     ]
-    return bool(c.execute(select(~TEAMS_ARE_ON | and_(*owners))).scalar_one())
+    return or_(user.c.role == Role.ADMIN.value, ~TEAMS_ARE_ON, and_(*owned))
 
 
-def _may_open(who: Identity, patient_id: ColumnElement[str]) -> ColumnElement[bool]:
-    return ~TEAMS_ARE_ON | _seen(who, patient_id)
-
-
-def _seen(who: Identity, patient_id: ColumnElement[str]) -> ColumnElement[bool]:
+def _is_seen(user_id: str | ColumnElement[str], patient_id: ColumnElement[str]) -> ColumnElement[bool]:
     at = literal(now(), emergency_access.c.ends_at.type)
-    member = select(care_team_member.c.patient_id).where(care_team_member.c.user_id == who.user_id)
+    member = select(care_team_member.c.patient_id).where(care_team_member.c.user_id == user_id)
     opened = select(emergency_access.c.patient_id).where(
-        emergency_access.c.user_id == who.user_id, emergency_access.c.ends_at > at
+        emergency_access.c.user_id == user_id, emergency_access.c.ends_at > at
     )
-    return patient_id.in_(union_all(member, opened))
+    return or_(
+        patient_id.in_(member.correlate_except(care_team_member)),
+        patient_id.in_(opened.correlate_except(emergency_access)),
+    )
 
 
 TEAMS_ARE_ON: Final = exists().where(clinic_option.c.name == CARE_TEAMS)

@@ -102,12 +102,11 @@ def view_team(c: Connection, patient_id: str) -> dict[str, Any] | None:
     """The care team and who opened the patient in an emergency; None where the clinic has no teams."""
     if not care_teams.are_on(c):
         return None
-    members = care_teams.list_team(c, patient_id)
-    known = {m.user_id for m in members}
+    people = care_teams.list_people(c, patient_id)
     return {
-        "members": members,
+        "members": [one for one, is_in in people if is_in],
+        "choices": people,
         "emergencies": care_teams.list_accesses(c, patient_id),
-        "choices": members + [m for m in care_teams.list_colleagues(c) if m.user_id not in known],
     }
 
 

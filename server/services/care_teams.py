@@ -90,21 +90,28 @@ def switch_off(c: Connection, actor: audit.Actor) -> None:
         audit.record(c, actor, "care_teams.off", "clinic", None)
 
 
-def list_colleagues(c: Connection) -> list[TeamMember]:
-    """Everybody who can be in a team: open accounts but administrators, who see everybody."""
-    query = select(user).where(user.c.active, user.c.role != Role.ADMIN).order_by(user.c.name)
-    return [TeamMember(u.id, u.display_name or u.name, Role(u.role)) for u in c.execute(query)]
+def list_people(c: Connection, patient_id: str) -> list[tuple[TeamMember, bool]]:
+    """Who is or can be in the team of a patient, by name, and whether in it.
+
+    Open accounts can, but administrators, who see everybody.
+    """
+    mine = (care_team_member.c.user_id == user.c.id) & (care_team_member.c.patient_id == patient_id)
+    can = user.c.active & (user.c.role != Role.ADMIN)
+    query = (
+        select(user, care_team_member.c.since)
+        .outerjoin(care_team_member, mine)
+        .where(can | care_team_member.c.since.is_not(None))
+        .order_by(user.c.name)
+    )
+    return [
+        (TeamMember(row.id, row.display_name or row.name, Role(row.role)), row.since is not None)
+        for row in c.execute(query)
+    ]
 
 
 def list_team(c: Connection, patient_id: str) -> list[TeamMember]:
     """The team of a patient, by name."""
-    query = (
-        select(user)
-        .join(care_team_member, care_team_member.c.user_id == user.c.id)
-        .where(care_team_member.c.patient_id == patient_id)
-        .order_by(user.c.name)
-    )
-    return [TeamMember(u.id, u.display_name or u.name, Role(u.role)) for u in c.execute(query)]
+    return [one for one, is_in in list_people(c, patient_id) if is_in]
 
 
 def set_team(
@@ -113,8 +120,9 @@ def set_team(
     """Say who is in the team of a patient; raises NotFound, of no open account too."""
     patients.get(c, patient_id)
     wanted = set(user_ids)
-    before = {m.user_id for m in list_team(c, patient_id)}
-    unknown = wanted - before - {m.user_id for m in list_colleagues(c)}
+    known = {one.user_id: is_in for one, is_in in list_people(c, patient_id)}
+    before = {user_id for user_id, is_in in known.items() if is_in}
+    unknown = wanted - known.keys()
     if unknown:
         raise NotFound("account for a team", min(unknown))
     gone = care_team_member.c.user_id.in_(before - wanted)

@@ -13,7 +13,8 @@ from sqlalchemy import insert, select
 from core.feedback import Baseline, Cue
 from server.pages.routes import ROUTERS
 from server.pages.shell import FRAGMENT
-from server.services import live, prescriptions, programmes, sessions
+from server.services import live, patients, prescriptions, programmes, sessions
+from server.storage.care_tables import care_team_member
 from server.storage.live_tables import live_take
 from server.storage.tables import analysis, new_id, recording
 from tests.server import analysed, crowd
@@ -112,9 +113,9 @@ def _train(clinic: Clinic, earlier: list[str], last: str) -> None:
             live.add_event(c, None, take, "cue", cue.t_s, {"type": "cue", **cue.to_json()})
 
 
-async def asked(clinic: Clinic, path: str, answer: int = 200) -> list[str]:
+async def asked(clinic: Clinic, path: str, answer: int = 200, role: str = "admin") -> list[str]:
     """Statements that a page takes, once whoever asks is signed in."""
-    async with clinic.client("admin") as client:
+    async with clinic.client(role) as client:
         await client.get("/account")
         with crowd.statements() as sent:
             given = await client.get(path, headers={FRAGMENT: "numbers"})
@@ -142,6 +143,33 @@ async def test_no_page_takes_more_statements_than_20(
     path = (page + QUERIES.get(page, "")).format(**values)
     sent = await asked(clinic, path, ANSWERS.get(page, 200))
     assert len(sent) <= MOST, "\n\n".join(sent)
+
+
+async def test_care_teams_cost_a_list_no_statement(
+    full: tuple[Clinic, Mapping[str, str]],
+) -> None:
+    clinic, values = full
+    looked = ("/patients", "/patients/{pid}", "/sessions/{sid}", "/jobs", "/study")
+    members = [{"patient_id": p.id, "user_id": clinic.user("clinician"), "since": p.created_at}
+               for p in clinic_patients(clinic)]  # fmt: skip
+    with clinic.db.write() as c:
+        c.execute(insert(care_team_member), members)
+    counts = {}
+    for on in (False, True):
+        async with clinic.client("admin") as client:
+            await client.put("/api/v1/care-teams", json={"on": on})
+        counts[on] = [len(await asked(clinic, p.format(**values), role="clinician")) for p in looked]
+    async with clinic.client("admin") as client:
+        await client.put("/api/v1/care-teams", json={"on": False})
+    added = [with_teams - without for without, with_teams in zip(*counts.values(), strict=True)]
+    # the patient's own page reads the team and who opened the patient in an emergency
+    assert added == [0, 2, 0, 0, 0]
+    assert max(counts[True]) <= MOST
+
+
+def clinic_patients(clinic: Clinic) -> list[patients.Patient]:
+    with clinic.db.read() as c:
+        return patients.list_patients(c, None, limit=1000)
 
 
 @pytest.mark.slow
