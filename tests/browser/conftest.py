@@ -298,6 +298,8 @@ def opened(flat: Browser, running: RunningServer, kept: KeptContexts, at_rest: N
         page.on("pageerror", lambda e: said.append(f"{path}: {e}") if is_ours(str(e)) else None)
         page.on("console", lambda m: said.append(f"{path}: {m.text}") if _matters(m.type, m.text) else None)
         page.goto(path)
+        # what plays the figure begins once the page has been seen, which may be after it is loaded
+        page.wait_for_function("() => !document.querySelector('time-bar:not(:defined)')")
         return page
 
     yield open_
