@@ -31,13 +31,15 @@ def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: Running
             page.get_by_role("button", name="Sign in", exact=True).click()
 
         sign_in()
+        page.wait_for_url(f"{here}/account")  # loaded, with its scripts
         page.get_by_label("Present password").nth(1).fill(PASSWORD)
         page.get_by_role("button", name="Set up a second factor").click()
         dialog = page.locator("dialog[open]")
         secret = dialog.locator("[data-answer=secret]").inner_text()
         dialog.get_by_label("Code").fill(pyotp.TOTP(secret).now())
         dialog.get_by_role("button", name="Confirm").click()
-        page.locator("#factor-codes").get_by_role("button", name="Done").click()
+        with page.expect_navigation():
+            page.locator("#factor-codes").get_by_role("button", name="Done").click()
 
         page.get_by_role("button", name="New key").click()
         dialog.get_by_label("Name").fill("Blue key")
@@ -52,7 +54,7 @@ def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: Running
         context.clear_cookies()
         sign_in()
         page.get_by_role("button", name="Use a security key").click()
-        page.wait_for_url("**/account")
+        page.wait_for_url(f"{here}/account")
         expect(keys).not_to_contain_text("never")
 
         # the key is at home
