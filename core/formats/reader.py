@@ -32,6 +32,9 @@ MOST_BYTES: Final = 4.2e9
 """A recording that needs more is read block by block, for the monitor of daily life: at 100 Hz five and a
 half hours of seven sensors, nine of two feet. Half of what a process may use (server/settings.py)."""
 
+MOST_ROWS_ALONE: Final = 2_000_000
+"""A longer recording of one sensor is daily life, five and a half hours at 100 Hz: by blocks it needs less."""
+
 
 @dataclass
 class _Upload:
@@ -212,6 +215,8 @@ def _take_long(member: SourceFile, spec: SourceSpec | None, upload: _Upload) -> 
 
 def is_too_long(rows: float, sensors: int) -> bool:
     """Whether a recording is too long to be analysed at once; known before any of it is read."""
+    if sensors == 1:
+        return rows > MOST_ROWS_ALONE
     return rows * (ROW_BYTES + SENSOR_BYTES * sensors) > MOST_BYTES
 
 

@@ -21,7 +21,7 @@ SPEC = {
 
 @pytest.fixture(autouse=True)
 def few_rows_are_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reader, "MOST_BYTES", 500.0 * (reader.ROW_BYTES + reader.SENSOR_BYTES))
+    monkeypatch.setattr(reader, "MOST_ROWS_ALONE", 500)
     monkeypatch.setattr(table, "_CHUNK", 4096)
 
 

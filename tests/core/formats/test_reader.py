@@ -154,4 +154,5 @@ def test_a_take_is_too_long_by_what_its_analysis_needs() -> None:
     assert not is_too_long(6.0 * hour, 2)
     assert not is_too_long(5.5 * hour, 7)
     assert is_too_long(7.0 * hour, 7)
-    assert is_too_long(24.0 * hour, 1)
+    assert not is_too_long(5.5 * hour, 1)
+    assert is_too_long(8.0 * hour, 1)
