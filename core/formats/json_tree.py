@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import json
+from collections import Counter
 from math import isfinite
 from typing import Final
 
@@ -62,11 +63,10 @@ def _read_whole(digits: str) -> int:
 
 
 def _make_object(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    made: dict[str, object] = {}
-    for key, value in pairs:
-        if key in made:
-            raise ValueError(f"the key '{_shorten_key(key)}' is given twice")
-        made[key] = value
+    made = dict(pairs)
+    if len(made) < len(pairs):
+        twice, _ = Counter(key for key, _ in pairs).most_common(1)[0]
+        raise ValueError(f"the key '{_shorten_key(twice)}' is given twice")
     return made
 
 
