@@ -33,7 +33,7 @@ MOST_BYTES: Final = 4.2e9
 half hours of seven sensors, nine of two feet. Half of what a process may use (server/settings.py)."""
 
 MOST_ROWS_ALONE: Final = 2_000_000
-"""A longer recording of one sensor is daily life, five and a half hours at 100 Hz: by blocks it needs less."""
+"""More of one sensor is daily life, five and a half hours at 100 Hz: by blocks it needs less memory."""
 
 
 @dataclass

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from core.errors import SagittalError
 from core.events.result import Strides
 from server.report.bundle import read_poses
 from server.report.model import ReportModel
@@ -16,6 +18,8 @@ from server.viewer.client import client_version
 from server.viewer.first_picture import draw_first_picture
 from server.viewer.motion import prepare_motion
 from server.viewer.still import draw_still
+
+log = logging.getLogger(__name__)
 
 MOST_FRAMES: Final = 120_000
 """A page would wait too long for the first picture of a walk of more, 20 min at 100 Hz."""
@@ -39,10 +43,17 @@ def draw_contact(
 def draw_beginning(
     reviewed: ReviewedAnalyses, this: AnalysedSession, model: ReportModel
 ) -> dict[str, str] | None:
-    """What the replay will show first, where the page's clock begins, and the client that will show it."""
+    """What the replay will show first, where the page's clock begins, and the client that will show it.
+
+    None where there is nothing to draw; damaged poses hide no number of the page.
+    """
     if "poses.parquet" not in this.found.files:
         return None
-    poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))
+    try:
+        poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))
+    except SagittalError as error:
+        log.warning("no first picture of session %s: %s", this.session.id, error.code)
+        return None
     if not poses.q or not 0 < len(poses.t_s) <= MOST_FRAMES:
         return None
     spans: Sequence[Mapping[str, Any]] = model.replay["strides"]  # type: ignore[assignment]

@@ -2,9 +2,40 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
+from collections.abc import Iterator
+from typing import Final
+
 from server.processes.channel import Channel
 from server.processes.child import end_process, start_child
 from server.settings import Settings
+
+MOST_WAITING: Final = 3
+"""Errands of a kind that may wait for their turn: each holds one of the few threads that answer requests."""
+
+
+class TooManyErrands(Exception):  # noqa: N818 - says what is refused
+    """As many as may wait do so already."""
+
+
+class ErrandTurn:
+    """One errand of a kind at a time; a few wait for it, more are refused at once."""
+
+    def __init__(self) -> None:
+        self._turn = threading.Semaphore(1)
+        self._places = threading.Semaphore(1 + MOST_WAITING)
+
+    @contextlib.contextmanager
+    def take(self) -> Iterator[None]:
+        """Wait for the turn and hold it; raises TooManyErrands."""
+        if not self._places.acquire(blocking=False):
+            raise TooManyErrands
+        try:
+            with self._turn:
+                yield
+        finally:
+            self._places.release()
 
 
 def run_errand(module: str, settings: Settings, order: bytes, longest_s: float) -> bytes:

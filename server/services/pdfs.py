@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 from typing import Final
 
 import msgspec
 
-from server.processes.errand import run_errand
+from server.processes.errand import ErrandTurn, TooManyErrands, run_errand
 from server.report.pdf import PdfMissing
 from server.services import signed_reports
 from server.services.errors import ServiceError
@@ -19,7 +18,7 @@ from server.storage.db import Database
 LONGEST_S: Final = 60.0
 """Longest one may take; a report takes some seconds."""
 
-_turn = threading.Semaphore(1)
+_turn = ErrandTurn()
 
 
 class PdfFailed(ServiceError):  # noqa: N818 - says what failed
@@ -34,17 +33,17 @@ def make_pdf(settings: Settings, document: bytes) -> bytes:
     Raises
     ------
     PdfMissing
-        the library is not there. PdfFailed: it took too long or ended without a word.
+        the library is not there. PdfFailed: others wait already, it took too long or ended without a word.
     """
-    with _turn:
-        try:
+    try:
+        with _turn.take():
             answer = run_errand("server.services.paper_child", settings, document, LONGEST_S)
-        except TimeoutError as error:
-            raise PdfFailed(
-                "pdf_failed", f"The PDF was not made within {LONGEST_S:.0f} s. Try again."
-            ) from error
-        except (EOFError, OSError) as error:
-            raise PdfFailed("pdf_failed", "The process that makes the PDF has ended. Try again.") from error
+    except TooManyErrands as error:
+        raise PdfFailed("busy", "Other PDFs are being made. Try again in some seconds.") from error
+    except TimeoutError as error:
+        raise PdfFailed("pdf_failed", f"The PDF was not made within {LONGEST_S:.0f} s. Try again.") from error
+    except (EOFError, OSError) as error:
+        raise PdfFailed("pdf_failed", "The process that makes the PDF has ended. Try again.") from error
     reply = msgspec.msgpack.decode(answer, type=PaperReply)
     if reply.code == "pdf_missing":
         raise PdfMissing

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import threading
 from typing import Final
 
 import msgspec
 
 from server.auth.identity import Identity
-from server.processes.errand import run_errand
+from server.processes.errand import ErrandTurn, TooManyErrands, run_errand
 from server.services.errors import Conflict, ServiceError
 from server.services.studies import StudyChoice, check_size, list_visits
 from server.services.study_child import StudyReply
@@ -18,7 +17,7 @@ from server.storage.db import Database
 LONGEST_S: Final = 300.0
 """Longest one may take; the most visits that are allowed take some ten seconds of computing."""
 
-_turn = threading.Semaphore(1)
+_turn = ErrandTurn()
 
 
 class StudyFailed(ServiceError):  # noqa: N818 - says what failed
@@ -35,23 +34,24 @@ def fetch_study(
     Raises
     ------
     Conflict
-        no_visits, too_many_visits. StudyFailed: it took too long, or ended without a word.
+        no_visits, too_many_visits. StudyFailed: others wait, it took too long, or ended without a word.
     """
     with db.read() as c:
         check_size(list_visits(c, who, choice))
-    with _turn:
-        try:
-            answer = run_errand(
-                "server.services.study_child", settings, msgspec.msgpack.encode((who, choice)), LONGEST_S
-            )
-        except TimeoutError as error:
-            raise StudyFailed(
-                "study_failed", f"The tables were not made within {LONGEST_S:.0f} s. Choose fewer visits."
-            ) from error
-        except (EOFError, OSError) as error:
-            raise StudyFailed(
-                "study_failed", "The process that makes the tables has ended. Choose fewer visits."
-            ) from error
+    order = msgspec.msgpack.encode((who, choice))
+    try:
+        with _turn.take():
+            answer = run_errand("server.services.study_child", settings, order, LONGEST_S)
+    except TooManyErrands as error:
+        raise StudyFailed("busy", "Other studies are being made. Try again in a minute.") from error
+    except TimeoutError as error:
+        raise StudyFailed(
+            "study_failed", f"The tables were not made within {LONGEST_S:.0f} s. Choose fewer visits."
+        ) from error
+    except (EOFError, OSError) as error:
+        raise StudyFailed(
+            "study_failed", "The process that makes the tables has ended. Choose fewer visits."
+        ) from error
     reply = msgspec.msgpack.decode(answer, type=StudyReply)
     if reply.code in {"no_visits", "too_many_visits"}:  # changed since it was looked at
         raise Conflict(reply.code, reply.message)

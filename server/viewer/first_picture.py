@@ -189,7 +189,9 @@ def _draw(mesh: Mesh, seen: Floats, shown: Bools) -> str:
 
 
 def _write_line(points: Floats) -> str:
-    """A line through points in whole units, without those that it comes near anyway."""
+    """A line through points in whole units, without those that it comes near anyway; "" through none."""
+    if not len(points):
+        return ""
     whole = np.rint(points * (1, -1)).astype(int)
     whole = whole[_find_corners(whole.astype(float))]
     steps = np.diff(whole, axis=0)

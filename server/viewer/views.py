@@ -29,8 +29,12 @@ from server.viewer.scene_server import socket_of, start_scene_server, stop_scene
 IDLE_S = 30.0
 """A view without a viewer is stopped after this; a page reload comes back well within it."""
 
-PATIENCE_S = 5.0
-"""A pipe waits as long for its view: the page loads the 3D client while the view is being opened."""
+PATIENCE_S = 4.0
+"""A pipe waits as long for its view: the page loads the 3D client while the view is being opened. Viser's
+client gives its line up a second later; the page then loads it again (replay.js)."""
+
+MOST_NAMES = 8
+"""Names that pages gave one view and that find it: those of the last few loads of a tab."""
 
 SWEEP_S = 1.0
 MAX_VIEWS = 48
@@ -229,7 +233,12 @@ class FigureViews:
 
     def _enter(self, name: str | None, view: FigureView[Any]) -> None:
         """Let a view be found by a name, unless another has it."""
-        if name is not None and self._views.setdefault(name, view) is view and name in self._awaited:
+        if name is None or self._views.setdefault(name, view) is not view:
+            return
+        names = [known for known, other in self._views.items() if other is view and known != view.id]
+        for old in names[:-MOST_NAMES]:
+            del self._views[old]
+        if name in self._awaited:
             self._awaited[name].set()
 
     async def _make_room(self) -> None:

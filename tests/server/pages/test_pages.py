@@ -12,6 +12,7 @@ from core.body.model import NOMINAL_HEIGHT_M
 from core.online.calibrating import CalibratingParams
 from server.pages.charts import draw_chart
 from server.report.panels import CurvePanel
+from server.services import analyses
 from tests.data import ROOT
 from tests.server import analysed
 from tests.server.clinic import Clinic
@@ -94,6 +95,21 @@ async def test_a_result_that_cannot_be_read_does_not_take_the_list_of_patients_a
         blob.chmod(0o600)
         blob.write_bytes(b"damaged")
     assert "Cannot be read" in row_of(await page(clinic, "/patients"), "Q-LOST")
+
+
+async def test_damaged_poses_take_the_figure_away_and_no_number(clinic: Clinic) -> None:
+    patient, session = await visit(clinic, "Q-POSES")
+    with clinic.db.read() as c:
+        sha256 = analyses.get_shown(c, session).files["poses.parquet"].sha256
+    stored = [p for p in (clinic.settings.data_dir / "blobs" / patient).rglob("*") if sha256 in p.name]
+    assert stored
+    for blob in stored:
+        blob.chmod(0o600)
+        blob.write_bytes(b"damaged")
+    for path in ("", "/kinematics"):
+        html = await page(clinic, f"/sessions/{session}{path}")
+        assert "data-first" not in html
+        assert "<h2" in html
 
 
 async def test_who_may_not_see_results_sees_no_verdict_on_them(clinic: Clinic) -> None:

@@ -13,7 +13,7 @@ import pytest
 from core.errors import EstimationError, InputError
 from server.auth.roles import Role
 from server.viewer.motion import ReplayMotion
-from server.viewer.views import FigureViews
+from server.viewer.views import MOST_NAMES, FigureViews
 
 pytestmark = pytest.mark.anyio
 
@@ -38,6 +38,16 @@ async def test_same_tab_shares_and_other_sign_in_does_not(motion: ReplayMotion) 
         assert views.find(mine.id, "login-2", Role.ADMIN) is None
         assert views.find("unknown", "login-1", Role.ADMIN) is None
         assert loads == [1]
+
+
+async def test_a_view_is_found_by_the_names_of_its_last_few_loads(motion: ReplayMotion) -> None:
+    async with FigureViews().run() as views:
+        for k in range(MOST_NAMES + 2):
+            view = await views.open("login", "tab", "session", "analysis", lambda: motion, name=f"{k:032x}")
+        found = [views.find(f"{k:032x}", "login", Role.VIEWER) for k in range(MOST_NAMES + 2)]
+        assert found == [None, None, *[view] * MOST_NAMES]
+        assert views.find(view.id, "login", Role.VIEWER) is view
+        assert len(views) == 1
 
 
 async def test_a_views_socket_is_for_this_user_alone_and_goes_with_it(motion: ReplayMotion) -> None:

@@ -5,6 +5,7 @@ import { localise, speak, translate } from "./common/words.js";
 const RATE_MS = 33; // the figure is posed at most 30 times a second (docs/data-flow.md, "The 3D figure")
 const RETRY_MS = [500, 1000, 2000, 5000];
 const FADE_MS = 400; // longer than the first picture takes to go (pages.css)
+const LINE_MS = 3500; // shorter than the server keeps a client waiting for its view (viewer/views.py)
 const PATIENCE_MS = 30_000; // a 3D view that has not said by then that it has drawn is shown as it is
 
 const isDark = () => getComputedStyle(document.documentElement).colorScheme.startsWith("dark");
@@ -104,7 +105,8 @@ class GaitView extends HTMLElement {
       this.say(translate(message.error.detail));
     } else if (message.src) {
       this.tries = 0;
-      if (message.view !== this.view) this.load(message.src);
+      // a client that waited for long has let go of its line
+      if (message.view !== this.view || performance.now() - this.loadedAt > LINE_MS) this.load(message.src);
       this.view = null; // after a lost line it is another
       this.dataset.state = "open";
       this.say("");
@@ -134,6 +136,7 @@ class GaitView extends HTMLElement {
   load(address) {
     if (this.refused) return;
     this.frame.src = address;
+    this.loadedAt = performance.now();
     this.frame.hidden = false;
     setTimeout(() => this.uncover(), PATIENCE_MS);
   }
