@@ -76,7 +76,7 @@ class _Reader:
         self._rows: list[str] = []
         self._broken = 0
         self._frame: Mapping[str, str] | None = None
-        self._said: dict[str, str] = {}
+        self._said: dict[str, list[str]] = {}
         self._part: str | None = None
         self._depth = 0
 
@@ -88,7 +88,7 @@ class _Reader:
             # what is inside of a part of a frame is not read
             self._part = name if self._depth == 1 and name in _WIDTHS else None
             if self._part is not None:
-                self._said[name] = ""
+                self._said[name] = []
         elif name == "frame":
             self._frame, self._said, self._part, self._depth = given, {}, None, 0
         elif name == "sensor" and (label := given.get("label")):
@@ -101,7 +101,7 @@ class _Reader:
     def add_text(self, content: str) -> None:
         """Text of the innermost element."""
         if self._part is not None:
-            self._said[self._part] += content
+            self._said[self._part].append(content)
 
     def end(self, tag: str) -> None:
         """An element ends."""
@@ -116,7 +116,8 @@ class _Reader:
             self._take_frame(_number(frame.get("index")))
 
     def _take_frame(self, index: float | None) -> None:
-        said = {name: content.split() for name, content in self._said.items()}
+        # an empty part is none
+        said = {name: split for name, pieces in self._said.items() if (split := "".join(pieces).split())}
         said.setdefault("sensorMagneticField", ["NaN"] * (3 * len(self._labels)))
         cells = [cell for name in _WIDTHS for cell in said.get(name, ())]
         if index is None or len(cells) != len(self._labels) * sum(_WIDTHS.values()):

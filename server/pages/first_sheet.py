@@ -38,7 +38,7 @@ def has_room_for_profile(report: Mapping[str, Any], assessment: str, note: str) 
         _count_lines(changed) + (_count_lines(left_changes) + 1 if report["since"] else 0),
     )
     noted = ceil(len(note) / (2 * HALF))
-    if report["trend"] is not None and report["trend"].missing:
+    if report["trend"] is not None and (report["trend"].missing or report["trend"].later):
         noted += 1
     return (
         len(assessment) <= MOST_CHARACTERS

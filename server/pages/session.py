@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
+from core.errors import FormatError
 from core.parameters.catalogue.entry import SQUAT
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -43,7 +46,7 @@ from server.report.curves import GLANCE_STRIDES, strip_svg
 from server.report.model import ReportModel
 from server.report.profile import BAR_HEIGHT, PAPER_BAR_HEIGHT
 from server.report.trend_strip import LEAST_VISITS, TrendStrip, trend_strip
-from server.report.trends import VisitKind
+from server.report.trends import AnalysedVisit, VisitKind
 from server.report.wording import speak_places
 from server.services import (
     comparisons,
@@ -59,6 +62,7 @@ from server.services.histories import AnalysedSession
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
+from server.storage.blobs import IntegrityError
 from server.storage.db import Database
 from web.words import day, seconds
 
@@ -303,12 +307,20 @@ def _draw_report(
 
 
 def _follow(reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any]) -> TrendStrip | None:
-    """Speed and score up to this visit, of those walked alike; None on screen, of few, of poor data."""
+    """Speed and score up to this visit, of those walked alike; None on screen, of few, of poor data.
+
+    The takes of a day are one visit, the last of them; those with poor or damaged data are left out.
+    """
     alike: Sequence[tuple[AnalysedSession, VisitKind]] = context.get("alike", ())
     if model.headline is None or model.quality.kind == "bad" or len(alike) < LEAST_VISITS:
         return None
-    visits = [histories.read_visit(reviewed, a, kind) for a, kind in alike]
-    return trend_strip(visits, context["patient"].affected_side)
+    visits: dict[dt.date, AnalysedVisit] = {}
+    for a, kind in alike:
+        with suppress(IntegrityError, FormatError):  # its own page says what is wrong
+            visit = histories.read_visit(reviewed, a, kind)
+            if visit.numbers.verdict[0] != "bad":
+                visits[visit.performed_on] = visit
+    return trend_strip(list(visits.values()), context["patient"].affected_side)
 
 
 def _draw_panels(model: ReportModel, heights: Mapping[bool, int]) -> list[dict[str, Any]]:

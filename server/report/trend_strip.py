@@ -58,7 +58,8 @@ class TrendStrip:
     ----------
     days : of the shown visits, oldest first. hidden : how many visits between the first two are not shown.
     missing : day and reason of each value that is not there, the same ones once.
-    later : title and day of what changed since a later visit than the first, which has no value.
+    later : title and day of what changed since a later visit than the first, which has no value to compare
+        with: none, an estimated one, or one of training.
     """
 
     days: tuple[dt.date, ...]

@@ -1,7 +1,7 @@
 """A take of L7S in windows: the filter runs through, the places are found window by window.
 
 Of a long take the equations of all nodes do not fit into memory: a sample of them has 3 kB. What is measured
-fixes the places of a node within some seconds around it, so that a window which is solved with more than
+fixes the places of a node within some minute around it, so that a window which is solved with more than
 that on both sides gives in its middle what the whole take gives (docs/science/l7s.md, "Both ways").
 """
 
@@ -27,8 +27,8 @@ WHOLE: Final = 1 << 16
 LONG: Final = 1 << 15
 """Samples of a window of a longer take."""
 
-AROUND_S: Final = 60.0
-"""What is solved with a window before and after it."""
+AROUND_S: Final = 120.0
+"""What is solved with a window before and after it: the pull to the filter's places fades with some 22 s."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import resource
 import sys
 from collections.abc import Callable
@@ -119,6 +120,8 @@ def test_mvnx_with_entities_is_refused_and_lost_frames_are_holes() -> None:
     assert len(stream.t_s) == made.N - 2
     assert np.diff(stream.t_s).max() == pytest.approx(0.03)
     assert stream.gyr == pytest.approx(made.GYR[2:], abs=1e-3)
+    empty = re.sub(rb"(<sensorMagneticField>).*?(</sensorMagneticField>)", rb"\1\2", made.mvnx())
+    assert len(only(read(empty)).t_s) == made.N
 
 
 def test_shimmer_reads_the_accelerometer_that_does_not_clip() -> None:

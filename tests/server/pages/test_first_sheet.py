@@ -16,6 +16,7 @@ import pytest
 from server.pages import session as session_page
 from server.pages.first_sheet import MOST_CHARACTERS, has_room_for_profile
 from server.report.headline import Headline, HeadlineSentence
+from server.services import comparisons
 from tests.server import analysed
 from tests.server.clinic import Clinic
 
@@ -105,6 +106,32 @@ async def test_the_trend_follows_visits_walked_alike_from_the_third_on(clinic: C
     assert mixed[-1] == [""]
     fed = await add_visits(clinic, "T-4", files, [(0.5, {}), (0.6, {}), (0.6, {}), (0.7, {"feedback": True})])
     assert await read_trend(clinic, fed) is None
+
+
+async def test_a_change_since_a_later_visit_than_the_first_says_so(
+    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A training in the first column is nothing to compare with."""
+    monkeypatch.setattr(comparisons, "classify_visit", lambda s, _: s.title)
+    kinds = [(0.5, "training"), (0.8, "assessment"), (0.9, "training")]
+    visits = [(speed, {"title": kind}) for speed, kind in kinds]
+    found = await read_trend(clinic, await add_visits(clinic, "T-70", analysed.files(), visits))
+    assert found is not None
+    assert found[1][1:4] == ["0.50", "0.80", "0.90"]
+    assert found[1][-1].startswith("+0.10")
+    assert found[-1][0].startswith("Gait speed: change since 21 Oct 2026.")
+
+
+async def test_the_takes_of_a_day_are_one_visit_of_the_trend(clinic: Clinic) -> None:
+    files = analysed.files()
+    first = {"performed_on": "2026-09-23"}
+    twice: list[tuple[float | None, dict[str, Any]]] = [(0.5, first), (0.6, first), (0.7, {})]
+    assert await read_trend(clinic, await add_visits(clinic, "T-71", files, twice)) is None
+    found = await read_trend(
+        clinic, await add_visits(clinic, "T-72", files, [(0.4, first), *twice, (0.8, {})])
+    )
+    assert found is not None
+    assert found[1][1:-2] == ["0.60", "0.70", "0.80"]
 
 
 async def test_a_visit_without_the_number_has_a_dash_and_the_reason(clinic: Clinic) -> None:

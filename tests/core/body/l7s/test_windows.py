@@ -59,6 +59,6 @@ def test_places_in_windows_are_those_of_the_whole_take(
     monkeypatch.undo()
     whole = poses_of("2I")
     anywhere, knee = compare(found, whole)
-    # six times the margin leaves 2 mm and 0.04 mm
+    # twelve times the margin leaves 1 mm
     assert anywhere < 0.1
     assert knee < 0.005
