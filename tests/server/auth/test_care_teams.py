@@ -1,0 +1,97 @@
+"""Care teams over time: who is in one at the beginning, and whoever guesses codes from outside."""
+
+from __future__ import annotations
+
+import datetime as dt
+
+import pytest
+from sqlalchemy import update
+
+from server import audit
+from server.auth.identity import Identity
+from server.auth.roles import Role
+from server.storage.care_tables import emergency_access
+from tests.server.clinic import Clinic
+
+pytestmark = pytest.mark.anyio
+
+API = "/api/v1"
+
+
+async def switch(clinic: Clinic, *, on: bool, **more: bool) -> None:
+    async with clinic.client("admin") as client:
+        answer = await client.put(f"{API}/care-teams", json={"on": on} | more)
+        assert answer.json() == {"on": on}
+
+
+async def add(clinic: Clinic, code: str) -> str:
+    """Id of a new patient, added by an administrator, who is in no team."""
+    async with clinic.client("admin") as client:
+        made = await client.post(f"{API}/patients", json={"code": code})
+        assert made.status_code == 201, made.text
+        return str(made.json()["id"])
+
+
+async def team(clinic: Clinic, patient: str) -> set[str]:
+    async with clinic.client("admin") as client:
+        found = (await client.get(f"{API}/patients/{patient}/care-team")).json()
+    return {member["name"] for member in found["members"]}
+
+
+async def enter(clinic: Clinic, role: str, patient: str) -> int:
+    """Open a patient; the status of the answer."""
+    async with clinic.client(role) as client:
+        return (await client.get(f"{API}/patients/{patient}")).status_code
+
+
+async def ask_in_emergency(clinic: Clinic, code: str) -> int:
+    """Ask as the clinician for a patient by the code; the status of the answer."""
+    async with clinic.client("clinician") as client:
+        body = {"code": code, "reason": "Fell in the corridor."}
+        return (await client.post(f"{API}/emergency-accesses", json=body)).status_code
+
+
+async def test_care_teams_begin_with_whoever_has_worked_with_the_patient(clinic: Clinic) -> None:
+    patient = await add(clinic, "Alder")
+    async with clinic.client("admin") as client:
+        visit = (await client.post(f"{API}/patients/{patient}/sessions", json={"title": "Walk"})).json()["id"]
+    async with clinic.client("assistant") as client:
+        assert (await client.get(f"{API}/sessions/{visit}")).status_code == 200
+    who = Identity(clinic.user("viewer"), "viewer", "", Role.VIEWER, "")
+    with clinic.db.write() as c:  # the row that the tables of a study leave of each visit
+        audit.record(c, who, "study.exported", "session", visit, {"visits": 1})
+    await switch(clinic, on=True, begin_with_past=True)
+    assert await team(clinic, patient) == {"assistant"}
+    async with clinic.client("admin") as client:
+        for one in (clinic.user("admin"), "0" * 32):  # an administrator sees everybody anyhow
+            refused = await client.put(f"{API}/patients/{patient}/care-team", json={"users": [one]})
+            assert refused.status_code == 404
+    await switch(clinic, on=False)
+    assert await enter(clinic, "viewer", patient) == 200
+
+
+async def test_switching_care_teams_off_and_on_puts_nobody_back_or_in(clinic: Clinic) -> None:
+    """A team that was set stays; whoever came in an emergency is in no team for that."""
+    of_one, of_nobody, new = [await add(clinic, code) for code in ("Elm", "Fir", "Hazel")]
+    for role in ("assistant", "viewer"):
+        assert await enter(clinic, role, of_one) == await enter(clinic, role, of_nobody) == 200
+    await switch(clinic, on=True, begin_with_past=True)
+    async with clinic.client("admin") as client:
+        for patient, left in ((of_one, ["viewer"]), (of_nobody, [])):
+            to = f"{API}/patients/{patient}/care-team"
+            users = {"users": [clinic.user(name) for name in left]}
+            assert (await client.put(to, json=users)).status_code == 200
+    for patient, code in ((of_one, "Elm"), (new, "Hazel")):
+        assert await ask_in_emergency(clinic, code) == 201
+        assert await enter(clinic, "clinician", patient) == 200  # looks around while it is open
+    with clinic.db.write() as c:
+        over = {"opened_at": dt.datetime(2024, 1, 1, tzinfo=dt.UTC), "ends_at": dt.datetime.now(dt.UTC)}
+        c.execute(update(emergency_access).values(**over))
+    await switch(clinic, on=False)
+    assert await enter(clinic, "viewer", new) == 200
+    await switch(clinic, on=True, begin_with_past=True)
+    assert await team(clinic, of_one) == {"viewer"}
+    assert await team(clinic, of_nobody) == set()
+    assert await team(clinic, new) == {"viewer"}
+    assert await enter(clinic, "clinician", new) == 404
+    await switch(clinic, on=False)
