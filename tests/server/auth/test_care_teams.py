@@ -10,8 +10,9 @@ from sqlalchemy import update
 from server import audit
 from server.auth.identity import Identity
 from server.auth.roles import Role
+from server.auth.throttle import MAX_PER_ADDRESS, MAX_PER_PAIR, Throttle
 from server.storage.care_tables import emergency_access
-from tests.server.clinic import Clinic
+from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
 
@@ -44,9 +45,10 @@ async def enter(clinic: Clinic, role: str, patient: str) -> int:
         return (await client.get(f"{API}/patients/{patient}")).status_code
 
 
-async def ask_in_emergency(clinic: Clinic, code: str) -> int:
-    """Ask as the clinician for a patient by the code; the status of the answer."""
-    async with clinic.client("clinician") as client:
+async def ask_in_emergency(clinic: Clinic, code: str, name: str = "clinician") -> int:
+    """Ask as a clinician for a patient by the code; the status of the answer."""
+    clinic.user("clinician", name)
+    async with clinic.client(name) as client:
         body = {"code": code, "reason": "Fell in the corridor."}
         return (await client.post(f"{API}/emergency-accesses", json=body)).status_code
 
@@ -94,4 +96,35 @@ async def test_switching_care_teams_off_and_on_puts_nobody_back_or_in(clinic: Cl
     assert await team(clinic, of_nobody) == set()
     assert await team(clinic, new) == {"viewer"}
     assert await enter(clinic, "clinician", new) == 404
+    await switch(clinic, on=False)
+
+
+@pytest.fixture
+def counted(clinic: Clinic) -> None:
+    """Failures are counted from nought."""
+    clinic.app.state.throttle = Throttle()
+
+
+@pytest.mark.usefixtures("counted")
+async def test_wrong_passwords_at_one_address_do_not_close_the_emergency_door(clinic: Clinic) -> None:
+    await add(clinic, "Juniper")
+    await switch(clinic, on=True)
+    async with clinic.client() as client:
+        for i in range(MAX_PER_ADDRESS + 1):
+            wrong = await client.post(f"{API}/sign-in", json={"name": f"n{i}", "password": PASSWORD})
+    assert wrong.status_code == 429
+    assert await ask_in_emergency(clinic, "Juniper") == 201
+    await switch(clinic, on=False)
+
+
+@pytest.mark.usefixtures("counted")
+async def test_guessed_codes_at_one_address_do_not_close_the_sign_in(clinic: Clinic) -> None:
+    await switch(clinic, on=True)
+    names = [f"guesser {i}" for i in range(MAX_PER_ADDRESS // MAX_PER_PAIR)]
+    guessed = [await ask_in_emergency(clinic, "P-0", name) for name in names for _ in range(MAX_PER_PAIR)]
+    assert set(guessed) == {404}
+    assert await ask_in_emergency(clinic, "P-0", "guesser of the same address") == 429
+    async with clinic.client() as client:
+        signed = await client.post(f"{API}/sign-in", json={"name": names[0], "password": PASSWORD})
+    assert signed.status_code == 200, signed.text
     await switch(clinic, on=False)
