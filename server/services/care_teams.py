@@ -29,7 +29,7 @@ SHOWN: Final = dt.timedelta(days=90)
 """How long the patient's page shows that; the audit log keeps it."""
 REASON: Final = (10, 500)
 """Characters of a reason, at least and at most."""
-_NOT_OF_A_TEAM: Final = ("emergency.opened", "study.exported")
+_NOT_OF_A_TEAM: Final = ("emergency.opened", "patient.code_refused", "study.exported")
 """Rows of the audit log that put nobody into a team: from outside it, or of a study over many visits."""
 
 

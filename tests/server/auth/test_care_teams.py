@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 
+import httpx
 import pytest
 from sqlalchemy import update
 
@@ -127,4 +128,42 @@ async def test_guessed_codes_at_one_address_do_not_close_the_sign_in(clinic: Cli
     async with clinic.client() as client:
         signed = await client.post(f"{API}/sign-in", json={"name": names[0], "password": PASSWORD})
     assert signed.status_code == 200, signed.text
+    await switch(clinic, on=False)
+
+
+@pytest.mark.usefixtures("counted")
+@pytest.mark.parametrize("way", ["add", "change"])
+async def test_a_refused_code_of_another_team_tells_no_spelling_and_is_counted(
+    clinic: Clinic, way: str
+) -> None:
+    hidden, known = await add(clinic, f"Rowan-{way}"), await add(clinic, f"Spruce-{way}")
+    async with clinic.client("admin") as client:
+        users = {"users": [clinic.user("clinician")]}
+        assert (await client.put(f"{API}/patients/{known}/care-team", json=users)).status_code == 200
+    await switch(clinic, on=True)
+    method, path = ("POST", "") if way == "add" else ("PATCH", f"/{known}")
+
+    async def give(code: str, role: str = "clinician") -> httpx.Response:
+        async with clinic.client(role) as client:
+            return await client.request(method, f"{API}/patients{path}", json={"code": code})
+
+    if way == "add":  # of one's own team it is no guess
+        assert [(await give(f"SPRUCE-{way}")).status_code for _ in range(MAX_PER_PAIR + 1)][-1] == 409
+    typed = f"ROWAN-{way}"
+    said = [await give(typed) for _ in range(MAX_PER_PAIR + 1)]
+    assert [answer.status_code for answer in said] == [409] * MAX_PER_PAIR + [429]
+    assert typed in said[0].text
+    assert "Rowan" not in said[0].text
+    assert (await give(typed, "admin")).status_code == 409
+    assert await ask_in_emergency(clinic, f"Rowan-{way}") == 201  # this door stays open
+    async with clinic.client("clinician") as client:
+        noted = await client.patch(f"{API}/patients/{known}", json={"note": "uses a stick"})
+        assert noted.status_code == 200
+    async with clinic.client("admin") as client:
+        rows = (await client.get(f"{API}/audit")).json()
+        assert "from outside the care team" in (await client.get("/audit")).text
+    refused = [
+        row for row in rows if row["action"] == "patient.code_refused" and row["resource_id"] == hidden
+    ]
+    assert [row["user_name"] for row in refused] == ["clinician"] * MAX_PER_PAIR
     await switch(clinic, on=False)
