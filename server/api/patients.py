@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import StreamingResponse
+from sqlalchemy import Connection
 
 from server.api import schemas
 from server.api.documents import refusals
@@ -13,7 +16,8 @@ from server.api.downloads import BINARY, write_disposition
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Config, Db, Id, LiveHub, OpenTrail, Reviewed
+from server.auth.sight import may_open
+from server.context import Blobs, Config, Db, Failures, Id, LiveHub, OpenTrail, Reviewed, address_of
 from server.http.json_body import StrictJsonRoute
 from server.services import care_teams, erasure, patient_export, patients, programmes, sessions
 
@@ -36,12 +40,47 @@ def list_patients(
     return found
 
 
-@router.post("", status_code=201, response_model=patients.Patient, responses=refusals(409))
+class _CodeDoor:
+    """Transactions that give a patient a code, which tell whoever guesses that somebody has it.
+
+    Codes of patients that one may not open are counted and recorded, as in an emergency.
+    """
+
+    def __init__(self, request: Request, db: Db, trail: OpenTrail, failures: Failures) -> None:
+        self._address = f"codes {address_of(request)}"
+        self._db, self._trail, self._failures = db, trail, failures
+
+    @contextmanager
+    def write(self, who: Identity) -> Iterator[Connection]:
+        """One writing transaction; raises Problem 429 after too many such codes."""
+        account, hidden = f"codes of {who.user_id}", None
+        try:
+            with self._db.write() as c:
+                # writers take turns: a burst of guesses cannot pass before the first is counted
+                self._failures.check(account, self._address)
+                try:
+                    yield c
+                except patients.CodeTaken as taken:
+                    one = taken.patient_id
+                    if one is not None and not may_open(c, who, {"patient_id": one}):
+                        hidden = one
+                        self._failures.fail(account, self._address)
+                    raise
+        except patients.CodeTaken:
+            if hidden is not None:
+                self._trail.record_opened(who, "patient.code_refused", "patient", hidden)
+            raise
+
+
+CodeDoor = Annotated[_CodeDoor, Depends()]
+
+
+@router.post("", status_code=201, response_model=patients.Patient, responses=refusals(409, 429))
 def add_patient(
-    body: schemas.PatientNew, db: Db, who: Annotated[Identity, require(Action.WRITE_PATIENT)]
+    body: schemas.PatientNew, door: CodeDoor, who: Annotated[Identity, require(Action.WRITE_PATIENT)]
 ) -> patients.Patient:
     """Add a patient."""
-    with db.write() as c:
+    with door.write(who) as c:
         made = patients.create(c, who, **body.values())
         care_teams.add_maker(c, who, made.id)
         return made
@@ -58,16 +97,18 @@ def read_patient(
     return found
 
 
-@router.patch("/{patient_id}", response_model=patients.Patient, responses=refusals(409))
+@router.patch("/{patient_id}", response_model=patients.Patient, responses=refusals(409, 429))
 def change_patient(
     patient_id: Id,
     body: schemas.PatientChange,
     db: Db,
+    door: CodeDoor,
     who: Annotated[Identity, require(Action.WRITE_PATIENT)],
 ) -> patients.Patient:
     """Change a patient; members left out stay as they are."""
-    with db.write() as c:
-        return patients.change(c, who, patient_id, body.values())
+    values = body.values()
+    with door.write(who) if "code" in values else db.write() as c:
+        return patients.change(c, who, patient_id, values)
 
 
 @router.delete("/{patient_id}", status_code=204, responses=refusals(409))

@@ -36,6 +36,7 @@ DEEDS: Final[Mapping[str, str]] = {
     "patient.opened": "opened the patient",
     "patient.created": "added the patient",
     "patient.changed": "changed what is said of the patient",
+    "patient.code_refused": "tried to give somebody else the code of the patient, from outside the care team",
     "patient.exported": "took along everything that is stored of the patient",
     "patient.deidentified": "took along results of the patient for research, without the name",
     "care_teams.on": "switched care teams on",

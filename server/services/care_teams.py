@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 from unicodedata import normalize
 
-from sqlalchemy import Connection, delete, insert, select, union
+from sqlalchemy import Connection, delete, exists, insert, select, union
 
 from server import audit
 from server.auth.identity import Identity
@@ -29,6 +29,8 @@ SHOWN: Final = dt.timedelta(days=90)
 """How long the patient's page shows that; the audit log keeps it."""
 REASON: Final = (10, 500)
 """Characters of a reason, at least and at most."""
+_NOT_OF_A_TEAM: Final = ("emergency.opened", "patient.code_refused", "study.exported")
+"""Rows of the audit log that put nobody into a team: from outside it, or of a study over many visits."""
 
 
 @dataclass(frozen=True)
@@ -67,21 +69,17 @@ def switch_on(c: Connection, actor: audit.Actor, *, begin_with_past: bool) -> No
 
     Parameters
     ----------
-    begin_with_past : whoever has opened or changed something of a patient so far is in the team.
+    begin_with_past : whoever has opened or changed something of a patient so far is in the team; a team that
+    was set before stays as it is.
     """
     if are_on(c):
         return
-    at, added = now(), 0
-    if begin_with_past:
-        there = {(m.patient_id, m.user_id) for m in c.execute(select(care_team_member))}
-        rows = [(p, u) for p, u in _list_past(c) if (p, u) not in there]
-        added = len(rows)
-        if rows:
-            c.execute(
-                insert(care_team_member), [{"patient_id": p, "user_id": u, "since": at} for p, u in rows]
-            )
+    at = now()
+    rows = _list_past(c) if begin_with_past else []
+    if rows:
+        c.execute(insert(care_team_member), [{"patient_id": p, "user_id": u, "since": at} for p, u in rows])
     c.execute(insert(clinic_option).values(name=CARE_TEAMS, since=at))
-    audit.record(c, actor, "care_teams.on", "clinic", None, {"members": added})
+    audit.record(c, actor, "care_teams.on", "clinic", None, {"members": len(rows)})
 
 
 def switch_off(c: Connection, actor: audit.Actor) -> None:
@@ -193,8 +191,12 @@ def list_accesses(c: Connection, patient_id: str) -> list[EmergencyAccess]:
 
 
 def _list_past(c: Connection) -> list[tuple[str, str]]:
-    """Patient and person, of who has opened or changed something of a patient and still has an account."""
-    of_patient = select(patient.c.id, audit_table.c.user_id).join(
+    """Patient and person, of who has opened or changed something of a patient and still has an account.
+
+    Left out: patients whose team was set before, and of a patient whoever came in an emergency.
+    """
+    is_work = audit_table.c.action.not_in(_NOT_OF_A_TEAM)
+    of_patient = select(patient.c.id.label("patient_id"), audit_table.c.user_id).join(
         audit_table, (audit_table.c.resource == "patient") & (audit_table.c.resource_id == patient.c.id)
     )
     of_session = (
@@ -204,6 +206,16 @@ def _list_past(c: Connection) -> list[tuple[str, str]]:
             audit_table, (audit_table.c.resource == "session") & (audit_table.c.resource_id == session.c.id)
         )
     )
-    done = union(of_patient, of_session).subquery()
+    done = union(of_patient.where(is_work), of_session.where(is_work)).subquery()
     colleagues = (user.c.id == done.c.user_id) & user.c.active & (user.c.role != Role.ADMIN)
-    return [(row[0], row[1]) for row in c.execute(select(done).join(user, colleagues))]
+    with_team = union(
+        select(care_team_member.c.patient_id),
+        select(audit_table.c.resource_id).where(audit_table.c.action == "care_team.changed"),
+    )
+    came = (emergency_access.c.patient_id == done.c.patient_id) & (
+        emergency_access.c.user_id == done.c.user_id
+    )
+    query = (
+        select(done).join(user, colleagues).where(done.c.patient_id.not_in(with_team), ~exists().where(came))
+    )
+    return [(row[0], row[1]) for row in c.execute(query)]

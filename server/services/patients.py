@@ -60,6 +60,17 @@ class Patient:
         return session.height_m if session.height_m is not None else self.height_m
 
 
+class CodeTaken(Conflict):
+    """Another patient has the code, or one that looks alike; None = which is not known.
+
+    The message names it as it was typed: its exact spelling opens that patient in an emergency.
+    """
+
+    def __init__(self, code: str, patient_id: str | None) -> None:
+        super().__init__("code_taken", f"The code '{code}' belongs to another patient; choose a new one.")
+        self.patient_id = patient_id
+
+
 def create(
     c: Connection,
     actor: audit.Actor | None,
@@ -72,7 +83,7 @@ def create(
     is_control: bool = False,
     note: str = "",
 ) -> Patient:
-    """Add a patient; raises Conflict code_taken, ServiceError bad_value."""
+    """Add a patient; raises CodeTaken, ServiceError bad_value."""
     patient_id = new_id()
     values = {
         "code": code,
@@ -94,7 +105,7 @@ def create(
 def change(
     c: Connection, actor: audit.Actor | None, patient_id: str, values: Mapping[str, object]
 ) -> Patient:
-    """Change some of CHANGEABLE; raises NotFound, Conflict code_taken, ServiceError bad_value."""
+    """Change some of CHANGEABLE; raises NotFound, CodeTaken, ServiceError bad_value."""
     before = get(c, patient_id)
     checked = _checked(values)
     changed = {name: value for name, value in checked.items() if getattr(before, name) != value}
@@ -194,10 +205,10 @@ def _checked(values: Mapping[str, object]) -> dict[str, Any]:
 
 
 def _refuse_alike(c: Connection, code: str, own: str | None = None) -> None:
-    """Raise Conflict code_taken where another's code differs in case or in the form of letters only."""
+    """Raise CodeTaken where another's code differs in case or in the form of letters only."""
     for other_id, other in c.execute(select(patient.c.id, patient.c.code)):
         if other_id != own and normalize("NFKC", other).casefold() == code.casefold():
-            raise Conflict("code_taken", f"The code '{other}' belongs to another patient; choose a new one.")
+            raise CodeTaken(code, other_id)
 
 
 class _explained:  # noqa: N801 - reads as a word: with _explained(code)
@@ -213,9 +224,7 @@ class _explained:  # noqa: N801 - reads as a word: with _explained(code)
         if not isinstance(error, IntegrityError):
             return
         if "code" in str(error.orig) and "UNIQUE" in str(error.orig).upper():
-            raise Conflict(
-                "code_taken", f"The code '{self._code}' belongs to another patient; choose a new one."
-            ) from error
+            raise CodeTaken(self._code, None) from error
         raise ServiceError(
             "bad_value",
             "Expected sex female, male or none, a year of birth from 1850, a height of 0.5 to 2.5 m. "

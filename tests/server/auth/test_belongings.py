@@ -411,18 +411,3 @@ async def test_guessing_codes_ends(guarded: Ward) -> None:
             for i in range(MAX_PER_PAIR + 1)
         ]
     assert (said[0], said[-1], set(said)) == (404, 429, {404, 429})
-
-
-async def test_care_teams_begin_with_whoever_has_worked_with_the_patient(ward: Ward) -> None:
-    async with ward.clinic.client("assistant") as client:
-        assert (await client.get(f"/api/v1/sessions/{ward.one['sid']}")).status_code == 200
-    async with ward.clinic.client("admin") as client:
-        await client.put("/api/v1/care-teams", json={"on": True, "begin_with_past": True})
-        found = await client.get(f"/api/v1/patients/{ward.one['pid']}/care-team")
-        assert "assistant" in [m["name"] for m in found.json()["members"]]
-        for one in (ward.clinic.user("admin"), "0" * 32):  # an administrator sees everybody anyhow
-            refused = await client.put(f"/api/v1/patients/{ward.one['pid']}/care-team", json={"users": [one]})
-            assert refused.status_code == 404
-    await teams(ward, on=False)
-    async with ward.clinic.client("viewer") as client:
-        assert (await client.get(f"/api/v1/patients/{ward.one['pid']}")).status_code == 200

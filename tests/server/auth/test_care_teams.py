@@ -1,0 +1,169 @@
+"""Care teams over time: who is in one at the beginning, and whoever guesses codes from outside."""
+
+from __future__ import annotations
+
+import datetime as dt
+
+import httpx
+import pytest
+from sqlalchemy import update
+
+from server import audit
+from server.auth.identity import Identity
+from server.auth.roles import Role
+from server.auth.throttle import MAX_PER_ADDRESS, MAX_PER_PAIR, Throttle
+from server.storage.care_tables import emergency_access
+from tests.server.clinic import PASSWORD, Clinic
+
+pytestmark = pytest.mark.anyio
+
+API = "/api/v1"
+
+
+async def switch(clinic: Clinic, *, on: bool, **more: bool) -> None:
+    async with clinic.client("admin") as client:
+        answer = await client.put(f"{API}/care-teams", json={"on": on} | more)
+        assert answer.json() == {"on": on}
+
+
+async def add(clinic: Clinic, code: str) -> str:
+    """Id of a new patient, added by an administrator, who is in no team."""
+    async with clinic.client("admin") as client:
+        made = await client.post(f"{API}/patients", json={"code": code})
+        assert made.status_code == 201, made.text
+        return str(made.json()["id"])
+
+
+async def team(clinic: Clinic, patient: str) -> set[str]:
+    async with clinic.client("admin") as client:
+        found = (await client.get(f"{API}/patients/{patient}/care-team")).json()
+    return {member["name"] for member in found["members"]}
+
+
+async def enter(clinic: Clinic, role: str, patient: str) -> int:
+    """Open a patient; the status of the answer."""
+    async with clinic.client(role) as client:
+        return (await client.get(f"{API}/patients/{patient}")).status_code
+
+
+async def ask_in_emergency(clinic: Clinic, code: str, name: str = "clinician") -> int:
+    """Ask as a clinician for a patient by the code; the status of the answer."""
+    clinic.user("clinician", name)
+    async with clinic.client(name) as client:
+        body = {"code": code, "reason": "Fell in the corridor."}
+        return (await client.post(f"{API}/emergency-accesses", json=body)).status_code
+
+
+async def test_care_teams_begin_with_whoever_has_worked_with_the_patient(clinic: Clinic) -> None:
+    patient = await add(clinic, "Alder")
+    async with clinic.client("admin") as client:
+        visit = (await client.post(f"{API}/patients/{patient}/sessions", json={"title": "Walk"})).json()["id"]
+    async with clinic.client("assistant") as client:
+        assert (await client.get(f"{API}/sessions/{visit}")).status_code == 200
+    who = Identity(clinic.user("viewer"), "viewer", "", Role.VIEWER, "")
+    with clinic.db.write() as c:  # the row that the tables of a study leave of each visit
+        audit.record(c, who, "study.exported", "session", visit, {"visits": 1})
+    await switch(clinic, on=True, begin_with_past=True)
+    assert await team(clinic, patient) == {"assistant"}
+    async with clinic.client("admin") as client:
+        for one in (clinic.user("admin"), "0" * 32):  # an administrator sees everybody anyhow
+            refused = await client.put(f"{API}/patients/{patient}/care-team", json={"users": [one]})
+            assert refused.status_code == 404
+    await switch(clinic, on=False)
+    assert await enter(clinic, "viewer", patient) == 200
+
+
+async def test_switching_care_teams_off_and_on_puts_nobody_back_or_in(clinic: Clinic) -> None:
+    """A team that was set stays; whoever came in an emergency is in no team for that."""
+    of_one, of_nobody, new = [await add(clinic, code) for code in ("Elm", "Fir", "Hazel")]
+    for role in ("assistant", "viewer"):
+        assert await enter(clinic, role, of_one) == await enter(clinic, role, of_nobody) == 200
+    await switch(clinic, on=True, begin_with_past=True)
+    async with clinic.client("admin") as client:
+        for patient, left in ((of_one, ["viewer"]), (of_nobody, [])):
+            to = f"{API}/patients/{patient}/care-team"
+            users = {"users": [clinic.user(name) for name in left]}
+            assert (await client.put(to, json=users)).status_code == 200
+    for patient, code in ((of_one, "Elm"), (new, "Hazel")):
+        assert await ask_in_emergency(clinic, code) == 201
+        assert await enter(clinic, "clinician", patient) == 200  # looks around while it is open
+    with clinic.db.write() as c:
+        over = {"opened_at": dt.datetime(2024, 1, 1, tzinfo=dt.UTC), "ends_at": dt.datetime.now(dt.UTC)}
+        c.execute(update(emergency_access).values(**over))
+    await switch(clinic, on=False)
+    assert await enter(clinic, "viewer", new) == 200
+    await switch(clinic, on=True, begin_with_past=True)
+    assert await team(clinic, of_one) == {"viewer"}
+    assert await team(clinic, of_nobody) == set()
+    assert await team(clinic, new) == {"viewer"}
+    assert await enter(clinic, "clinician", new) == 404
+    await switch(clinic, on=False)
+
+
+@pytest.fixture
+def counted(clinic: Clinic) -> None:
+    """Failures are counted from nought."""
+    clinic.app.state.throttle = Throttle()
+
+
+@pytest.mark.usefixtures("counted")
+async def test_wrong_passwords_at_one_address_do_not_close_the_emergency_door(clinic: Clinic) -> None:
+    await add(clinic, "Juniper")
+    await switch(clinic, on=True)
+    async with clinic.client() as client:
+        for i in range(MAX_PER_ADDRESS + 1):
+            wrong = await client.post(f"{API}/sign-in", json={"name": f"n{i}", "password": PASSWORD})
+    assert wrong.status_code == 429
+    assert await ask_in_emergency(clinic, "Juniper") == 201
+    await switch(clinic, on=False)
+
+
+@pytest.mark.usefixtures("counted")
+async def test_guessed_codes_at_one_address_do_not_close_the_sign_in(clinic: Clinic) -> None:
+    await switch(clinic, on=True)
+    names = [f"guesser {i}" for i in range(MAX_PER_ADDRESS // MAX_PER_PAIR)]
+    guessed = [await ask_in_emergency(clinic, "P-0", name) for name in names for _ in range(MAX_PER_PAIR)]
+    assert set(guessed) == {404}
+    assert await ask_in_emergency(clinic, "P-0", "guesser of the same address") == 429
+    async with clinic.client() as client:
+        signed = await client.post(f"{API}/sign-in", json={"name": names[0], "password": PASSWORD})
+    assert signed.status_code == 200, signed.text
+    await switch(clinic, on=False)
+
+
+@pytest.mark.usefixtures("counted")
+@pytest.mark.parametrize("way", ["add", "change"])
+async def test_a_refused_code_of_another_team_tells_no_spelling_and_is_counted(
+    clinic: Clinic, way: str
+) -> None:
+    hidden, known = await add(clinic, f"Rowan-{way}"), await add(clinic, f"Spruce-{way}")
+    async with clinic.client("admin") as client:
+        users = {"users": [clinic.user("clinician")]}
+        assert (await client.put(f"{API}/patients/{known}/care-team", json=users)).status_code == 200
+    await switch(clinic, on=True)
+    method, path = ("POST", "") if way == "add" else ("PATCH", f"/{known}")
+
+    async def give(code: str, role: str = "clinician") -> httpx.Response:
+        async with clinic.client(role) as client:
+            return await client.request(method, f"{API}/patients{path}", json={"code": code})
+
+    if way == "add":  # of one's own team it is no guess
+        assert [(await give(f"SPRUCE-{way}")).status_code for _ in range(MAX_PER_PAIR + 1)][-1] == 409
+    typed = f"ROWAN-{way}"
+    said = [await give(typed) for _ in range(MAX_PER_PAIR + 1)]
+    assert [answer.status_code for answer in said] == [409] * MAX_PER_PAIR + [429]
+    assert typed in said[0].text
+    assert "Rowan" not in said[0].text
+    assert (await give(typed, "admin")).status_code == 409
+    assert await ask_in_emergency(clinic, f"Rowan-{way}") == 201  # this door stays open
+    async with clinic.client("clinician") as client:
+        noted = await client.patch(f"{API}/patients/{known}", json={"note": "uses a stick"})
+        assert noted.status_code == 200
+    async with clinic.client("admin") as client:
+        rows = (await client.get(f"{API}/audit")).json()
+        assert "from outside the care team" in (await client.get("/audit")).text
+    refused = [
+        row for row in rows if row["action"] == "patient.code_refused" and row["resource_id"] == hidden
+    ]
+    assert [row["user_name"] for row in refused] == ["clinician"] * MAX_PER_PAIR
+    await switch(clinic, on=False)
