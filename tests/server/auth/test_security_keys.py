@@ -45,9 +45,9 @@ async def ask(client: httpx.AsyncClient) -> dict[str, Any]:
     return options
 
 
-async def set_up(client: httpx.AsyncClient) -> SoftKey:
+async def set_up(client: httpx.AsyncClient, at: str = HERE) -> SoftKey:
     key = SoftKey()
-    body = {"name": "blue", "key": key.create(await ask(client), HERE)}
+    body = {"name": "blue", "key": key.create(await ask(client), at)}
     answer = await client.post(f"{API}/account/security-keys", json=body)
     assert answer.status_code == 201, answer.text
     return key
@@ -60,11 +60,11 @@ async def challenge(clinic: Clinic, name: str = "clinician", at: str = HERE) -> 
 
 
 async def sign_in(
-    clinic: Clinic, key: Mapping[str, Any] | None = None, code: str | None = None, name: str = "clinician"
+    clinic: Clinic, key: Mapping[str, Any] | None = None, code: str | None = None, at: str = HERE
 ) -> httpx.Response:
-    body = {"name": name, "password": PASSWORD, "key": key, "code": code}
+    body = {"name": "clinician", "password": PASSWORD, "key": key, "code": code}
     async with clinic.client() as client:
-        client.base_url = httpx.URL(HERE)
+        client.base_url = httpx.URL(at)
         return await client.post(f"{API}/sign-in", json=body)
 
 
@@ -143,6 +143,38 @@ async def test_what_an_intruder_answers_is_refused(
     assert (await sign_in(clinic, key.get(await given(), HERE))).status_code == 200
     key.count -= 3
     assert (await sign_in(clinic, key.get(await given(), HERE))).status_code == 401
+
+
+async def test_another_service_on_this_host_gets_nothing_it_can_use(
+    clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
+) -> None:
+    client, _ = person
+    key, there = await set_up(client), "http://localhost:8443"
+    for asked, sent in ((HERE, there), (HERE, HERE)):
+        answer = key.get((await challenge(clinic, at=asked)).json()["options"], there)
+        got = await sign_in(clinic, answer, at=sent)
+        assert (got.status_code, got.json()["code"]) == (401, "key_refused"), (asked, sent)
+    assert (await challenge(clinic, at=there)).status_code == 404
+    # a key set up at that port signs in there, and there alone
+    client.base_url = httpx.URL(there)
+    other = await set_up(client, there)
+    assert [k["host"] for k in (await client.get(f"{API}/account/security-keys")).json()] == [
+        "localhost",
+        "localhost:8443",
+    ]
+    options = (await challenge(clinic, at=there)).json()["options"]
+    assert options["rpId"] == "localhost"
+    assert len(options["allowCredentials"]) == 1
+    assert (await sign_in(clinic, other.get(options, there), at=there)).status_code == 200
+    options = (await challenge(clinic)).json()["options"]
+    assert (await sign_in(clinic, other.get(options, HERE))).status_code == 401
+    # a port nobody could keep is no place for keys
+    client.base_url = httpx.URL(HERE)
+    far = {"Host": f"localhost:{'1' * 300}"}
+    refused = await client.post(
+        f"{API}/account/security-keys/options", json={"password": PASSWORD}, headers=far
+    )
+    assert refused.json()["code"] == "no_keys_here"
 
 
 async def test_of_two_answers_at_once_one_signs_in(
