@@ -56,13 +56,19 @@ def begin(
     responses=refusals(403, 409),
 )
 def add(
-    body: account_schemas.KeyNew, request: Request, db: Db, settings: Config, who: Self
+    body: account_schemas.KeyNew, request: Request, db: Db, settings: Config, trail: OpenTrail, who: Self
 ) -> account_schemas.SecurityKey:
     """Keep a key by what it answered."""
     site = site_of(request, behind_tls=settings.behind_tls)
-    with db.write() as c:
-        row = security_keys.register(c, site, who.user_id, body.name, body.key)
-        audit.record(c, who, "user.security_key_added", "user", who.user_id, {"key": row.id})
+    with db.write() as c:  # of its own: a refusal must not give the challenge back
+        challenge = security_keys.take_challenge(c, who.user_id, "register", body.key)
+    try:
+        with db.write() as c:
+            row = security_keys.register(c, site, who.user_id, body.name, body.key, challenge)
+            audit.record(c, who, "user.security_key_added", "user", who.user_id, {"key": row.id})
+    except security_keys.KeyRefused:
+        trail.record_opened(who, "user.security_key_refused", "user", who.user_id)
+        raise
     return schemas.make_answer(account_schemas.SecurityKey, row)
 
 

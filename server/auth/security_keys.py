@@ -114,11 +114,40 @@ def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> di
     return _as_tree(options_to_json(options))
 
 
-def register(c: Connection, site: Site, user_id: str, name: str, answer: Mapping[str, Any]) -> Row[Any]:
-    """Keep a key by what it answered; raises KeyRefused 403, Problem 409 beyond MOST_KEYS."""
+def take_challenge(c: Connection, user_id: str, purpose: Purpose, answer: Mapping[str, Any]) -> bytes | None:
+    """The challenge that was answered, if it was given to this account for this and waits; it ends here."""
+    from webauthn import base64url_to_bytes
+
+    try:
+        said = json.loads(base64url_to_bytes(str(answer["response"]["clientDataJSON"])))
+        challenge = base64url_to_bytes(str(said["challenge"]))
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
+    table = security_key_challenge
+    given = (
+        table.c.challenge_sha256 == token_hash(challenge.hex()),
+        table.c.user_id == user_id,
+        table.c.purpose == purpose,
+        table.c.expires_at > now(),
+    )
+    # of two that come at once one deletes the row
+    return challenge if c.execute(delete(table).where(*given)).rowcount else None
+
+
+def register(
+    c: Connection,
+    site: Site,
+    user_id: str,
+    name: str,
+    answer: Mapping[str, Any],
+    challenge: bytes | None,
+) -> Row[Any]:
+    """Keep a key by what it answered to a challenge of `take_challenge`, whose end is written before.
+
+    Raises KeyRefused 403, Problem 409 beyond MOST_KEYS.
+    """
     from webauthn import verify_registration_response
 
-    challenge = _take_challenge(c, user_id, "register", answer)
     if challenge is None or not site.has_keys or not second_factor.is_on(c, user_id):
         raise KeyRefused(403)
     with _refusals(403):
@@ -169,7 +198,7 @@ def use(c: Connection, site: Site, user_id: str, answer: Mapping[str, Any]) -> b
     """Take what a key of this account answered, once (writes)."""
     from webauthn import base64url_to_bytes, verify_authentication_response
 
-    challenge = _take_challenge(c, user_id, "sign_in", answer)
+    challenge = take_challenge(c, user_id, "sign_in", answer)
     if challenge is None:
         return False
     try:
@@ -217,26 +246,6 @@ def _new_challenge(c: Connection, user_id: str, purpose: Purpose) -> bytes:
     row = {"challenge_sha256": token_hash(made.hex()), "user_id": user_id, "purpose": purpose}
     c.execute(insert(table).values(**row, expires_at=at + CHALLENGE_LIFE))
     return made
-
-
-def _take_challenge(c: Connection, user_id: str, purpose: Purpose, answer: Mapping[str, Any]) -> bytes | None:
-    """The challenge that was answered, if it was given to this account for this and waits; it ends here."""
-    from webauthn import base64url_to_bytes
-
-    try:
-        said = json.loads(base64url_to_bytes(str(answer["response"]["clientDataJSON"])))
-        challenge = base64url_to_bytes(str(said["challenge"]))
-    except (ValueError, KeyError, TypeError, RecursionError):
-        return None
-    table = security_key_challenge
-    given = (
-        table.c.challenge_sha256 == token_hash(challenge.hex()),
-        table.c.user_id == user_id,
-        table.c.purpose == purpose,
-        table.c.expires_at > now(),
-    )
-    # of two that come at once one deletes the row
-    return challenge if c.execute(delete(table).where(*given)).rowcount else None
 
 
 @contextlib.contextmanager

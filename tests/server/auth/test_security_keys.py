@@ -252,6 +252,15 @@ async def test_a_key_is_set_up_once_for_one_account_and_one_name(
         {},
     ):
         assert (await client.post(add, json={"name": "x", "key": lie})).status_code == 403
+    async with clinic.client("admin") as admin:
+        rows = (await admin.get(f"{API}/audit")).json()
+    tries = [row for row in rows if row["action"] == "user.security_key_refused"]
+    assert [row["user_name"] for row in tries] == ["clinician"] * 5
+    # a challenge that was answered wrongly is spent
+    options = await ask(client)
+    for at in ("http://evil.example", HERE):
+        body = {"name": "x", "key": SoftKey().create(options, at)}
+        assert (await client.post(add, json=body)).json()["code"] == "key_refused", at
     client.base_url = httpx.URL("http://127.0.0.1")
     refused = await client.post(f"{add}/options", json={"password": PASSWORD})
     assert refused.json()["code"] == "no_keys_here"
