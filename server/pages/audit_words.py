@@ -25,7 +25,7 @@ DEEDS: Final[Mapping[str, str]] = {
     "user.second_factor_on": "set up a second factor",
     "user.second_factor_off": "removed the second factor",
     "user.second_factor_reset": "removed the second factor of an account",
-    "user.recovery_code_used": "signed in with a recovery code",
+    "user.recovery_code_used": "used a recovery code",
     "user.security_key_added": "set up a security key",
     "user.security_key_refused": "tried to set up a security key, which was refused",
     "user.security_key_removed": "removed a security key",
