@@ -67,13 +67,6 @@ class SecurityKey:
     used_at: dt.datetime | None
 
 
-class KeysOnly(Request):
-    """Whether security keys and recovery codes alone are taken, and one's password."""
-
-    on: bool
-    password: Annotated[str, StringConstraints(max_length=1000)]
-
-
 class SetUp(Request):
     """The first administrator."""
 
@@ -108,6 +101,16 @@ class CodeProof(Request):
     """A code of the authenticator, or a recovery code."""
 
     code: Annotated[str, StringConstraints(min_length=1, max_length=40)]
+
+
+class BothProofs(PasswordProof, CodeProof):
+    """One's password and a code: what changes by which keys one signs in."""
+
+
+class KeysOnly(BothProofs):
+    """Whether security keys and recovery codes alone are taken."""
+
+    on: bool
 
 
 class LanguageChoice(Request):

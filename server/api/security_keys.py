@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Request
+from sqlalchemy import Connection
 
 from server import audit
 from server.api import account_schemas, schemas
@@ -34,7 +35,7 @@ def list_keys(db: Db, who: Self) -> list[account_schemas.SecurityKey]:
     "/security-keys/options", response_model=account_schemas.KeyOptions, responses=refusals(409, 429)
 )
 def begin(
-    body: account_schemas.PasswordProof,
+    body: account_schemas.BothProofs,
     request: Request,
     db: Db,
     settings: Config,
@@ -45,7 +46,8 @@ def begin(
     """What the browser needs to set up a key; it is answered within five minutes."""
     accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
     site = site_of(request, behind_tls=settings.behind_tls)
-    with db.write() as c:
+    with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
+        _require_code(c, settings, who, body.code)
         return account_schemas.KeyOptions(security_keys.begin_registration(c, site, who.user_id, who.name))
 
 
@@ -56,29 +58,37 @@ def begin(
     responses=refusals(403, 409),
 )
 def add(
-    body: account_schemas.KeyNew, request: Request, db: Db, settings: Config, who: Self
+    body: account_schemas.KeyNew, request: Request, db: Db, settings: Config, trail: OpenTrail, who: Self
 ) -> account_schemas.SecurityKey:
     """Keep a key by what it answered."""
     site = site_of(request, behind_tls=settings.behind_tls)
-    with db.write() as c:
-        row = security_keys.register(c, site, who.user_id, body.name, body.key)
-        audit.record(c, who, "user.security_key_added", "user", who.user_id, {"key": row.id})
+    with db.write() as c:  # of its own: a refusal must not give the challenge back
+        challenge = security_keys.take_challenge(c, who.user_id, "register", body.key)
+    try:
+        with db.write() as c:
+            row = security_keys.register(c, site, who.user_id, body.name, body.key, challenge)
+            audit.record(c, who, "user.security_key_added", "user", who.user_id, {"key": row.id})
+    except security_keys.KeyRefused:
+        trail.record_opened(who, "user.security_key_refused", "user", who.user_id)
+        raise
     return schemas.make_answer(account_schemas.SecurityKey, row)
 
 
 @router.post("/security-keys/{key_id}/remove", status_code=204, responses=refusals(404, 429))
 def remove(
     key_id: Id,
-    body: account_schemas.PasswordProof,
+    body: account_schemas.BothProofs,
     request: Request,
     db: Db,
+    settings: Config,
     trail: OpenTrail,
     failures: Failures,
     who: Self,
 ) -> None:
     """Forget a key; with the last one the figures of the authenticator are taken again."""
     accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
-    with db.write() as c:
+    with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
+        _require_code(c, settings, who, body.code)
         security_keys.remove(c, who.user_id, key_id)
         audit.record(c, who, "user.security_key_removed", "user", who.user_id, {"key": key_id})
 
@@ -88,14 +98,28 @@ def choose_keys_only(
     body: account_schemas.KeysOnly,
     request: Request,
     db: Db,
+    settings: Config,
     trail: OpenTrail,
     failures: Failures,
     who: Self,
 ) -> None:
     """Take security keys and recovery codes only, or the figures of the authenticator as well."""
     accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
-    with db.write() as c:
+    with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
+        _require_code(c, settings, who, body.code)
         if body.on and not security_keys.list_keys(c, who.user_id):
             raise Problem(409, "no_key", "Set up a security key first.")
         second_factor.take_keys_only(c, who.user_id, body.on)
         audit.record(c, who, "user.keys_only" if body.on else "user.codes_again", "user", who.user_id)
+
+
+def _require_code(c: Connection, settings: Config, who: Identity, code: str) -> None:
+    """After the password: a code, which a browser left open does not have. Raises CodeWrong 403."""
+    if not second_factor.is_on(c, who.user_id):
+        return  # nor has the account a key
+    before = second_factor.count_recovery(c, who.user_id)
+    if not second_factor.use(c, settings.second_factor_key, who.user_id, code):
+        raise second_factor.CodeWrong(403)
+    left = second_factor.count_recovery(c, who.user_id)
+    if left < before:
+        audit.record(c, who, "user.recovery_code_used", "user", who.user_id, {"left": left})

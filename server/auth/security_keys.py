@@ -1,9 +1,10 @@
 """Security keys beside the password (WebAuthn, W3C Level 2): registered, asked for at sign-in, removed.
 
-A key signs a challenge for the name of this host alone, so a page that pretends to be this server gets
-nothing it can use. A challenge is random, of one account and one purpose, has five minutes and one use; the
-database has its hash. Keys stand beside the codes of server/auth/second_factor.py, which come first: whoever
-loses a key gets in by a recovery code.
+A key signs a challenge for the name of this host alone, and is taken only at the port where it was set up:
+a page that pretends to be this server, or another service on its host, gets nothing it can use. A challenge
+is random, of one account and one purpose, has five minutes and one use; the database has its hash. Keys stand
+beside the codes of server/auth/second_factor.py, which come first: whoever loses a key gets in by a recovery
+code.
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ MOST_KEYS: Final = 10
 """Of one account."""
 _MOST_WAITING: Final = 20
 """Challenges of one account at a time; the oldest ends."""
+_LONGEST_ADDRESS: Final = 255
+"""Characters of `security_key.host`."""
 Purpose = Literal["register", "sign_in"]
 
 
@@ -45,10 +48,16 @@ class Site:
     origin: str
 
     @property
+    def address(self) -> str:
+        """Host name and port. Browsers keep keys apart by the name alone; another port is another service."""
+        return self.origin.partition("://")[2]
+
+    @property
     def has_keys(self) -> bool:
         """Whether browsers offer keys here: over HTTPS or on localhost, and for no address in figures."""
         is_figures = ":" in self.host or self.host.replace(".", "").isdigit()
-        return not is_figures and (self.origin.startswith("https:") or self.host == "localhost")
+        is_short = len(self.address) <= _LONGEST_ADDRESS
+        return is_short and not is_figures and (self.origin.startswith("https:") or self.host == "localhost")
 
 
 def site_of(connection: HTTPConnection, *, behind_tls: bool) -> Site:
@@ -105,12 +114,41 @@ def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> di
     return _as_tree(options_to_json(options))
 
 
-def register(c: Connection, site: Site, user_id: str, name: str, answer: Mapping[str, Any]) -> Row[Any]:
-    """Keep a key by what it answered; raises KeyRefused 403, Problem 409 beyond MOST_KEYS."""
+def take_challenge(c: Connection, user_id: str, purpose: Purpose, answer: Mapping[str, Any]) -> bytes | None:
+    """The challenge that was answered, if it was given to this account for this and waits; it ends here."""
+    from webauthn import base64url_to_bytes
+
+    try:
+        said = json.loads(base64url_to_bytes(str(answer["response"]["clientDataJSON"])))
+        challenge = base64url_to_bytes(str(said["challenge"]))
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
+    table = security_key_challenge
+    given = (
+        table.c.challenge_sha256 == token_hash(challenge.hex()),
+        table.c.user_id == user_id,
+        table.c.purpose == purpose,
+        table.c.expires_at > now(),
+    )
+    # of two that come at once one deletes the row
+    return challenge if c.execute(delete(table).where(*given)).rowcount else None
+
+
+def register(
+    c: Connection,
+    site: Site,
+    user_id: str,
+    name: str,
+    answer: Mapping[str, Any],
+    challenge: bytes | None,
+) -> Row[Any]:
+    """Keep a key by what it answered to a challenge of `take_challenge`, whose end is written before.
+
+    Raises KeyRefused 403, Problem 409 beyond MOST_KEYS.
+    """
     from webauthn import verify_registration_response
 
-    challenge = _take_challenge(c, user_id, "register", answer)
-    if challenge is None or not second_factor.is_on(c, user_id):
+    if challenge is None or not site.has_keys or not second_factor.is_on(c, user_id):
         raise KeyRefused(403)
     with _refusals(403):
         made = verify_registration_response(
@@ -128,7 +166,7 @@ def register(c: Connection, site: Site, user_id: str, name: str, answer: Mapping
         "id": new_id(),
         "user_id": user_id,
         "name": name,
-        "host": site.host,
+        "host": site.address,
         "credential_id": made.credential_id,
         "public_key": made.credential_public_key,
         "sign_count": made.sign_count,
@@ -139,11 +177,11 @@ def register(c: Connection, site: Site, user_id: str, name: str, answer: Mapping
 
 
 def begin_sign_in(c: Connection, site: Site, user_id: str) -> dict[str, Any] | None:
-    """What the browser needs to ask a key of this account for; None when it has none under this host name."""
+    """What the browser needs to ask a key of this account for; None when it has none for this address."""
     from webauthn import generate_authentication_options, options_to_json
     from webauthn.helpers.structs import PublicKeyCredentialDescriptor, UserVerificationRequirement
 
-    known = [k for k in list_keys(c, user_id) if k.host == site.host]
+    known = [k for k in list_keys(c, user_id) if k.host == site.address]
     if not known or not second_factor.is_on(c, user_id):
         return None
     options = generate_authentication_options(
@@ -160,7 +198,7 @@ def use(c: Connection, site: Site, user_id: str, answer: Mapping[str, Any]) -> b
     """Take what a key of this account answered, once (writes)."""
     from webauthn import base64url_to_bytes, verify_authentication_response
 
-    challenge = _take_challenge(c, user_id, "sign_in", answer)
+    challenge = take_challenge(c, user_id, "sign_in", answer)
     if challenge is None:
         return False
     try:
@@ -168,7 +206,7 @@ def use(c: Connection, site: Site, user_id: str, answer: Mapping[str, Any]) -> b
             credential_id = base64url_to_bytes(str(answer.get("rawId", "")))
             mine = (security_key.c.user_id == user_id, security_key.c.credential_id == credential_id)
             key = c.execute(select(security_key).where(*mine)).one_or_none()
-            if key is None or key.host != site.host:
+            if key is None or key.host != site.address:
                 return False
             proof = verify_authentication_response(
                 credential=dict(answer),
@@ -208,26 +246,6 @@ def _new_challenge(c: Connection, user_id: str, purpose: Purpose) -> bytes:
     row = {"challenge_sha256": token_hash(made.hex()), "user_id": user_id, "purpose": purpose}
     c.execute(insert(table).values(**row, expires_at=at + CHALLENGE_LIFE))
     return made
-
-
-def _take_challenge(c: Connection, user_id: str, purpose: Purpose, answer: Mapping[str, Any]) -> bytes | None:
-    """The challenge that was answered, if it was given to this account for this and waits; it ends here."""
-    from webauthn import base64url_to_bytes
-
-    try:
-        said = json.loads(base64url_to_bytes(str(answer["response"]["clientDataJSON"])))
-        challenge = base64url_to_bytes(str(said["challenge"]))
-    except (ValueError, KeyError, TypeError, RecursionError):
-        return None
-    table = security_key_challenge
-    given = (
-        table.c.challenge_sha256 == token_hash(challenge.hex()),
-        table.c.user_id == user_id,
-        table.c.purpose == purpose,
-        table.c.expires_at > now(),
-    )
-    # of two that come at once one deletes the row
-    return challenge if c.execute(delete(table).where(*given)).rowcount else None
 
 
 @contextlib.contextmanager

@@ -67,7 +67,7 @@ security_key = Table(
     id_column(),
     reference("user_id", "user"),
     Column("name", String(40), nullable=False),
-    Column("host", String(255), nullable=False),  # the name of this server that the key signs for
+    Column("host", String(255), nullable=False),  # name and port where the key was set up
     Column("credential_id", LargeBinary, nullable=False, unique=True),
     Column("public_key", LargeBinary, nullable=False),
     Column("sign_count", Integer().with_variant(BigInteger(), "postgresql"), nullable=False),

@@ -217,7 +217,8 @@ async def test_nobody_touches_what_opens_the_account_of_another(ward: Ward, role
         assert revoked.status_code == 404
         keys = "/api/v1/account/security-keys"
         assert (await client.get(keys)).json() == []
-        forgotten = await client.post(f"{keys}/{ward.one['key_id']}/remove", json={"password": PASSWORD})
+        proofs = {"password": PASSWORD, "code": "123456"}
+        forgotten = await client.post(f"{keys}/{ward.one['key_id']}/remove", json=proofs)
         assert forgotten.status_code == 404
         if role is not Role.ADMIN:
             taken = await client.delete(f"/api/v1/users/{ward.one['user_id']}/second-factor")

@@ -38,16 +38,17 @@ async def person(clinic: Clinic) -> AsyncIterator[tuple[httpx.AsyncClient, list[
         yield client, codes
 
 
-async def ask(client: httpx.AsyncClient) -> dict[str, Any]:
-    answer = await client.post(f"{API}/account/security-keys/options", json={"password": PASSWORD})
+async def ask(client: httpx.AsyncClient, codes: list[str]) -> dict[str, Any]:
+    proofs = {"password": PASSWORD, "code": codes.pop()}
+    answer = await client.post(f"{API}/account/security-keys/options", json=proofs)
     assert answer.status_code == 200, answer.text
     options: dict[str, Any] = answer.json()["options"]
     return options
 
 
-async def set_up(client: httpx.AsyncClient) -> SoftKey:
+async def set_up(client: httpx.AsyncClient, codes: list[str], at: str = HERE) -> SoftKey:
     key = SoftKey()
-    body = {"name": "blue", "key": key.create(await ask(client), HERE)}
+    body = {"name": "blue", "key": key.create(await ask(client, codes), at)}
     answer = await client.post(f"{API}/account/security-keys", json=body)
     assert answer.status_code == 201, answer.text
     return key
@@ -60,19 +61,19 @@ async def challenge(clinic: Clinic, name: str = "clinician", at: str = HERE) -> 
 
 
 async def sign_in(
-    clinic: Clinic, key: Mapping[str, Any] | None = None, code: str | None = None, name: str = "clinician"
+    clinic: Clinic, key: Mapping[str, Any] | None = None, code: str | None = None, at: str = HERE
 ) -> httpx.Response:
-    body = {"name": name, "password": PASSWORD, "key": key, "code": code}
+    body = {"name": "clinician", "password": PASSWORD, "key": key, "code": code}
     async with clinic.client() as client:
-        client.base_url = httpx.URL(HERE)
+        client.base_url = httpx.URL(at)
         return await client.post(f"{API}/sign-in", json=body)
 
 
 async def test_a_key_takes_the_place_of_the_code(
     clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
 ) -> None:
-    client, _ = person
-    key = await set_up(client)
+    client, codes = person
+    key = await set_up(client, codes)
     assert (await sign_in(clinic)).json()["code"] == "code_needed"
     options = (await challenge(clinic)).json()["options"]
     assert options["rpId"] == "localhost"
@@ -83,10 +84,11 @@ async def test_a_key_takes_the_place_of_the_code(
     assert (listed["name"], listed["host"], bool(listed["used_at"])) == ("blue", "localhost", True)
     assert "blue" in (await client.get("/account")).text
     path = f"{API}/account/security-keys/{listed['id']}/remove"
+    proofs = {"password": PASSWORD, "code": codes.pop()}
     async with clinic.client("viewer") as other:
-        assert (await other.post(path, json={"password": PASSWORD})).status_code == 404
-    assert (await client.post(path, json={"password": "wrong"})).status_code == 403
-    assert (await client.post(path, json={"password": PASSWORD})).status_code == 204
+        assert (await other.post(path, json=proofs)).status_code == 404
+    assert (await client.post(path, json=proofs | {"password": "wrong"})).status_code == 403
+    assert (await client.post(path, json=proofs)).status_code == 204
     assert (await challenge(clinic)).status_code == 404
     async with clinic.client("admin") as admin:
         actions = [row["action"] for row in (await admin.get(f"{API}/audit")).json()]
@@ -96,8 +98,8 @@ async def test_a_key_takes_the_place_of_the_code(
 async def test_what_an_intruder_answers_is_refused(
     clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
 ) -> None:
-    client, _ = person
-    key, stranger = await set_up(client), SoftKey()
+    client, codes = person
+    key, stranger = await set_up(client, codes), SoftKey()
 
     async def given() -> dict[str, Any]:
         options: dict[str, Any] = (await challenge(clinic)).json()["options"]
@@ -128,7 +130,7 @@ async def test_what_an_intruder_answers_is_refused(
         assert (answer.status_code, answer.json()["code"]) == (401, "key_refused"), name
     # a challenge for setting up does not sign in, nor one of another account
     clinic.app.state.throttle = Throttle()
-    options = await ask(client)
+    options = await ask(client, codes)
     assert (await sign_in(clinic, key.get({**options, "rpId": "localhost"}, HERE))).status_code == 401
     # a challenge that was answered wrongly is spent
     options = await given()
@@ -145,11 +147,42 @@ async def test_what_an_intruder_answers_is_refused(
     assert (await sign_in(clinic, key.get(await given(), HERE))).status_code == 401
 
 
+async def test_another_service_on_this_host_gets_nothing_it_can_use(
+    clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
+) -> None:
+    client, codes = person
+    key, there = await set_up(client, codes), "http://localhost:8443"
+    for asked, sent in ((HERE, there), (HERE, HERE)):
+        answer = key.get((await challenge(clinic, at=asked)).json()["options"], there)
+        got = await sign_in(clinic, answer, at=sent)
+        assert (got.status_code, got.json()["code"]) == (401, "key_refused"), (asked, sent)
+    assert (await challenge(clinic, at=there)).status_code == 404
+    # a key set up at that port signs in there, and there alone
+    client.base_url = httpx.URL(there)
+    other = await set_up(client, codes, there)
+    assert [k["host"] for k in (await client.get(f"{API}/account/security-keys")).json()] == [
+        "localhost",
+        "localhost:8443",
+    ]
+    options = (await challenge(clinic, at=there)).json()["options"]
+    assert options["rpId"] == "localhost"
+    assert len(options["allowCredentials"]) == 1
+    assert (await sign_in(clinic, other.get(options, there), at=there)).status_code == 200
+    options = (await challenge(clinic)).json()["options"]
+    assert (await sign_in(clinic, other.get(options, HERE))).status_code == 401
+    # a port nobody could keep is no place for keys
+    client.base_url = httpx.URL(HERE)
+    far = {"Host": f"localhost:{'1' * 300}"}
+    proofs = {"password": PASSWORD, "code": codes.pop()}
+    refused = await client.post(f"{API}/account/security-keys/options", json=proofs, headers=far)
+    assert refused.json()["code"] == "no_keys_here"
+
+
 async def test_of_two_answers_at_once_one_signs_in(
     clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
 ) -> None:
-    client, _ = person
-    key = await set_up(client)
+    client, codes = person
+    key = await set_up(client, codes)
     answer = key.get((await challenge(clinic)).json()["options"], HERE)
     got = await asyncio.gather(*(sign_in(clinic, answer) for _ in range(5)))
     assert sorted(g.status_code for g in got) == [200, 401, 401, 401, 401]
@@ -159,7 +192,7 @@ async def test_guessing_is_counted_as_for_codes(
     clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
 ) -> None:
     client, codes = person
-    await set_up(client)
+    await set_up(client, codes)
     got = [(await sign_in(clinic, {})).status_code for _ in range(11)]
     assert got[-1] == 429
     assert (await sign_in(clinic, code=codes[0])).status_code == 429
@@ -174,10 +207,13 @@ async def test_keys_alone_when_asked_for_and_a_way_back(
 ) -> None:
     client, codes = person
     choose = f"{API}/account/second-factor/keys-only"
-    assert (await client.put(choose, json={"on": True, "password": PASSWORD})).json()["code"] == "no_key"
-    key = await set_up(client)
-    assert (await client.put(choose, json={"on": True, "password": "wrong"})).status_code == 403
-    assert (await client.put(choose, json={"on": True, "password": PASSWORD})).status_code == 204
+    proofs: dict[str, Any] = {"on": True, "password": PASSWORD, "code": codes[-1]}
+    assert (await client.put(choose, json=proofs)).json()["code"] == "no_key"  # the code is not spent
+    key = await set_up(client, codes)
+    proofs["code"] = codes.pop()
+    assert (await client.put(choose, json=proofs | {"password": "wrong"})).status_code == 403
+    assert (await client.put(choose, json=proofs)).status_code == 204
+    assert "One of your recovery codes." in (await client.get("/account")).text
     monkeypatch.setattr(second_factor, "_take_code", lambda *_: True)  # whatever the figures are
     assert (await sign_in(clinic, code="123456")).json()["code"] == "wrong_code"
     assert (
@@ -186,15 +222,44 @@ async def test_keys_alone_when_asked_for_and_a_way_back(
     assert (await sign_in(clinic, code=codes[0])).status_code == 200  # the key is lost
     (listed,) = (await client.get(f"{API}/account/security-keys")).json()
     path = f"{API}/account/security-keys/{listed['id']}/remove"
-    assert (await client.post(path, json={"password": PASSWORD})).status_code == 204
+    proofs = {"password": PASSWORD, "code": codes.pop()}
+    assert (await client.post(path, json=proofs | {"code": "123456"})).json()["code"] == "wrong_code"
+    assert (await client.post(path, json=proofs)).status_code == 204
     assert (await sign_in(clinic, code="123456")).status_code == 200  # without a key figures count again
+
+
+async def test_the_password_alone_changes_no_key(
+    clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
+) -> None:
+    client, codes = person
+    spent = codes[-1]
+    await set_up(client, codes)
+    keys, only = f"{API}/account/security-keys", f"{API}/account/second-factor/keys-only"
+    (listed,) = (await client.get(keys)).json()
+    more: dict[str, Any]
+    for method, path, more in (
+        ("POST", f"{keys}/options", {}),
+        ("POST", f"{keys}/{listed['id']}/remove", {}),
+        ("PUT", only, {"on": True}),
+    ):
+        body = {"password": PASSWORD, **more}
+        assert (await client.request(method, path, json=body)).status_code == 422, path
+        refused = await client.request(method, path, json=body | {"code": spent})
+        assert (refused.status_code, refused.json()["code"]) == (403, "wrong_code"), path
+    assert len((await client.get(keys)).json()) == 1
+    guess = {"password": PASSWORD, "code": "nonsense"}
+    got = [(await client.post(f"{keys}/options", json=guess)).status_code for _ in range(8)]
+    assert got == [403] * 7 + [429]
+    async with clinic.client("admin") as admin:
+        actions = [row["action"] for row in (await admin.get(f"{API}/audit")).json()]
+    assert "user.recovery_code_used" in actions
 
 
 async def test_with_the_second_factor_its_keys_go(
     clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
 ) -> None:
-    client, _ = person
-    key = await set_up(client)
+    client, codes = person
+    key = await set_up(client, codes)
     options = (await challenge(clinic)).json()["options"]
     async with clinic.client("admin") as admin:
         gone = await admin.delete(f"{API}/users/{clinic.user('clinician')}/second-factor")
@@ -210,21 +275,31 @@ async def test_with_the_second_factor_its_keys_go(
 async def test_a_key_is_set_up_once_for_one_account_and_one_name(
     clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
 ) -> None:
-    client, _ = person
-    key, add = await set_up(client), f"{API}/account/security-keys"
+    client, codes = person
+    key, add = await set_up(client, codes), f"{API}/account/security-keys"
     for lie in (
-        key.create(await ask(client), HERE),  # there already
-        SoftKey().create(await ask(client), "http://evil.example"),
-        SoftKey().create(await ask(client), HERE, host="evil.example"),
-        SoftKey().create({**await ask(client), "challenge": "AAAA"}, HERE),
+        key.create(await ask(client, codes), HERE),  # there already
+        SoftKey().create(await ask(client, codes), "http://evil.example"),
+        SoftKey().create(await ask(client, codes), HERE, host="evil.example"),
+        SoftKey().create({**await ask(client, codes), "challenge": "AAAA"}, HERE),
         {},
     ):
         assert (await client.post(add, json={"name": "x", "key": lie})).status_code == 403
+    async with clinic.client("admin") as admin:
+        rows = (await admin.get(f"{API}/audit")).json()
+    tries = [row for row in rows if row["action"] == "user.security_key_refused"]
+    assert [row["user_name"] for row in tries] == ["clinician"] * 5
+    # a challenge that was answered wrongly is spent
+    options = await ask(client, codes)
+    for at in ("http://evil.example", HERE):
+        body = {"name": "x", "key": SoftKey().create(options, at)}
+        assert (await client.post(add, json=body)).json()["code"] == "key_refused", at
     client.base_url = httpx.URL("http://127.0.0.1")
-    refused = await client.post(f"{add}/options", json={"password": PASSWORD})
+    proofs = {"password": PASSWORD, "code": codes.pop()}
+    refused = await client.post(f"{add}/options", json=proofs)
     assert refused.json()["code"] == "no_keys_here"
     assert (await challenge(clinic, at="http://127.0.0.1")).status_code == 404
     async with clinic.client("viewer") as other:
         other.base_url = httpx.URL(HERE)
-        refused = await other.post(f"{add}/options", json={"password": PASSWORD})
+        refused = await other.post(f"{add}/options", json=proofs)
         assert refused.status_code in {401, 409}

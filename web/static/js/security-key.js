@@ -33,7 +33,8 @@ async function run(form, work) {
 }
 
 async function setUp(form) {
-  const { options } = await request("POST", "/api/v1/account/security-keys/options", { password: said(form, "password") });
+  const proofs = { password: said(form, "password"), code: said(form, "code") };
+  const { options } = await request("POST", "/api/v1/account/security-keys/options", proofs);
   const publicKey = PublicKeyCredential.parseCreationOptionsFromJSON(options);
   const made = /** @type {PublicKeyCredential} */ (await navigator.credentials.create({ publicKey }));
   await request("POST", "/api/v1/account/security-keys", { name: said(form, "name"), key: made.toJSON() });
