@@ -25,8 +25,8 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
     Raises
     ------
     SignalError
-        no_mapping, missing_gyro (no usable sensor), duplicate_stream, no_common_clock, sample_rate_too_low,
-        no_overlap, too_short, clock_jump.
+        recording_too_long, no_mapping, missing_gyro (no usable sensor), duplicate_stream, no_common_clock,
+        sample_rate_too_low, no_overlap, too_short, clock_jump.
     """
     params = params or TimelineParams()
     worn = {
@@ -34,11 +34,12 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
         for d, s in recording.segments.items()
         if s is not None and d in recording.streams
     }
-    if not worn and any(recording.segments.get(d) is not None for d in recording.long):
+    too_long = [d for d in recording.long if recording.segments.get(d) is not None]
+    if too_long:  # nor are the others analysed as if it had not been worn
         raise SignalError(
             "recording_too_long",
-            f"The recording is too long for the protocol '{recording.protocol}'. Choose daily life "
-            "(activity), or cut out the walk.",
+            f"The recording of {', '.join(too_long)} is too long for the protocol '{recording.protocol}'. "
+            "Cut out the walk, or choose daily life (activity) for a sensor on the trunk.",
         )
     if not worn:
         raise SignalError(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -81,6 +83,18 @@ def test_another_protocol_says_that_it_is_too_long(recording: Recording) -> None
     )
     with pytest.raises(SignalError, match="too long for the protocol 'walk'") as error:
         synchronise(found)
+    assert error.value.code == "recording_too_long"
+
+
+def test_a_sensor_that_is_too_long_is_not_left_out_beside_a_short_one(recording: Recording) -> None:
+    found = read_recording(
+        [SourceFile.of_bytes("day.parquet", write_recording(recording))], manifest_of({"protocol": "walk"})
+    )
+    ((worn, segment),) = recording.segments.items()
+    short = replace(recording.streams[worn], device_id="short")
+    both = replace(found, streams={"short": short}, segments={worn: segment, "short": "pelvis"})
+    with pytest.raises(SignalError, match=f"{worn} is too long") as error:
+        synchronise(both)
     assert error.value.code == "recording_too_long"
 
 
