@@ -33,6 +33,8 @@ def create_app(settings: Settings) -> FastAPI:
     from server.http.requests import RequestObserver
     from server.lifespan import run_installation
     from server.metrics import RequestMetrics
+    from server.nodes.forwarding import Forwarding
+    from server.nodes.known import KnownNodes
     from server.pages.assets import STATIC, Assets
     from server.pages.routes import ROUTERS
     from server.services.provenance import CODE_VERSION
@@ -52,9 +54,11 @@ def create_app(settings: Settings) -> FastAPI:
             Middleware(RequestObserver, line=settings.log_format == "json", observe=metrics.observe),
             Middleware(Compression),
             Middleware(SecurityHeaders, behind_tls=settings.behind_tls),
+            *([Middleware(KnownNodes)] if settings.node_name else []),
             Middleware(HostGuard, allowed=settings.hosts),
             Middleware(CrossSiteGuard),
             Middleware(BodyLimit),
+            *([Middleware(Forwarding)] if settings.node_name else []),
         ],
     )
     app.state.settings = settings

@@ -1,4 +1,7 @@
-"""What endpoints take from the running application, as typed dependencies."""
+"""What endpoints take from the running application, as typed dependencies.
+
+Asynchronous: for each that is not, FastAPI takes a thread; on a busy machine a page waits for all in turn.
+"""
 
 from __future__ import annotations
 
@@ -23,47 +26,47 @@ from server.storage.db import Database
 from server.trail import AuditTrail
 
 
-def _settings(connection: HTTPConnection) -> Settings:
+async def _settings(connection: HTTPConnection) -> Settings:
     return cast("Settings", connection.app.state.settings)
 
 
-def _db(connection: HTTPConnection) -> Database:
+async def _db(connection: HTTPConnection) -> Database:
     return cast("Database", connection.app.state.db)
 
 
-def _blobs(connection: HTTPConnection) -> BlobStore:
+async def _blobs(connection: HTTPConnection) -> BlobStore:
     return cast("BlobStore", connection.app.state.blobs)
 
 
-def _reviewed(connection: HTTPConnection) -> ReviewedAnalyses:
+async def _reviewed(connection: HTTPConnection) -> ReviewedAnalyses:
     return cast("ReviewedAnalyses", connection.app.state.reviewed)
 
 
-def _logins(connection: HTTPConnection) -> Logins:
+async def _logins(connection: HTTPConnection) -> Logins:
     return cast("Logins", connection.app.state.logins)
 
 
-def _trail(connection: HTTPConnection) -> AuditTrail:
+async def _trail(connection: HTTPConnection) -> AuditTrail:
     return cast("AuditTrail", connection.app.state.trail)
 
 
-def _throttle(connection: HTTPConnection) -> Throttle:
+async def _throttle(connection: HTTPConnection) -> Throttle:
     return cast("Throttle", connection.app.state.throttle)
 
 
-def _queue(connection: HTTPConnection) -> JobQueue:
+async def _queue(connection: HTTPConnection) -> JobQueue:
     return cast("JobQueue", connection.app.state.queue)
 
 
-def _feed(connection: HTTPConnection) -> JobFeed:
+async def _feed(connection: HTTPConnection) -> JobFeed:
     return cast("JobFeed", connection.app.state.feed)
 
 
-def _hub(connection: HTTPConnection) -> Hub:
+async def _hub(connection: HTTPConnection) -> Hub:
     return cast("Hub", connection.app.state.hub)
 
 
-def _films(connection: HTTPConnection) -> FilmIntake:
+async def _films(connection: HTTPConnection) -> FilmIntake:
     return cast("FilmIntake", connection.app.state.films)
 
 
@@ -85,7 +88,7 @@ Id = Annotated[str, Path(pattern=HEX_ID, description="32 hex digits")]
 DeviceId = Annotated[str, Path(pattern=r"^[0-9A-Za-z:-]{2,32}$", description="serial number of a sensor")]
 
 
-def _study_choice(
+async def _study_choice(
     q: Annotated[str, Query(max_length=200, description="part of a patient's code or note")] = "",
     protocol: Annotated[Protocol | Literal[""], Query(description="of the visits; empty = any")] = "",
     since: Annotated[dt.date | Literal[""], Query(description="first day; empty = open")] = "",

@@ -6,23 +6,28 @@ import asyncio
 import contextlib
 import datetime as dt
 import logging
+import os
+import signal
+import time
 from collections.abc import AsyncIterator
 from functools import partial
 
 from fastapi import FastAPI
 
 from server.auth.sessions import Logins
-from server.auth.throttle import Throttle
+from server.auth.throttle import SharedFailures, Throttle
 from server.jobs.feed import JobFeed
 from server.jobs.opening import open_queue
 from server.live.hub import Hub
 from server.metrics import StateCollector
+from server.nodes.registry import Nodes
 from server.processes.supervisor import Workers
 from server.services import custody, erasure
 from server.services.custody import refuse_strangers
 from server.services.films import FilmIntake
 from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
+from server.storage.blob_opening import open_blobs
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.high_water import MarkKeeper
@@ -39,7 +44,12 @@ def _look_after(db: Database, blobs: BlobStore, settings: Settings) -> None:
     with db.read() as c:
         doubted = custody.find_doubt(c, settings)
     if doubted is not None:
-        log.warning("%s No stored file is taken away until `sagittal accept`.", doubted)
+        log.warning("%s No stored file is taken away meanwhile; see `sagittal check`.", doubted)
+
+
+def _end_at_once() -> None:
+    """End without a word more to the disk: another process has this one's files."""
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def _say_workers(app: FastAPI) -> str:
@@ -65,24 +75,28 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     upgrade(settings.database_source, backups=settings.backups)
     db = Database(settings.database_source)
     app.state.db = db
-    app.state.blobs = BlobStore(settings.blobs)
+    app.state.blobs = open_blobs(settings)
     app.state.reviewed = ReviewedAnalyses(app.state.blobs)
     await asyncio.to_thread(_look_after, db, app.state.blobs, settings)
     app.state.trail = AuditTrail(db)
     app.state.queue = open_queue(db, settings.lease_s)
     app.state.feed = JobFeed(db)
-    app.state.throttle = Throttle()
+    app.state.throttle = Throttle(time.time, SharedFailures(db)) if settings.node_name else Throttle()
     app.state.logins = Logins(
         db, dt.timedelta(minutes=settings.idle_minutes), dt.timedelta(hours=settings.absolute_hours)
     )
     keeper = MarkKeeper(db, settings.mark)
     keeper.start()
     app.state.films = FilmIntake(settings, db, app.state.blobs)
-    app.state.hub = Hub(settings, db, app.state.reviewed, app.state.queue)
+    app.state.nodes = Nodes(settings, db, _end_at_once)
+    await asyncio.to_thread(app.state.nodes.start)
+    app.state.hub = Hub(settings, db, app.state.reviewed, app.state.queue, app.state.nodes)
     await app.state.hub.start()
     parts = {"workers": partial(_say_workers, app), "estimators": partial(_say_estimators, app)}
+    if settings.node_name:
+        parts["node"] = app.state.nodes.explain_silence
     app.state.readiness = Readiness(settings, db, app.state.blobs, parts=parts)
-    figures = StateCollector(settings, db, app.state.readiness.checks)
+    figures = StateCollector(settings, db, app.state.readiness.checks, app.state.nodes)
     app.state.metrics.registry.register(figures)
     try:
         async with app.state.trail.run():
@@ -92,5 +106,6 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
         await app.state.hub.stop()
         app.state.films.close()
         app.state.feed.close()
+        await asyncio.to_thread(app.state.nodes.stop)
         await asyncio.to_thread(keeper.stop)
         db.close()

@@ -25,6 +25,7 @@ def _run(command: str, given: dict[str, object]) -> int:
     # numba and the web stack take seconds to import: each command loads only what it needs
     from importlib import import_module
 
+    from core.errors import SagittalError
     from server.processes.compile_cache import share_compile_cache
     from server.processes.memory import share_allocator
     from server.settings import SettingsError, load_settings
@@ -42,6 +43,10 @@ def _run(command: str, given: dict[str, object]) -> int:
         if error.filename is None:
             raise  # of no file: nothing that a person could put right by its name
         sys.stderr.write(f"{error.filename}: {error.strerror}. Check the path, its rights and the disk.\n")
+        return 1
+    except SagittalError as error:
+        detail = getattr(error, "detail", "")
+        sys.stderr.write(f"{error.message}{f' ({detail})' if detail else ''}\n")
         return 1
     except KeyboardInterrupt:
         return 130
@@ -158,7 +163,10 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--seed", type=_whole, default=0)
     for name in ("particles", "iterations", "rounds", "random-rounds"):
         p.add_argument(f"--{name}", type=int, metavar="N", help="of the swarm (default: the thesis')")
-    p = add("check", "Check the database, every stored file by its hash, live logs, trash, the audit chain.")
+    p = add(
+        "check",
+        "Check database, stored files by their hash, live logs, trash, audit chain, encrypted values.",
+    )
     _data_option(p)
     p.add_argument("--head", type=Path, metavar="JSON", help="newest audit row as it was, kept elsewhere")
     p = add("backup", "Write database, stored files and live logs into one file, while the service runs.")
@@ -176,6 +184,11 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--test", action="store_true", help="only try it, in a folder that is removed again")
     p = add("keygen", "Make a key for encrypted backups.")
     p.add_argument("path", type=Path, metavar="FILE")
+    p = add("identity-key", "Make or change the key that encrypts patients' names; make it to keep names.")
+    p.add_argument("what", choices=("make", "change", "discard"), help="discard: list what it does not open")
+    _data_option(p)
+    p.add_argument("--really", action="store_true", help="remove what `discard` lists, for good")
+    p.add_argument("--without-key", action="store_true", help="though the key is not there: lost for good")
     p = add("trash", "List stored files that the database does not know; they stay 30 days.")
     _data_option(p)
     p.add_argument("--restore", action="store_true", help="put back those that the database refers to")
@@ -194,6 +207,7 @@ def _parser() -> argparse.ArgumentParser:
     _data_option(add("accept", "Go on with this database, though it was emptied, put back or exchanged."))
     _data_option(add("migrate", "Bring the database to the schema of this version (after a backup)."))
     _data_option(add("move-database", "Move the database from the data folder's file to PostgreSQL."))
+    _data_option(add("move-blobs", "Move stored files from the data folder into SAGITTAL_BUCKET."))
     add("warm", "Compile the filters now, so that the first analysis does not wait for it.")
     p = add("user", "Add a user, or give one a new password, on the command line.")
     _data_option(p)

@@ -14,6 +14,7 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 from sqlalchemy import func, select
 
+from server.nodes.registry import Nodes
 from server.services import backup_schedule
 from server.settings import Settings
 from server.storage.db import Database
@@ -63,11 +64,13 @@ class StateCollector(Collector):
 
     Parameters
     ----------
-    checks : parts of the installation, each "ok" or what does not work.
+    checks : parts of the installation, each "ok" or what does not work. nodes : the web servers.
     """
 
-    def __init__(self, settings: Settings, db: Database, checks: Callable[[], Mapping[str, str]]) -> None:
-        self._settings, self._db, self._checks = settings, db, checks
+    def __init__(
+        self, settings: Settings, db: Database, checks: Callable[[], Mapping[str, str]], nodes: Nodes
+    ) -> None:
+        self._settings, self._db, self._checks, self._nodes = settings, db, checks, nodes
 
     def collect(self) -> Iterator[Metric]:
         """The figures of this moment."""
@@ -94,6 +97,12 @@ class StateCollector(Collector):
         for part, said in self._checks().items():
             family.add_metric((part,), float(said == "ok"))
         yield family
+        if self._nodes.is_one_of_several:
+            family = GaugeMetricFamily("sagittal_node_up", "1 = this one is heard of", labels=("node",))
+            for node in self._nodes.list_all():
+                if node.beat_at is not None:
+                    family.add_metric((node.name,), float(self._nodes.is_living(node, now())))
+            yield family
         yield from self._backups()
 
     def _backups(self) -> Iterator[Metric]:

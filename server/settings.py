@@ -15,10 +15,15 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from urllib.parse import urlsplit
 
 MB = 1_000_000
+_NODE_NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,31}")
 _CLOCK = re.compile(r"([01]\d|2[0-3]):[0-5]\d")
+_BUCKET = re.compile(r"(s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9_][A-Za-z0-9._-]*)*)?")
+BUCKET_DOMAIN = "s3://name or s3://name/prefix, of letters, digits, '.', '_' and '-'"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
+NODE_ADDRESS_DOMAIN = "http://host:port or https://host:port"
 PROXY_DOMAIN = "addresses or networks of proxies, such as 172.16.0.0/12, and not all of the internet"
 
 
@@ -52,11 +57,17 @@ class Settings:
     backup_dir : folder outside the data folder in which `sagittal serve` keeps backups, "" = it makes none.
     backup_at : when, HH:MM in the machine's own time.
     backup_key : file with the key that encrypts them (`sagittal keygen`), "" = they are not encrypted.
+    identity_key : file with the key that encrypts patients' names (`sagittal identity-key`), "" = in data_dir
     retention_years : patients without a visit for longer are listed on the page System, 0 = none are.
     log_format : "text" for people or "json", one object a line with a line for each request.
     database_url : a PostgreSQL database instead of the file in the data folder, as
         postgresql://user:password@host:port/database; what it leaves out, such as the password, comes from
         where PostgreSQL's own programs have it (PGPASSFILE). "" = the file.
+    bucket : where stored files are instead of in the data folder: s3://name or s3://name/prefix, of any store
+        that speaks S3. Endpoint, region and keys come from the variables that all its programs know
+        (AWS_ENDPOINT_URL, AWS_REGION, AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY). "" = the folder.
+    node_name, node_address : of this web server where several serve one PostgreSQL database: the name is for
+        good and names its folder, the address is where the others reach it. "" = it serves alone.
     task_modules : modules whose import registers kinds of jobs, and what they draw.
     """
 
@@ -82,9 +93,13 @@ class Settings:
     backup_dir: str = ""
     backup_at: str = "02:30"
     backup_key: str = ""
+    identity_key: str = ""
     retention_years: int = 0
     log_format: str = "text"
     database_url: str = field(default="", repr=False)
+    bucket: str = ""
+    node_name: str = ""
+    node_address: str = ""
     task_modules: tuple[str, ...] = ("server.worker.tasks", "server.viewer.recorded_walk")
 
     def __post_init__(self) -> None:
@@ -103,10 +118,13 @@ class Settings:
         _require(0 <= years <= 200, "retention_years", years, "0 to 200 (0 = no list)")
         _require(_CLOCK.fullmatch(self.backup_at) is not None, "backup_at", f"'{self.backup_at}'", "HH:MM")
         _require(self.log_format in {"text", "json"}, "log_format", f"'{self.log_format}'", "text or json")
+        _require(not self.data_dir.is_file(), "data_dir", f"'{self.data_dir}', a file", "a folder")
         if self.database_url and not self.database_url.startswith("postgresql://"):
             # what was given is not repeated: it may hold a password
             raise SettingsError("database_url is no postgresql://user:password@host:port/database.")
-        for name in ("backup_dir", "backup_key"):
+        self._check_node()
+        _require(_BUCKET.fullmatch(self.bucket) is not None, "bucket", f"'{self.bucket}'", BUCKET_DOMAIN)
+        for name in ("backup_dir", "backup_key", "identity_key"):
             path = getattr(self, name)
             _require(not path or Path(path).is_absolute(), name, f"'{path}'", "a path from the root, /…")
         if self.backup_dir and Path(self.backup_dir).resolve().is_relative_to(self.data_dir.resolve()):
@@ -118,6 +136,25 @@ class Settings:
             raise SettingsError(
                 f"host is '{self.host}': patients' data would cross the network unencrypted. Put a TLS proxy "
                 "in front and set SAGITTAL_BEHIND_TLS=1, or listen on 127.0.0.1."
+            )
+
+    def _check_node(self) -> None:
+        name, address = self.node_name, self.node_address
+        if not name and not address:
+            return
+        if not (name and address):
+            raise SettingsError(
+                "Of SAGITTAL_NODE_NAME and SAGITTAL_NODE_ADDRESS one is missing: a web server among several "
+                "needs both, one that serves alone none."
+            )
+        _require(
+            _NODE_NAME.fullmatch(name) is not None, "node_name", f"'{name}'", "a-z, 0-9 and -, at most 32"
+        )
+        _require(_is_origin(address), "node_address", f"'{address}'", NODE_ADDRESS_DOMAIN)
+        if not self.database_url:
+            raise SettingsError(
+                f"node_name is '{name}', but the database is a file, which one web server has for itself. "
+                "Several need PostgreSQL: set SAGITTAL_DATABASE_URL."
             )
 
     @property
@@ -147,13 +184,33 @@ class Settings:
 
     @property
     def blobs(self) -> Path:
-        """Folder of the content-addressed files."""
+        """Folder of the content-addressed files, and of those that are on their way into a bucket."""
         return self.data_dir / "blobs"
 
     @property
+    def nodes(self) -> Path:
+        """Folder with one of each web server that has a name, and the key by which they know each other."""
+        return self.data_dir / "nodes"
+
+    @property
+    def node_folder(self) -> Path:
+        """Where this web server has what no other one may write."""
+        return self.nodes / self.node_name if self.node_name else self.data_dir
+
+    @property
+    def node_key(self) -> Path:
+        """The key by which web servers know each other (server/nodes/passage.py)."""
+        return self.nodes / "key"
+
+    @property
     def live(self) -> Path:
-        """Folder of the logs of live takes that have not become recordings yet."""
-        return self.data_dir / "live"
+        """Folder of this web server's logs of live takes that have not become recordings yet."""
+        return self.node_folder / "live"
+
+    @property
+    def live_folders(self) -> list[Path]:
+        """The same of all web servers; some may not be there."""
+        return [self.data_dir / "live", *sorted(self.nodes.glob("*/live"))]
 
     @property
     def trash(self) -> Path:
@@ -196,9 +253,24 @@ class Settings:
         return self.data_dir / "second-factor.key"
 
     @property
+    def identity_key_file(self) -> Path:
+        """The key that opens names and addresses of patients (storage/field_cipher.py)."""
+        return Path(self.identity_key) if self.identity_key else self.data_dir / "identity.key"
+
+    @property
     def lock(self) -> Path:
-        """The file whose lock says that a server is running on this data folder."""
+        """The file whose lock says that a server is running on this data folder; several share it."""
         return self.data_dir / "server.lock"
+
+    @property
+    def node_lock(self) -> Path:
+        """The same of what one among several web servers has for itself."""
+        return self.node_folder / "server.lock"
+
+    @property
+    def workers_lock(self) -> Path:
+        """The file whose lock all workers of this data folder share; who moves its content has it alone."""
+        return self.data_dir / "workers.lock"
 
     def environment(self) -> dict[str, str]:
         """These settings as environment variables, for a process started by us."""
@@ -260,6 +332,19 @@ def _is_some_network(text: str) -> bool:
     """Whether it names some addresses; were all of them believed, every client could lie about its own."""
     try:
         return ipaddress.ip_network(text).prefixlen > 0
+    except ValueError:
+        return False
+
+
+def _is_origin(text: str) -> bool:
+    try:
+        found = urlsplit(text)
+        return (
+            found.scheme in {"http", "https"}
+            and bool(found.hostname)
+            and (found.port or 0) > 0
+            and (f"{found.scheme}://{found.netloc}" == text and found.username is None)
+        )
     except ValueError:
         return False
 

@@ -105,14 +105,25 @@ class AuditTrail:
         detail: Mapping[str, Any] | None = None,
     ) -> None:
         """Do the same once in QUIET_S for each sign-in, action and resource; raises as `record_opened`."""
-        key = (who.login_id, action, resource_id)
+        self._record_once(who.login_id, _Row(who, action, resource, resource_id, dict(detail or {})))
+
+    def record_tried(self, who: audit.Actor, action: str, resource: str, resource_id: str) -> None:
+        """Write down what somebody could not open, once in QUIET_S for each account, action and resource.
+
+        Never raises for the database: the answer must not tell that there is something.
+        """
+        with contextlib.suppress(SQLAlchemyError):
+            self._record_once(who.user_id, _Row(who, action, resource, resource_id, {}))
+
+    def _record_once(self, by: str, row: _Row) -> None:
+        key = (by, row.action, row.resource_id)
         at = self._clock()
         with self._guard:
             if at - self._watched.get(key, -QUIET_S) < QUIET_S:
                 return
             if len(self._watched) >= _MOST_WATCHED:
                 self._watched = {k: t for k, t in self._watched.items() if at - t < QUIET_S}
-        self.record_opened(who, action, resource, resource_id, detail)
+        self._add(row)
         with self._guard:
             self._watched[key] = at
 

@@ -9,16 +9,15 @@ from typing import Any, Final, TypeVar
 import pytest
 
 from tests.accuracy.report import WRITE
-from tests.data import ENGINE
 
 T = TypeVar("T")
 
 WRITES: Final = WRITE in os.environ
 """Whether figures are written: then every case is run."""
-ON_POSTGRES: Final = os.environ.get(ENGINE) == "postgresql"
-"""The option `--engine`: whether clinics whose test names no engine are on PostgreSQL."""
 
-about_the_file = pytest.mark.skipif(ON_POSTGRES, reason="about the file that SQLite has")
+about_the_file = pytest.mark.skipif(
+    "config.getoption('--engine') == 'postgresql'", reason="about the file that SQLite has"
+)
 
 where_figures_are_written = pytest.mark.skipif(not WRITES, reason="minutes more: run with --write-figures")
 """Figures that cost more than they tell from one change to the next; limits stand in other tests."""

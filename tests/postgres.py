@@ -150,6 +150,11 @@ def stopped_server() -> Iterator[None]:
         server.start()
 
 
+def give_to_server(folder: Path) -> None:
+    """Let the server write into a folder."""
+    _choose_user(folder)
+
+
 def run_sql(statement: str, url: str | None = None) -> list[Any]:
     """Run one statement outside a transaction, in the server's first database if no other is named."""
     import psycopg
@@ -180,11 +185,12 @@ def make_database(*, migrated: bool = True) -> Iterator[str]:
         run_sql(f"DROP DATABASE {name} WITH (FORCE)")
 
 
-def make_lasting_database() -> str:
-    """A migrated database without rows that stays until the server ends."""
-    _migrate_one()
+def make_lasting_database(*, migrated: bool = True) -> str:
+    """A database without rows, or without tables, that stays until the server ends."""
+    if migrated:
+        _migrate_one()
     name = f"lasting_{next(_numbers)}"
-    run_sql(f"CREATE DATABASE {name} TEMPLATE migrated")
+    run_sql(f"CREATE DATABASE {name} TEMPLATE {'migrated' if migrated else 'template0'}")
     return _url_of(name)
 
 

@@ -25,6 +25,7 @@ COMPOSE: dict[str, Any] = yaml.safe_load(TEXT.replace("${SAGITTAL_DOMAIN", "${")
 """With the one variable that a person gives left for `fill`."""
 SERVICES: dict[str, dict[str, Any]] = COMPOSE["services"]
 OURS = {name: service for name, service in SERVICES.items() if service.get("image") == "sagittal"}
+WEB = ("web-a", "web-b")
 DOMAIN = "gait.clinic.example"
 VARIABLES = {"SAGITTAL_HOME"} | {
     f"SAGITTAL_{field.name.upper()}" for field in dataclasses.fields(Settings) if field.name != "data_dir"
@@ -45,11 +46,11 @@ def environment_of(name: str) -> dict[str, str]:
 
 
 def test_one_image_is_web_server_and_worker() -> None:
-    assert set(OURS) == {"web", "worker"}
+    assert set(OURS) == {*WEB, "worker"}
     assert all(service["build"] == "." for service in OURS.values())
 
 
-@pytest.mark.parametrize("name", ["web", "worker"])
+@pytest.mark.parametrize("name", [*WEB, "worker"])
 def test_every_setting_is_one_and_together_they_are_accepted(name: str) -> None:
     environment = environment_of(name)
     assert {key for key in environment if key.startswith("SAGITTAL_")} <= VARIABLES
@@ -59,30 +60,34 @@ def test_every_setting_is_one_and_together_they_are_accepted(name: str) -> None:
     assert any(ipaddress.ip_address("172.18.0.5") in ipaddress.ip_network(one) for one in settings.proxies)
 
 
-@pytest.mark.parametrize("name", ["web", "worker"])
+@pytest.mark.parametrize("name", [*WEB, "worker"])
 def test_every_command_exists(name: str) -> None:
     program, *words = OURS[name].get("command") or json.loads(last("CMD"))
     assert program == "sagittal"
-    assert _parser().parse_args(words).command == {"web": "serve", "worker": "worker"}[name]
+    assert _parser().parse_args(words).command == ("worker" if name == "worker" else "serve")
 
 
 def test_every_volume_secret_and_service_that_is_named_is_declared_and_used() -> None:
-    for kind in ("volumes", "secrets"):
-        named = {str(one).split(":")[0] for service in SERVICES.values() for one in service.get(kind, [])}
+    for kind in ("volumes", "secrets", "configs"):
+        named = {
+            one["source"] if isinstance(one, dict) else str(one).split(":")[0]
+            for service in SERVICES.values()
+            for one in service.get(kind, [])
+        }
         assert named == set(COMPOSE[kind])
     for service in SERVICES.values():
         assert set(service.get("depends_on", ())) <= set(SERVICES)
 
 
 def test_the_database_is_the_one_that_the_url_and_the_password_file_name() -> None:
-    url = make_url(environment_of("web")["SAGITTAL_DATABASE_URL"])
+    url = make_url(environment_of("web-a")["SAGITTAL_DATABASE_URL"])
     made = SERVICES["database"]["environment"]
     assert (url.host, url.username, url.database) == ("database", made["POSTGRES_USER"], made["POSTGRES_DB"])
     assert url.password is None
     line = re.search(r"printf '(.*?):%s", TEXT)
     assert line is not None
     assert line[1] == f"{url.host}:5432:{url.database}:{url.username}"
-    for path in (environment_of("web")["PGPASSFILE"], made["POSTGRES_PASSWORD_FILE"]):
+    for path in (environment_of("web-a")["PGPASSFILE"], made["POSTGRES_PASSWORD_FILE"]):
         assert Path(path).parent == Path("/run/secrets")
         assert Path(path).name in COMPOSE["secrets"]
 
@@ -100,12 +105,24 @@ def test_the_image_has_the_database_driver_and_runs_on_a_disk_it_cannot_write() 
 
 
 def test_the_proxy_reaches_the_port_on_which_the_server_listens() -> None:
-    words = shlex.split(fill(SERVICES["proxy"]["command"]))
-    assert words[words.index("--from") + 1] == DOMAIN
-    host, _, port = words[words.index("--to") + 1].partition(":")
-    settings = load_settings(environment=environment_of(host))
-    assert (settings.host, str(settings.port)) == ("0.0.0.0", port)  # noqa: S104
-    assert port == last("EXPOSE")
+    caddyfile = fill(COMPOSE["configs"]["caddyfile"]["content"])
+    assert caddyfile.split()[0] == DOMAIN
+    found = re.search(r"reverse_proxy (.*) \{", caddyfile)
+    assert found is not None
+    reached = [one.partition(":") for one in found[1].split()]
+    assert [host for host, _, _ in reached] == list(WEB)
+    for host, _, port in reached:
+        settings = load_settings(environment=environment_of(host))
+        assert (settings.host, str(settings.port)) == ("0.0.0.0", port)  # noqa: S104
+        assert port == last("EXPOSE")
+
+
+def test_each_web_server_has_a_name_of_its_own_and_the_address_of_its_service() -> None:
+    nodes = {name: load_settings(environment=environment_of(name)) for name in WEB}
+    assert len({settings.node_name for settings in nodes.values()}) == len(WEB)
+    for name, settings in nodes.items():
+        assert settings.node_address == f"http://{name}:{settings.port}"
+        assert not load_settings(environment=environment_of("worker")).node_name
 
 
 def test_the_server_has_time_to_end() -> None:

@@ -130,6 +130,17 @@ DE: Final = load_catalogue("de")
         ("12.3 ± 0.4", "12,3 ± 0,4"),
         ("0.98 m/s", "0,98 m/s"),
         ("18 Nov 2026", "18.11.2026"),
+        # how a person walks, and how a clock runs
+        ("slow", "langsam"),
+        ("fast", "schnell"),
+        (
+            "Clock runs slow, 12\u202fms over the take, left so",
+            "Uhr läuft zu langsam, 12\u202fms über die Aufnahme, so belassen",
+        ),
+        ("Clock 12\u202fms late, put right", "Uhr 12\u202fms zu spät, richtiggestellt"),
+        ("Right hip, in the pelvis", "Hüfte rechts, im Segment Becken"),
+        ("Left ankle, in the left shank", "Sprunggelenk links, im Segment Unterschenkel links"),
+        ("Gravity reads 2 % more since 23 Nov 2026", "Schwerkraft: 2 % mehr seit 23.11.2026"),
         ("left longer by 0.04 s", "links länger um 0,04 s"),
         ("left shorter by 4.8 points", "links kürzer um 4,8 Punkte"),
         (

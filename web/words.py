@@ -79,7 +79,9 @@ def find_scripted_icons() -> frozenset[str]:
 def used_icons(page: str) -> Markup:
     """The page without the symbols of icons that neither it nor a script shows, a twentieth of a session."""
     kept = find_scripted_icons().union(_SHOWN.findall(page))
-    return Markup(_ICON.sub(lambda icon: icon[0] if icon[1] in kept else "", page))  # noqa: S704
+    symbols, end, rest = str(page).rpartition("</symbol>")
+    fewer = _ICON.sub(lambda icon: icon[0] if icon[1] in kept else "", symbols + end)
+    return Markup(fewer + rest)  # noqa: S704
 
 
 def as_it_is(value: Any) -> Any:

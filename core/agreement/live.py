@@ -24,6 +24,7 @@ from core.agreement.tell_live import take_back, tell_exchange_now, tell_lag_now,
 from core.agreement.terms import find_thinning
 from core.errors import Notice
 from core.frames import Segment
+from core.timeline.columns import find_columns, take_columns
 from core.timeline.live import UniformBlock
 
 STANDING: Final = 2
@@ -57,7 +58,7 @@ class LiveAgreement:
         self._params = params or LiveAgreementParams()
         joints = list_worn_joints(segments)
         self._worn = tuple(s for s in segments if any(s in joint for joint in joints))
-        self._columns = np.array([segments.index(s) for s in self._worn], np.int64)
+        self._columns = find_columns(self._worn, segments)
         self._rate_hz = rate_hz
         self._thin = find_thinning(rate_hz, self._params.agreement.joints)
         chunk_s = self._params.agreement.joints.chunk_s
@@ -122,13 +123,9 @@ class LiveAgreement:
             end = stop
             if self._second_at is not None:
                 end = min(stop, self._second_at + self._second - block.first)
-            k, part = self._columns, slice(start, end)
-            self._last.append(
-                RawSecond(
-                    block.acc[part].take(k, axis=1), block.gyr[part].take(k, axis=1),
-                    block.valid[part].take(k, axis=1),
-                )
-            )  # fmt: skip
+            part = slice(start, end)
+            taken = take_columns(block.acc[part], block.gyr[part], block.valid[part], self._columns)
+            self._last.append(RawSecond(*taken))
             self._held += end - start
             while self._held - len(self._last[0].acc) >= STANDING * self._second:
                 self._held -= len(self._last.popleft().acc)

@@ -9,6 +9,7 @@ stays in, equally in all streams of a kind.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -27,8 +28,15 @@ def sample_times_us(batch: SampleBatch, rate_hz: float) -> Micros:
     """Device clock (n,) of a batch's samples: by its offsets, else evenly by the stream's rate."""
     if batch.offsets_us is not None:
         return batch.t0_us + batch.offsets_us.astype(np.int64)
-    steps: Micros = np.rint(np.arange(len(batch.samples)) * (1e6 / rate_hz)).astype(np.int64)
-    return batch.t0_us + steps
+    return batch.t0_us + _steps_us(len(batch.samples), rate_hz)
+
+
+@lru_cache(maxsize=64)
+def _steps_us(samples: int, rate_hz: float) -> Micros:
+    """Time (n,) since the first of some even samples; batches of a stream have few sizes."""
+    steps: Micros = np.rint(np.arange(samples) * (1e6 / rate_hz)).astype(np.int64)
+    steps.setflags(write=False)
+    return steps
 
 
 @dataclass

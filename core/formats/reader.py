@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -33,7 +34,7 @@ MOST_BYTES: Final = 4.2e9
 half hours of seven sensors, nine of two feet. Half of what a process may use (server/settings.py)."""
 
 MOST_ROWS_ALONE: Final = 2_000_000
-"""More of one sensor is daily life, five and a half hours at 100 Hz: by blocks it needs less memory."""
+"""More of one sensor alone is daily life, five and a half hours at 100 Hz: by blocks it needs less memory."""
 
 
 @dataclass
@@ -79,8 +80,10 @@ def read_recording(
     upload = _Upload()
     manifest = _find_manifest(members, manifest, upload)
     sources = [(member, _describe(member, members, manifest, upload)) for member in members]
-    for member, spec in sources:
-        _take(member, spec, upload)
+    sizes = [_measure(member, spec) for member, spec in sources]
+    sensors = sum(count for _, count in sizes)
+    for (member, spec), (rows, _) in zip(sources, sizes, strict=True):
+        _take(member, spec, upload, long=is_too_long(rows, sensors))
     if not upload.drafts and not upload.stored and not upload.long:
         raise _nothing_readable(upload)
     recording = (
@@ -136,9 +139,24 @@ def _describe(
     return table.spec
 
 
-def _take(member: SourceFile, spec: SourceSpec | None, upload: _Upload) -> None:
+def _measure(member: SourceFile, spec: SourceSpec | None) -> tuple[float, int]:
+    """Rows and sensors of a file that could be read block by block; 0 of others and of damaged ones."""
+    with member.open() as opened:
+        head = opened.read(1 << 16)
+    if cwa.looks_like(head):
+        with suppress(FormatError):
+            stream = cwa.open_long(member.name, member.open)
+            return stream.duration_s * stream.rate_hz, 1
+    elif parquet.looks_like(head):
+        return parquet.count_rows_and_sensors(member)
+    elif spec and spec.columns:
+        return table.estimate_rows(head, member.size), len(spec.columns)
+    return 0.0, 0
+
+
+def _take(member: SourceFile, spec: SourceSpec | None, upload: _Upload, *, long: bool) -> None:
     """Read one file; a file that cannot be read is remembered, it does not stop the others."""
-    if _take_long(member, spec, upload):
+    if _take_long(member, spec, upload, long=long):
         return
     raw = member.read()
     data = raw if parquet.looks_like(raw) or live_reader.looks_like(raw) else text.to_utf8(raw)
@@ -175,16 +193,18 @@ def _take(member: SourceFile, spec: SourceSpec | None, upload: _Upload) -> None:
         upload.problems.append((member.name, e))
 
 
-def _take_long(member: SourceFile, spec: SourceSpec | None, upload: _Upload) -> bool:
-    """Whether a file is too long to hold and was opened to be read block by block; a CWA file always is.
+def _take_long(member: SourceFile, spec: SourceSpec | None, upload: _Upload, *, long: bool) -> bool:
+    """Open a file that is too long to hold, to be read block by block; True when that is all to be done.
 
-    A short CWA file is read as well, so that every protocol can use it.
+    A CWA file is always opened so; a short one is read as well, so that every protocol can use it.
     """
     with member.open() as opened:
-        head = opened.read(1 << 16)
-    long = False
+        head = opened.read(len(cwa.MAGIC))
+    is_cwa = cwa.looks_like(head)
+    if not (is_cwa or long):
+        return False
     try:
-        if cwa.looks_like(head):
+        if is_cwa:
             stream = cwa.open_long(member.name, member.open)
             if stream.device_id in upload.long:
                 raise FormatError(
@@ -194,27 +214,25 @@ def _take_long(member: SourceFile, spec: SourceSpec | None, upload: _Upload) -> 
                     sensor=stream.device_id,
                 )
             upload.long[stream.device_id] = stream
-            long = is_too_long(stream.duration_s * stream.rate_hz, 1)
         elif parquet.looks_like(head):
-            long = is_too_long(*parquet.count_rows_and_sensors(member))
-            if long:
-                upload.stored.append(parquet.open_long(member))
-        elif spec and spec.columns and is_too_long(table.estimate_rows(head, member.size), len(spec.columns)):
-            long = True
+            upload.stored.append(parquet.open_long(member))
+        elif spec:
             upload.long |= table.open_long_table(member, spec)
-        if not long:
-            return False
-        upload.sha256[member.name] = digest_file(member)
+        if long:
+            upload.sha256[member.name] = digest_file(member)
     except ManifestError:
         raise
     except FormatError as e:
         upload.problems.append((member.name, e))
         return True
-    return True
+    return long
 
 
 def is_too_long(rows: float, sensors: int) -> bool:
-    """Whether a recording is too long to be analysed at once; known before any of it is read."""
+    """Whether a file of so many rows is too long to be analysed at once with all sensors of its take.
+
+    Known before any of it is read.
+    """
     if sensors == 1:
         return rows > MOST_ROWS_ALONE
     return rows * (ROW_BYTES + SENSOR_BYTES * sensors) > MOST_BYTES

@@ -40,6 +40,7 @@ from core.parameters.live_stride import LiveStride
 from core.parameters.live_strides import HistoryColumns, LiveStrides
 from core.parameters.spatial import Surface
 from core.rest import index_window
+from core.timeline.columns import find_columns, take_columns
 
 NOT_LIVE: Final = (
     "The sensors that are worn ({}) show no figure while they stream: for one, wear both feet, or the pelvis "
@@ -103,7 +104,7 @@ class LiveChain:
         rate = self.rate_hz = calibrated.recording.rate_hz
         mounted = calibrated.calibration.segments
         self.segments = tuple(s for s in columns if s in mounted)
-        self._columns = np.array([columns.index(s) for s in self.segments], np.int64)
+        self._columns = find_columns(self.segments, columns)
         zero = index_window(calibrated.calibration.zero, rate)
         self.first = calibration.first + zero.start
         self.body = calibration.body
@@ -120,6 +121,9 @@ class LiveChain:
         self._feet = np.array([self.segments.index(f) for f in feet], np.int64)
         self._foot_mounts = [mounted[f] for f in feet]
         self._courses = tuple(s for s in COURSES if s in self.segments)
+        self._course_columns = np.array([self.segments.index(s) for s in self._courses], np.int64)
+        alone, figure = self.estimator.attitudes, self.estimator.segments
+        self._figured = [None if s in alone else figure.index(s) for s in self._courses]
         # a pelvis that carries a sensor tilts as that says, not as a model of the legs wants it
         self._tilting = tuple(s for s in self.estimator.attitudes if s == "pelvis")
         self._angles = AngleKernel.between(self._tilting, self.estimator.segments)
@@ -151,8 +155,7 @@ class LiveChain:
 
     def push(self, acc: Floats, gyr: Floats, valid: Bools) -> ChainOutput:
         """The next samples (T, columns, …) of the axis."""
-        k = self._columns
-        return self._advance(acc.take(k, axis=1), gyr.take(k, axis=1), valid.take(k, axis=1))
+        return self._advance(*take_columns(acc, gyr, valid, self._columns))
 
     def _choose(self, calibration: LiveCalibration) -> LivePoseEstimator:
         """The estimator that the calibrated sensors allow, best first as offline."""
@@ -248,12 +251,11 @@ class LiveChain:
     def _remember(
         self, placed: BodyBlock, turned: Mapping[Segment, Floats], valid: Bools, angles: Floats
     ) -> None:
-        index = {s: i for i, s in enumerate(self.estimator.segments)}
         course = np.empty((len(angles), len(self._courses), 4))
-        course_valid = np.empty(course.shape[:2], np.bool_)
         for i, s in enumerate(self._courses):
-            course[:, i] = turned[s] if s in self.estimator.attitudes else placed.q[:, index[s]]
-            course_valid[:, i] = valid[:, self.segments.index(s)] & np.isfinite(course[:, i, 0])
+            k = self._figured[i]
+            course[:, i] = turned[s] if k is None else placed.q[:, k]
+        course_valid = valid.take(self._course_columns, axis=1) & np.isfinite(course[:, :, 0])
         rows = {
             "angles": angles, "course": course, "course_valid": course_valid, "feet_p": placed.paths.p,
             "feet_q": placed.paths.q, "feet_still": placed.paths.still, "feet_valid": placed.paths.valid,

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,6 +31,21 @@ class _Piece:
     counts: NDArray[np.int64]
 
 
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _count(samples, limit, counts):  # type: ignore[no-untyped-def]
+    """Count (k, 2) of samples (m, k, 9) those that are whole, and those at an end (k, 6) of their range."""
+    counts[:] = 0
+    for i in range(samples.shape[1]):
+        for s in range(samples.shape[0]):
+            whole, full = True, False
+            for c in range(limit.shape[1]):
+                x = samples[s, i, c]
+                whole = whole and np.isfinite(x)
+                full = full or abs(x) >= limit[i, c]
+            counts[i, 0] += whole
+            counts[i, 1] += full
+
+
 class _StreamHealth:
     """The last seconds of one stream."""
 
@@ -40,18 +56,17 @@ class _StreamHealth:
         ) * np.float32(FULL)
         self._pieces: deque[_Piece] = deque()
         self._total = np.zeros((len(info.sensors), 2), np.int64)
+        self._told: list[tuple[object, SensorHealth] | None] = [None] * len(info.sensors)
         self.sent_us: int | None = None
 
     def push(self, batch: SampleBatch) -> None:
         """Take a batch."""
         self.sent_us = batch.sent_us
-        x = batch.samples[:, :, :6]
         step_us = round(1e6 / self.info.rate_hz)
-        last_us = (len(x) - 1) * step_us if batch.offsets_us is None else int(batch.offsets_us[-1])
+        x, offsets_us = batch.samples, batch.offsets_us
+        last_us = (len(x) - 1) * step_us if offsets_us is None else int(offsets_us[-1])
         counts = np.empty(self._total.shape, np.int64)
-        # a sum is not a number where any part of it is not
-        counts[:, 0] = np.isfinite(x.sum(axis=2)).sum(axis=0)
-        counts[:, 1] = (np.abs(x) >= self._limit).any(axis=2).sum(axis=0)
+        _count(x, self._limit, counts)
         end_us = batch.t0_us + last_us + step_us
         self._pieces.append(_Piece(batch.t0_us, end_us, counts))
         self._total += counts
@@ -68,20 +83,28 @@ class _StreamHealth:
         """Health of its sensors."""
         span_s = 1e-6 * (self._pieces[-1].end_us - self._pieces[0].start_us) if self._pieces else 1.0
         expected = max(1.0, span_s * self.info.rate_hz)
-        return [
-            SensorHealth(
-                id=sensor.id,
-                segment=sensor.segment,
-                rate_hz=measured / max(span_s, 1e-6),
-                lost_share=min(1.0, max(0.0, 1.0 - measured / expected)),
-                saturated_share=full / max(1, measured),
-                silent_s=silent_s,
-                still=sensor.segment in still,
-                stuck=sensor.segment in stuck,
-                doubt=None if sensor.segment is None else doubts.get(sensor.segment),
-            )
-            for sensor, (measured, full) in zip(self.info.sensors, self._total.tolist(), strict=True)
-        ]
+        found = []
+        for i, (measured, full) in enumerate(self._total.tolist()):
+            sensor = self.info.sensors[i]
+            segment = sensor.segment
+            doubt = None if segment is None else doubts.get(segment)
+            now = span_s, measured, full, silent_s, segment in still, segment in stuck, doubt
+            before = self._told[i]
+            if before is None or before[0] != now:
+                health = SensorHealth(
+                    id=sensor.id,
+                    segment=segment,
+                    rate_hz=measured / max(span_s, 1e-6),
+                    lost_share=min(1.0, max(0.0, 1.0 - measured / expected)),
+                    saturated_share=full / max(1, measured),
+                    silent_s=silent_s,
+                    still=segment in still,
+                    stuck=segment in stuck,
+                    doubt=doubt,
+                )
+                self._told[i] = before = now, health
+            found.append(before[1])
+        return found
 
 
 class SensorHealthMonitor:

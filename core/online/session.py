@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Any
 
 import numpy as np
 
@@ -118,19 +120,17 @@ class OnlineSession:
         if self._guided is not None:
             strides = [s for x in outcomes for s in x.strides]
             self._guided.push(block, strides, [e for x in outcomes for e in x.events])
-        frame = LiveFrame(
+        resting = [s for s, x in zip(self.segments, rests.tolist(), strict=True) if x]
+        told = {} if self.chain is None or not outcomes else _tell(block, self.chain, outcomes)
+        return LiveFrame(
             t_s=float(block.t_s[-1]),
             seq=batch.seq,
             stage=self._calibrating.stage,
-            health=self._health.read_health(
-                [s for s, x in zip(self.segments, rests, strict=True) if x],
-                self._stuck.now,
-                self._agreement.doubts,
-            ),
+            health=self._health.read_health(resting, self._stuck.now, self._agreement.doubts),
             calibration=self._calibrating.view,
-            notices=tuple(notices),
+            notices=(*notices, *(n for x in outcomes for n in x.notices)) if told else tuple(notices),
+            **told,
         )
-        return frame if self.chain is None or not outcomes else _told(frame, block, self.chain, outcomes)
 
     def compare_sensors(self) -> list[Notice]:
         """What the sensors say about each other of the seconds that the last push completed; takes ms."""
@@ -171,27 +171,23 @@ class OnlineSession:
         return [self.chain.caught_up]
 
 
-def _told(
-    frame: LiveFrame, block: UniformBlock, chain: LiveChain, outcomes: Sequence[ChainOutput]
-) -> LiveFrame:
-    """The frame with what the chain says after the block's last sample."""
+def _tell(block: UniformBlock, chain: LiveChain, outcomes: Sequence[ChainOutput]) -> dict[str, Any]:
+    """What a frame has of the chain after the block's last sample."""
     placed, angles = outcomes[-1].placed, outcomes[-1].angles
     here = min(len(angles), len(block))
-    q, p, known = placed.q[-1], placed.p[-1], placed.known[-1]
-    segments = chain.estimator.segments
-    return replace(
-        frame,
-        method=chain.estimator.method,
-        q={s: q[i] for i, s in enumerate(segments) if known[i]},
-        p={s: p[i] for i, s in enumerate(segments) if known[i] and np.isfinite(p[i, 0])},
-        valid=bool(placed.whole[-1]),
-        contact=dict(chain.contact),
-        angles=dict(zip(chain.names, angles[-1].tolist(), strict=True)),
-        trail=AngleTrail(block.t_s[-here:], chain.names, angles[-here:]) if here else EMPTY_TRAIL,
-        events=tuple(e for x in outcomes for e in x.events),
-        strides=tuple(s for x in outcomes for s in x.strides),
-        notices=(*frame.notices, *(n for x in outcomes for n in x.notices)),
-    )
+    q, p = placed.q[-1], placed.p[-1]
+    known = [(i, s) for i, s in enumerate(chain.estimator.segments) if placed.known[-1, i]]
+    return {
+        "method": chain.estimator.method,
+        "q": {s: q[i] for i, s in known},
+        "p": {s: p[i] for i, s in known if isfinite(p[i, 0])},
+        "valid": bool(placed.whole[-1]),
+        "contact": dict(chain.contact),
+        "angles": dict(zip(chain.names, angles[-1].tolist(), strict=True)),
+        "trail": AngleTrail(block.t_s[-here:], chain.names, angles[-here:]) if here else EMPTY_TRAIL,
+        "events": tuple(e for x in outcomes for e in x.events),
+        "strides": tuple(s for x in outcomes for s in x.strides),
+    }
 
 
 def compile_live_kernels() -> None:

@@ -32,7 +32,11 @@ class StuckSensors:
 
     def push(self, block: UniformBlock) -> tuple[UniformBlock, list[Notice]]:
         """Take the next samples; the same block, invalid where a sensor does not measure, and what is new."""
-        bad, back = self._watch.push(block.acc, block.gyr, block.valid)
+        found = self._watch.push(block.acc, block.gyr, block.valid)
+        if found is None:
+            self.now = ()
+            return replace(block, out=np.zeros(block.valid.shape, np.bool_)), []
+        bad, back = found
         self.now = tuple(s for s, x in zip(self._segments, bad[-1], strict=True) if x)
         notices = []
         for k, i in np.argwhere(back > 0).tolist():

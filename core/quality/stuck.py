@@ -74,7 +74,7 @@ def _watch(  # type: ignore[no-untyped-def]
     acc, gyr, valid, limits, full, now, last, mean, dev, top, count, begun, clip, clip_begun,
     same, others, others_begun, ring, loop, place, kind, channels, bad, back,
 ):  # fmt: skip
-    """Advance the state over a block.
+    """Advance the state over a block; whether a sensor of it does not measure.
 
     Parameters
     ----------
@@ -95,6 +95,7 @@ def _watch(  # type: ignore[no-untyped-def]
     x = np.empty(6)
     equal = np.empty(6, np.bool_)
     moving = np.zeros(n, np.bool_)
+    found = False
     for k in range(T):
         at = now[0] + k
         for i in range(n):
@@ -107,6 +108,7 @@ def _watch(  # type: ignore[no-untyped-def]
             movers += moving[i] and valid[k, i]
         for i in range(n):
             bad[k, i], back[k, i] = kind[i], 0
+            found = found or kind[i] != 0
             if not valid[k, i]:
                 continue
             whole = True
@@ -130,8 +132,9 @@ def _watch(  # type: ignore[no-untyped-def]
                 bad[k, i] = 3
                 back[k, i] = same[i]
             # a whole sensor that repeats its last samples
+            j = place[0] - 1
             for p in range(1, P):
-                j = (place[0] - 1 - p) % P
+                j = j - 1 if j > 0 else j - 1 + P
                 again = True
                 for c in range(6):
                     if x[c] != ring[i, j, c]:
@@ -172,6 +175,7 @@ def _watch(  # type: ignore[no-untyped-def]
                 mean[i, c] += share * (x[c] - mean[i, c])
                 dev[i, c] += share * (abs(x[c] - mean[i, c]) - dev[i, c])
                 last[i, c] = x[c]
+            found = found or bad[k, i] != 0
             if kind[i] != 0:
                 continue
             first = at
@@ -194,8 +198,10 @@ def _watch(  # type: ignore[no-untyped-def]
             if kind[i] != 0:
                 bad[k, i] = kind[i]
                 back[k, i] = at - first
+            found = found or bad[k, i] != 0
         place[0] = (place[0] + 1) % P
     now[0] += T
+    return found
 
 
 class StuckWatch:
@@ -229,21 +235,23 @@ class StuckWatch:
         self._loop, self._place = np.zeros((n, packet), np.int64), np.zeros(1, np.int64)
         self._kind, self._channels = np.zeros(n, np.int64), np.zeros(each, np.bool_)
 
-    def push(self, acc: Floats, gyr: Floats, valid: Bools) -> tuple[Ints, Ints]:
+    def push(self, acc: Floats, gyr: Floats, valid: Bools) -> tuple[Ints, Ints] | None:
         """The fault (T, n) at each sample, 0 = none, and for how many samples before it holds as well (T, n).
+
+        None where there is no fault.
 
         Parameters
         ----------
         acc, gyr : (T, n, 3) m/s², rad/s. valid : (T, n); other samples are passed over.
         """
-        bad, back = np.zeros(valid.shape, np.int64), np.zeros(valid.shape, np.int64)
-        _watch(
+        bad, back = np.empty(valid.shape, np.int64), np.empty(valid.shape, np.int64)
+        found = _watch(
             np.ascontiguousarray(acc), np.ascontiguousarray(gyr), np.ascontiguousarray(valid), self._limits,
             self._full, self._now, self._last, self._mean, self._dev, self._top, self._count, self._begun,
             self._clip, self._clip_begun, self._same, self._others, self._others_begun, self._ring,
             self._loop, self._place, self._kind, self._channels, bad, back,
         )  # fmt: skip
-        return bad, back
+        return (bad, back) if found else None
 
     def describe(self, segment: Segment, sensor: int, kind: int, first_s: float) -> Notice:
         """Say what is wrong with a sensor and since when."""
@@ -314,9 +322,10 @@ def mark_stuck(recording: UniformRecording, params: StuckParams | None = None) -
         return recording
     watch = StuckWatch(len(segments), recording.rate_hz, params)
     acc, gyr = (np.stack(x, axis=1) for x in ([s.acc for s in signals], [s.gyr for s in signals]))
-    bad, back = watch.push(acc, gyr, np.stack([s.valid for s in signals], axis=1))
-    if not bad.any():
+    found = watch.push(acc, gyr, np.stack([s.valid for s in signals], axis=1))
+    if found is None:
         return recording
+    bad, back = found
     sensors, notices = dict(recording.sensors), list(recording.notices)
     for i in np.flatnonzero(bad.any(axis=0)).tolist():
         valid = signals[i].valid.copy()

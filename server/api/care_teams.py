@@ -88,3 +88,12 @@ def open_in_emergency(
         raise
     failures.withdraw(account, address, attempt)
     return opened
+
+
+@router.post("/emergency-accesses/{access_id}/end", response_model=care_teams.EmergencyAccess)
+def end_emergency(
+    access_id: Id, db: Db, who: Annotated[Identity, require(Action.OPEN_IN_EMERGENCY)]
+) -> care_teams.EmergencyAccess:
+    """End one's own access in an emergency now, as administrator anybody's; links made in it end too."""
+    with db.write() as c:
+        return care_teams.end_emergency(c, who, access_id)

@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
 from server import context
-from server.auth.access import require, still_opens
+from server.auth.access import find_end, require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail
@@ -72,7 +72,7 @@ async def watch_job(
             jobs.get(c, job_id)
 
     await run_in_threadpool(check)
-    events = _events(feed, job_id, lambda: still_opens(request))
+    events = _events(feed, job_id, lambda: find_end(request) is None)
     return StreamingResponse(events, media_type="text/event-stream", headers={"X-Accel-Buffering": "no"})
 
 

@@ -30,7 +30,7 @@ async def open_take(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> sch
 
     def write() -> tuple[live.LiveTakeRecord, str]:
         with db.write() as c:
-            return live.open_take(c, who, session_id)
+            return live.open_take(c, who, session_id, hub.owner)
 
     take, code = await run_in_threadpool(write)
     hub.tell_row(take)
@@ -105,7 +105,7 @@ async def pair(
     # counted per address: a stranger cannot keep other tablets out by guessing
     address = address_of(request)
     who = f"pairing from {address}"
-    failures.check(who, address)
+    await run_in_threadpool(failures.check, who, address)
 
     def write() -> tuple[live.TabletAccess, live.LiveTakeRecord]:
         with db.write() as c:
@@ -115,10 +115,10 @@ async def pair(
     try:
         paired, take = await run_in_threadpool(write)
     except live.CodeNotValid:
-        failures.fail(who, address)
+        await run_in_threadpool(failures.fail, who, address)
         await run_in_threadpool(trail.record_refused, "live.pairing_failed", "live", None, address)
         raise
-    failures.succeed(who, address)
+    await run_in_threadpool(failures.succeed, who, address)
     hub.tell_row(take)
     return make_answer(schemas.PairedTablet, paired, socket=SOCKET)
 

@@ -12,17 +12,19 @@ from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, WebSocket
-from starlette.status import WS_1008_POLICY_VIOLATION
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.status import WS_1008_POLICY_VIOLATION, WS_1012_SERVICE_RESTART
 from starlette.websockets import WebSocketDisconnect
 
 from core.errors import SagittalError
-from server.auth.access import require, still_opens
+from server.auth.access import find_end, require, wait_for_end
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.auth.sessions import CHECK_EVERY_S
 from server.context import Id
-from server.live.hub import Hub
+from server.live.hub import MIND_S, Hub
 from server.live.room import BrowserQueue
+from server.nodes.pins import Pin, find_owner
+from server.nodes.registry import Nodes
 from server.services import sessions
 
 router = APIRouter(include_in_schema=False)
@@ -53,15 +55,19 @@ async def feed(ws: WebSocket, sid: Id, who: Annotated[Identity, require(Action.R
     with room.viewing() as viewer:
         viewer.put("state", first)
         tasks = [
+            moved := asyncio.create_task(_until_moved(ws, sid)),
+            over := asyncio.create_task(wait_for_end(lambda: _find_end(ws, hub, sid, who))),
             asyncio.create_task(_down(ws, viewer)),
             asyncio.create_task(_until_gone(ws)),
-            asyncio.create_task(_until_signed_out(ws, hub, sid, who)),
         ]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-            if tasks[2].done():
+            if over.done():
                 with contextlib.suppress(RuntimeError, WebSocketDisconnect):
-                    await ws.close(WS_1008_POLICY_VIOLATION, "not_signed_in")
+                    await ws.close(WS_1008_POLICY_VIOLATION, over.result())
+            elif moved.done():
+                with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+                    await ws.close(WS_1012_SERVICE_RESTART, "moved")
         finally:
             for task in tasks:
                 task.cancel()
@@ -75,17 +81,27 @@ async def _down(ws: WebSocket, viewer: BrowserQueue) -> None:
             await ws.send_text(message.decode())
 
 
+async def _until_moved(ws: WebSocket, sid: str) -> None:
+    """Return when another web server has the session's take: the browser then comes back and is led there."""
+    nodes: Nodes = ws.app.state.nodes
+    while True:
+        await asyncio.sleep(MIND_S)
+        if not nodes.is_one_of_several:
+            continue
+        with contextlib.suppress(SQLAlchemyError):
+            owner = await asyncio.to_thread(find_owner, ws.app.state.db, nodes, Pin("session", sid))
+            if owner is not None and owner.node is not None:
+                return
+
+
 async def _until_gone(ws: WebSocket) -> None:
     while (await ws.receive())["type"] != "websocket.disconnect":
         pass
 
 
-async def _until_signed_out(ws: WebSocket, hub: Hub, sid: str, who: Identity) -> None:
-    logins = ws.app.state.logins
-    while True:
-        await asyncio.sleep(CHECK_EVERY_S)
-        take = hub.take_of(sid)
-        streams = take is not None and take.tablet is not None
-        check = logins.touch if streams else logins.is_open
-        if not await asyncio.to_thread(check, who.login_id) or not await asyncio.to_thread(still_opens, ws):
-            return
+def _find_end(ws: WebSocket, hub: Hub, sid: str, who: Identity) -> str | None:
+    """Why the feed must end; a running live view counts as activity."""
+    take = hub.take_of(sid)
+    if take is not None and take.tablet is not None:
+        ws.app.state.logins.touch(who.login_id)
+    return find_end(ws)

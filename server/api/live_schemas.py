@@ -28,7 +28,8 @@ class TakeAnswer:
     """A live take.
 
     `state` is pairing, open (a tablet has joined), streaming, finished (by the tablet) or closed (here);
-    `problem` finish_mismatch: the tablet counted or hashed otherwise at the end.
+    `problem` finish_mismatch: the tablet counted or hashed otherwise at the end. node_away: the web
+    server that has the take is away.
     """
 
     id: str

@@ -54,22 +54,24 @@ class _CodeDoor:
     def write(self, who: Identity) -> Iterator[Connection]:
         """One writing transaction; raises Problem 429 after too many such codes."""
         account, hidden = f"codes of {who.user_id}", None
+        # counted before it is tried: a burst of guesses cannot pass before the first is counted
+        begun = self._failures.begin(account, self._address)
         try:
             with self._db.write() as c:
-                # writers take turns: a burst of guesses cannot pass before the first is counted
-                self._failures.check(account, self._address)
                 try:
                     yield c
                 except patients.CodeTaken as taken:
                     one = taken.patient_id
                     if one is not None and not may_open(c, who, {"patient_id": one}):
                         hidden = one
-                        self._failures.fail(account, self._address)
                     raise
         except patients.CodeTaken:
             if hidden is not None:
                 self._trail.record_opened(who, "patient.code_refused", "patient", hidden)
             raise
+        finally:
+            if hidden is None:
+                self._failures.withdraw(account, self._address, begun)
 
 
 CodeDoor = Annotated[_CodeDoor, Depends()]
@@ -142,11 +144,13 @@ def export(
     patient_id: Id,
     db: Db,
     blobs: Blobs,
+    settings: Config,
     trail: OpenTrail,
     who: Annotated[Identity, require(Action.EXPORT_PATIENT)],
 ) -> StreamingResponse:
     """Everything that is stored of a patient: rows as JSON, who opened what, and all files."""
-    pieces = patient_export.export_patient(db, blobs, patient_id)
+    key_file = settings.identity_key_file if who.may(Action.READ_IDENTITY) else None
+    pieces = patient_export.export_patient(db, blobs, patient_id, key_file)
     trail.record_opened(who, "patient.exported", "patient", patient_id)
     headers = {"Content-Disposition": write_disposition(f"patient-{patient_id[:8]}.zip")}
     return StreamingResponse(pieces, media_type="application/zip", headers=headers)

@@ -14,6 +14,7 @@ from server.jobs.queue import JobView
 from server.report.behind import StrideValue
 from server.services import report_links
 from server.services.care_teams import REASON, EmergencyAccess, TeamMember
+from server.services.identities import MOST
 from server.services.notes import MOST_CHARACTERS
 from server.services.recordings import RecordedFile, RecordingState
 from server.services.tunings import MOST_OF_SWARM, Scheme
@@ -27,7 +28,8 @@ _JOINERS = "\u200c\u200d"
 
 def _one_line(refused: str) -> str:
     """The pattern of a text that starts and ends with something visible, without control characters."""
-    no = f"\\x00-\\x1f\\x7f{refused}"
+    # up to 9f, as U+0085 is a space here and none in JSON Schema
+    no = f"\\x00-\\x1f\\x7f-\\x9f{refused}"
     return f"^[^\\s{no}]([^{no}]*[^\\s{no}])?$"
 
 
@@ -138,6 +140,16 @@ class EmergencyOpening(Request):
 
     code: Code
     reason: Annotated[str, StringConstraints(min_length=REASON[0], max_length=REASON[1], pattern=_TEXT)]
+
+
+class IdentityChange(Request):
+    """Who a patient is; null takes a value away, what is left out stays as it is."""
+
+    name: Annotated[Line, Field(max_length=MOST["name"])] | None = None
+    born_on: dt.date | None = None
+    record_number: Annotated[Line, Field(max_length=MOST["record_number"])] | None = None
+    insurance_number: Annotated[Line, Field(max_length=MOST["insurance_number"])] | None = None
+    contact: Annotated[str, StringConstraints(max_length=MOST["contact"], pattern=_TEXT)] | None = None
 
 
 class PatientNew(Request):

@@ -85,11 +85,11 @@ def remove(
     failures: Failures,
     who: Self,
 ) -> None:
-    """Forget a key; with the last one the figures of the authenticator are taken again."""
+    """Forget a key; with the last one of this address the figures of the authenticator are taken again."""
     accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
     with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
         _require_code(c, settings, who, body.code)
-        security_keys.remove(c, who.user_id, key_id)
+        security_keys.remove(c, site_of(request, behind_tls=settings.behind_tls), who.user_id, key_id)
         audit.record(c, who, "user.security_key_removed", "user", who.user_id, {"key": key_id})
 
 
@@ -107,8 +107,9 @@ def choose_keys_only(
     accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
     with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
         _require_code(c, settings, who, body.code)
-        if body.on and not security_keys.list_keys(c, who.user_id):
-            raise Problem(409, "no_key", "Set up a security key first.")
+        site = site_of(request, behind_tls=settings.behind_tls)
+        if body.on and not security_keys.list_usable(c, site, who.user_id):
+            raise Problem(409, "no_key", "Set up a security key for this address first.")
         second_factor.take_keys_only(c, who.user_id, body.on)
         audit.record(c, who, "user.keys_only" if body.on else "user.codes_again", "user", who.user_id)
 

@@ -85,19 +85,19 @@ def sign_in(
     row = accounts.check_password(db, failures, trail, body.name, body.password, address)
     key = settings.second_factor_key
     proof = None if body.key is None else (site_of(request, behind_tls=settings.behind_tls), body.key)
-    by_recovery = accounts.check_code(db, key, failures, trail, row.id, body.code, proof, address)
+    factor = accounts.check_code(db, key, failures, trail, row.id, body.code, proof, address)
     try:
         with db.write() as c:
-            if by_recovery:
+            if factor is accounts.Factor.RECOVERY_CODE:
                 left = {"left": second_factor.count_recovery(c, row.id)}
                 audit.record(c, None, "user.recovery_code_used", "user", row.id, left)
-            token = _open(c, logins, row, request, "sign_in")
+            token = _open(c, logins, row, request, "sign_in", {"factor": factor.value})
     except OperationalError as error:
         kept = logins.keep(row.id, read_token(request)) if refusal_of(error) else None
         if kept is None:
             raise
         token = kept
-        trail.record_opened(_identity(row, token), "sign_in", "user", row.id)
+        trail.record_opened(_identity(row, token), "sign_in", "user", row.id, {"factor": factor.value})
     response: Response
     if request.headers.get("content-type", "").startswith(_FORM):
         response = RedirectResponse(local_path(body.next), status_code=303)
@@ -166,7 +166,7 @@ def set_up(
         one_time.use(c, token, "set_up")
         row = accounts.create(c, body.name, body.display_name, Role.ADMIN, hashed)
         audit.record(c, None, "user.set_up", "user", row.id)
-        session = _open(c, logins, row, request, "sign_in")
+        session = _open(c, logins, row, request, "sign_in", {"factor": accounts.Factor.PASSWORD.value})
     response = JSONResponse(_USER.dump_python(user_answer(row), mode="json"), 201)
     set_token(response, request, session)
     return response
@@ -228,7 +228,7 @@ def sign_in_once(token: str, request: Request, db: Db, logins: OpenLogins, trail
     with _told(trail, request), db.write() as c:
         user_id = one_time.use(c, token, "sign_in")
         row = accounts.get(c, user_id or "")
-        session = _open(c, logins, row, request, "sign_in.one_time")
+        session = _open(c, logins, row, request, "sign_in.one_time", {})
     response = RedirectResponse("/patients", status_code=303)
     set_token(response, request, session)
     return response
@@ -242,9 +242,11 @@ def local_path(path: str | None) -> str:
     return path
 
 
-def _open(c: Connection, logins: Logins, row: Row[Any], request: Request, action: str) -> str:
+def _open(
+    c: Connection, logins: Logins, row: Row[Any], request: Request, action: str, detail: dict[str, str]
+) -> str:
     token = logins.start(c, row.id, replaces=read_token(request))
-    audit.record(c, _identity(row, token), action, "user", row.id)
+    audit.record(c, _identity(row, token), action, "user", row.id, detail)
     return token
 
 

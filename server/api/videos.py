@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 from starlette.concurrency import run_in_threadpool
-from starlette.responses import FileResponse
+from starlette.responses import Response, StreamingResponse
 
 from server.api import schemas
 from server.api.documents import refusals
@@ -17,6 +18,7 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Blobs, Config, Db, Id, OpenTrail
 from server.http.json_body import StrictJsonRoute
+from server.http.ranges import answer_range
 from server.services import recordings, videos
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}/video", tags=["sessions"])
@@ -76,14 +78,17 @@ def remove_video(session_id: Id, db: Db, who: Writer) -> None:
 
 @router.get(
     "/content",
-    response_class=FileResponse,
+    response_class=StreamingResponse,
     responses={
         200: {"description": "The video, or the range of it", "content": {"video/*": {"schema": BINARY}}}
     },
 )
-def play_video(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> FileResponse:
+def play_video(
+    request: Request, session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
+) -> Response:
     """The video's bytes; players ask for ranges of it."""
     with db.read() as c:
-        found, path = videos.find_path(c, blobs, session_id)
+        found, space = videos.find_stored(c, blobs, session_id)
     trail.record_watched(who, "video.opened", "session", session_id)
-    return FileResponse(path, media_type=found.media_type)
+    read = partial(blobs.read_part, space, found.sha256)
+    return answer_range(request.headers, found.size, found.sha256, read, found.media_type)

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import asyncio
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from fastapi import Depends
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.requests import HTTPConnection
 
 from server.auth.api_tokens import find_bearer, read_bearer
 from server.auth.cookie import read_token
 from server.auth.identity import Identity
 from server.auth.roles import PUBLIC, Action
-from server.auth.sessions import Logins
-from server.auth.sight import may_open
+from server.auth.sessions import CHECK_EVERY_S, Logins
+from server.auth.sight import list_hidden, may_open
 from server.http.problems import SENTENCES, Problem
 from server.storage.db import Database
+from server.trail import AuditTrail
 
 
 class RouteAccess:
@@ -39,8 +42,19 @@ class RouteAccess:
         if not identity.may(self.action):
             raise Problem(403, "forbidden", SENTENCES["forbidden"])
         if not identity.opens:
+            _note_try(connection, identity)
             raise Problem(404, "not_found", SENTENCES["not_found"])
         return identity
+
+
+def _note_try(connection: HTTPConnection, who: Identity) -> None:
+    """Write down whom somebody outside the care team tried to open; the answer is that of an unknown id."""
+    db: Database = connection.app.state.db
+    trail: AuditTrail = connection.app.state.trail
+    with db.read() as c:
+        hidden = list_hidden(c, who.user_id, connection.path_params)
+    for patient_id in hidden:
+        trail.record_tried(who, "patient.hidden", "patient", patient_id)
 
 
 def require(action: Action) -> Any:
@@ -72,10 +86,31 @@ def opens(connection: HTTPConnection, who: Identity, parts: Mapping[str, str]) -
         return may_open(c, who, parts)
 
 
-def still_opens(connection: HTTPConnection, **parts: str) -> bool:
-    """Whether a sign-in goes on and still opens this, for what stays open; counts as no activity.
+def find_end(connection: HTTPConnection, **parts: str) -> str | None:
+    """Why what stays open must end: not_signed_in, or not_found where a patient may be opened no longer.
 
-    Without `parts`: what the address of the connection names.
+    None while the sign-in goes on and still opens this; asking counts as no activity. Without `parts`: what
+    the address of the connection names.
     """
     who = identify(connection, parts or connection.path_params, counts=False)
-    return who is not None and who.opens
+    if who is None:
+        return "not_signed_in"
+    return None if who.opens else "not_found"
+
+
+async def wait_for_end(find: Callable[[], str | None]) -> str:
+    """Return why what stays open must end, when it must.
+
+    Parameters
+    ----------
+    find : asked in a thread every `CHECK_EVERY_S`, as `find_end`; asked again while the database is away, for
+        nobody can be put out then.
+    """
+    while True:
+        await asyncio.sleep(CHECK_EVERY_S)
+        try:
+            why = await asyncio.to_thread(find)
+        except SQLAlchemyError:
+            continue
+        if why is not None:
+            return why

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -103,6 +104,15 @@ def check_password(
     return row
 
 
+class Factor(StrEnum):
+    """By what somebody signed in, beside the password: nothing, or what was taken as second factor."""
+
+    PASSWORD = "password"  # noqa: S105 - the name of a factor
+    CODE = "code"
+    RECOVERY_CODE = "recovery_code"
+    SECURITY_KEY = "security_key"
+
+
 def check_code(
     db: Database,
     key_file: Path,
@@ -112,12 +122,12 @@ def check_code(
     code: str | None,
     key: tuple[Site, Mapping[str, Any]] | None,
     address: str,
-) -> bool:
+) -> Factor:
     """After the password: require a code, or the answer of a security key, where there is a second factor.
 
     Returns
     -------
-    Whether a recovery code was used.
+    What was taken.
 
     Raises
     ------
@@ -126,7 +136,7 @@ def check_code(
     """
     with db.read() as c:
         if not second_factor.is_on(c, user_id):
-            return False
+            return Factor.PASSWORD
     if key is not None:
         with count_wrong_codes(throttle, user_id):
             with db.write() as c:
@@ -134,7 +144,7 @@ def check_code(
             if not is_right:
                 trail.record_refused("sign_in.failed", "user", user_id, address)
                 raise security_keys.KeyRefused(401)
-        return False
+        return Factor.SECURITY_KEY
     if not (code or "").strip():
         raise second_factor.CodeNeeded
     with count_wrong_codes(throttle, user_id):
@@ -145,7 +155,7 @@ def check_code(
         if not is_right:
             trail.record_refused("sign_in.failed", "user", user_id, address)
             raise second_factor.CodeWrong(401)
-    return after < before
+    return Factor.RECOVERY_CODE if after < before else Factor.CODE
 
 
 @contextlib.contextmanager

@@ -139,10 +139,10 @@ def find_bearer(db: Database, token: str, parts: Mapping[str, str] = NOTHING) ->
         .join(api_token, api_token.c.user_id == user.c.id)
         .where(api_token.c.token_sha256 == token_hash(token), api_token.c.expires_at > at, user.c.active)
     )
-    with db.read() as c:
-        row = c.execute(query).one_or_none()
-    if row is None:
+    found = db.ask(query)
+    if not found:
         return None
+    [row] = found
     if row.used_at is None or row.used_at <= at - _TOUCH_EVERY:
         _write_used(db, row.token_id, at)
     allowed = frozenset[Action]().union(*(SCOPES[Scope(scope)] for scope in row.scopes))

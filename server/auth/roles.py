@@ -35,6 +35,9 @@ class Action(StrEnum):
     """Takes the numbers of many patients along, by pseudonyms."""
     OPEN_IN_EMERGENCY = "open_in_emergency"
     """Opens a patient of another care team for a time, with a reason."""
+    READ_IDENTITY = "read_identity"
+    """Reads the name behind a pseudonym, date of birth and address, and prints them."""
+    WRITE_IDENTITY = "write_identity"
     READ_SESSION = "read_session"
     CREATE_SESSION = "create_session"
     WRITE_SESSION = "write_session"
@@ -93,6 +96,8 @@ POLICY: dict[Action, frozenset[Role]] = {
     Action.EXPORT_PATIENT: _CLINICAL,
     Action.EXPORT_STUDY: _CLINICAL,
     Action.OPEN_IN_EMERGENCY: _CLINICAL,
+    Action.READ_IDENTITY: _CLINICAL,
+    Action.WRITE_IDENTITY: _CLINICAL,
     Action.READ_SESSION: _ALL,
     Action.CREATE_SESSION: _UPLOADERS,
     Action.WRITE_SESSION: _CLINICAL,

@@ -1,12 +1,14 @@
 """A second factor beside the password: a code of six figures that changes every 30 s (TOTP, RFC 6238).
 
 The secret is stored encrypted; its key is a file beside the database, so that a copy of the database alone
-opens nothing. A code is taken once: the newest step that was taken is stored, and only later ones count.
-Recovery codes are stored as hashes and end when used.
+opens nothing. The first secret makes the key; beside secrets a missing key is an error. A code is taken once:
+the newest step that was taken is stored, and only later ones count. Recovery codes are stored as hashes
+and end when used.
 """
 
 from __future__ import annotations
 
+import logging
 import secrets
 import time
 from dataclasses import dataclass
@@ -20,9 +22,11 @@ from sqlalchemy import Connection, delete, insert, select, update
 
 from server.auth.tokens import token_hash
 from server.http.problems import Problem
-from server.storage.archive import ClinicKey, make_key, read_key
+from server.storage.archive import BackupFileError, make_key, read_key
 from server.storage.person_tables import second_factor, security_key, security_key_challenge
 from server.storage.tables import now
+
+log = logging.getLogger(__name__)
 
 STEP_S: Final = 30
 DRIFT: Final = 1
@@ -55,6 +59,18 @@ class CodeWrong(Problem):
         )
 
 
+class KeyOfFactorsUnusable(Problem):
+    """The key that opens the secrets is missing, or is another one."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            503,
+            "second_factor_key_unusable",
+            "The key of second factors is missing or wrong. The operator puts it back. "
+            "A recovery code still works.",
+        )
+
+
 @dataclass(frozen=True)
 class Enrolment:
     """What an authenticator needs: the secret as text, as otpauth address, as picture (data address)."""
@@ -65,12 +81,18 @@ class Enrolment:
 
 
 def begin(c: Connection, key_file: Path, user_id: str, name: str) -> Enrolment:
-    """Make a secret, which counts from the first right code on; raises Problem 409 where one counts."""
+    """Make a secret, which counts from the first right code on.
+
+    Raises
+    ------
+    Problem 409 where one counts; KeyOfFactorsUnusable, of a key that is missing beside secrets too.
+    """
     if is_on(c, user_id):
         raise Problem(409, "second_factor_on", "There is a second factor already. Remove it first.")
     secret = pyotp.random_base32()
     c.execute(delete(second_factor).where(second_factor.c.user_id == user_id))
-    sealed = pyrage.encrypt(secret.encode(), [_key(key_file).public])
+    _make_missing_key(c, key_file)
+    sealed = pyrage.encrypt(secret.encode(), [_read_key(key_file).to_public()])
     c.execute(insert(second_factor).values(user_id=user_id, secret=sealed, recovery=[], last_step=0))
     address = pyotp.TOTP(secret, interval=STEP_S).provisioning_uri(name=name, issuer_name="Sagittal")
     return Enrolment(secret, address, segno.make(address, error="m").png_data_uri(scale=5, border=4))
@@ -141,8 +163,7 @@ def _take_code(c: Connection, key_file: Path, user_id: str, code: str, at_s: flo
     figures = code.replace(" ", "")
     if row is None or not (figures.isascii() and figures.isdigit()):
         return False
-    private = _key(key_file).private
-    totp = pyotp.TOTP(pyrage.decrypt(row.secret, [private]).decode(), interval=STEP_S)
+    totp = pyotp.TOTP(_open(_read_key(key_file), row.secret), interval=STEP_S)
     step = int(time.time() if at_s is None else at_s) // STEP_S
     for one in range(step - DRIFT, step + DRIFT + 1):
         if one > row.last_step and secrets.compare_digest(totp.generate_otp(one), figures):
@@ -167,7 +188,49 @@ def _random_group() -> str:
     return "".join(secrets.choice(_ALPHABET) for _ in range(_GROUP))
 
 
-def _key(path: Path) -> ClinicKey:
-    if not path.exists():
-        make_key(path)
-    return read_key(path)
+def find_problems(c: Connection, key_file: Path) -> list[str]:
+    """Whose secret cannot be read by the key, one sentence each; one alone where the key is not usable."""
+    rows = c.execute(select(second_factor.c.user_id, second_factor.c.secret)).all()
+    if not rows:
+        return []
+    try:
+        key = _read_key(key_file)
+    except KeyOfFactorsUnusable as error:
+        return [f"{key_file}: {error.detail}"]
+    found = []
+    for row in rows:
+        try:
+            _open(key, row.secret)
+        except KeyOfFactorsUnusable:
+            found.append(f"the second factor of account {row.user_id} needs another key than {key_file}")
+    return found
+
+
+def _make_missing_key(c: Connection, path: Path) -> None:
+    """Make the key for the first secret; raises KeyOfFactorsUnusable where there are secrets already."""
+    if path.exists():
+        return
+    if c.execute(select(second_factor.c.user_id).where(second_factor.c.confirmed_at.is_not(None))).first():
+        raise KeyOfFactorsUnusable
+    c.execute(delete(second_factor))  # set up by the lost key and not proved: nobody can prove them
+    make_key(path)
+
+
+def _read_key(path: Path) -> pyrage.x25519.Identity:
+    try:
+        key = read_key(path)
+    except BackupFileError as error:
+        log.error("%s: %s", path, error)
+        raise KeyOfFactorsUnusable from error
+    if key.private is None:
+        log.error("%s holds a public key, which opens nothing", path)
+        raise KeyOfFactorsUnusable
+    return key.private
+
+
+def _open(key: pyrage.x25519.Identity, sealed: bytes) -> str:
+    try:
+        plain: bytes = pyrage.decrypt(sealed, [key])
+        return plain.decode()
+    except pyrage.DecryptError as error:
+        raise KeyOfFactorsUnusable from error

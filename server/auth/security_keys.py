@@ -83,6 +83,11 @@ def list_keys(c: Connection, user_id: str) -> Sequence[Row[Any]]:
     return c.execute(mine.order_by(security_key.c.created_at, security_key.c.id)).all()
 
 
+def list_usable(c: Connection, site: Site, user_id: str) -> Sequence[Row[Any]]:
+    """Of these, those that were set up at this address and sign in here."""
+    return [key for key in list_keys(c, user_id) if site.has_keys and key.host == site.address]
+
+
 def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> dict[str, Any]:
     """What the browser needs to set up a key; raises Problem 409 without a second factor, or beyond ten."""
     from webauthn import generate_registration_options, options_to_json
@@ -181,7 +186,7 @@ def begin_sign_in(c: Connection, site: Site, user_id: str) -> dict[str, Any] | N
     from webauthn import generate_authentication_options, options_to_json
     from webauthn.helpers.structs import PublicKeyCredentialDescriptor, UserVerificationRequirement
 
-    known = [k for k in list_keys(c, user_id) if k.host == site.address]
+    known = list_usable(c, site, user_id)
     if not known or not second_factor.is_on(c, user_id):
         return None
     options = generate_authentication_options(
@@ -226,12 +231,12 @@ def use(c: Connection, site: Site, user_id: str, answer: Mapping[str, Any]) -> b
     return True
 
 
-def remove(c: Connection, user_id: str, key_id: str) -> None:
-    """Forget one key of an account; with the last one codes are taken again. Raises Problem 404."""
+def remove(c: Connection, site: Site, user_id: str, key_id: str) -> None:
+    """Forget one key of an account; with none left for here codes are taken again. Raises Problem 404."""
     mine = (security_key.c.id == key_id, security_key.c.user_id == user_id)
     if not c.execute(delete(security_key).where(*mine)).rowcount:
         raise Problem(404, "key_not_found", "There is no such key; it may have been removed already.")
-    if not list_keys(c, user_id):
+    if not list_usable(c, site, user_id):
         second_factor.take_keys_only(c, user_id, only=False)
 
 

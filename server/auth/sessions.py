@@ -129,10 +129,6 @@ class Logins:
             self._write_seen(login_id, at)
         return identity
 
-    def is_open(self, login_id: str) -> bool:
-        """Tell whether a sign-in goes on, without counting as activity."""
-        return self._open(login_id, self._clock()) is not None
-
     def close(self, login_id: str) -> None:
         """End one sign-in, also on a disk that refuses to be written."""
         try:
@@ -174,10 +170,10 @@ class Logins:
             if kept is None
             else select(user, opens).where(user.c.id == kept.user_id)
         )
-        with self._db.read() as c:
-            person = c.execute(query.where(user.c.active)).one_or_none()
-        if person is None:
+        found = self._db.ask(query.where(user.c.active))
+        if not found:
             return None
+        [person] = found
         login = kept or _Login(person.id, person.last_seen_at, person.expires_at)
         seen = max(login.last_seen_at, self._seen.get(login_id, login.last_seen_at))
         if login.expires_at <= at or seen <= at - self._idle:

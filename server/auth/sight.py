@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
-from sqlalchemy import ColumnElement, Connection, Select, and_, exists, literal, or_, select, true
+from sqlalchemy import ColumnElement, Connection, Row, Select, and_, exists, literal, or_, select, true
 
 from server.auth.identity import Identity
 from server.auth.roles import Role
@@ -60,6 +60,7 @@ OWNER: Final[Mapping[str, _Owner]] = {
         _OF_REPORT.join(report_link, report_link.c.report_id == signed_report.c.id),
         report_link.c.id,
     ),
+    "access_id": (select(emergency_access.c.patient_id), emergency_access.c.id),
     "note_id": (select(patient_note.c.patient_id), patient_note.c.id),
     "consent_id": (select(consent.c.patient_id), consent.c.id),
     "prescription_id": (select(prescription.c.patient_id), prescription.c.id),
@@ -104,6 +105,37 @@ def may_open(c: Connection, who: Identity, parts: Mapping[str, str]) -> bool:
     return bool(c.execute(select(opens_parts(parts)).where(user.c.id == who.user_id)).scalar())
 
 
+def list_hidden(c: Connection, user_id: str, parts: Mapping[str, str]) -> list[str]:
+    """Ids of the patients that parts of an address name and whose team this person is not in."""
+    found: set[str] = set()
+    for name in parts.keys() & OWNER.keys():
+        query, own = OWNER[name]
+        hidden = ~_is_seen(user_id, query.selected_columns[0])
+        found.update(c.execute(query.where(own == parts[name], hidden)).scalars())
+    return sorted(found)
+
+
+def find_emergency(c: Connection, who: Identity | None, patient_id: str) -> Row[Any] | None:
+    """The access in an emergency by which alone a person sees a patient; None = seen without one, or not."""
+    if who is None or who.is_admin or not c.execute(select(TEAMS_ARE_ON)).scalar_one():
+        return None
+    mine = (care_team_member.c.user_id == who.user_id) & (care_team_member.c.patient_id == patient_id)
+    if c.execute(select(care_team_member.c.since).where(mine)).first():
+        return None
+    query = select(emergency_access).where(
+        emergency_access.c.user_id == who.user_id,
+        emergency_access.c.patient_id == patient_id,
+        is_emergency_open(),
+    )
+    return c.execute(query.order_by(emergency_access.c.ends_at.desc()).limit(1)).first()
+
+
+def is_emergency_open() -> ColumnElement[bool]:
+    """Whether an access in an emergency goes on, as a condition of a statement."""
+    at = literal(now(), emergency_access.c.ends_at.type)
+    return emergency_access.c.ended_at.is_(None) & (emergency_access.c.ends_at > at)
+
+
 def opens_parts(parts: Mapping[str, str]) -> ColumnElement[bool]:
     """The same as a column of a statement over `user`: the one that tells who asks answers this too."""
     named = [(OWNER[name], value) for name, value in parts.items() if name in OWNER]
@@ -117,10 +149,9 @@ def opens_parts(parts: Mapping[str, str]) -> ColumnElement[bool]:
 
 
 def _is_seen(user_id: str | ColumnElement[str], patient_id: ColumnElement[str]) -> ColumnElement[bool]:
-    at = literal(now(), emergency_access.c.ends_at.type)
     member = select(care_team_member.c.patient_id).where(care_team_member.c.user_id == user_id)
     opened = select(emergency_access.c.patient_id).where(
-        emergency_access.c.user_id == user_id, emergency_access.c.ends_at > at
+        emergency_access.c.user_id == user_id, is_emergency_open()
     )
     return or_(
         patient_id.in_(member.correlate_except(care_team_member)),

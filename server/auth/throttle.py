@@ -1,13 +1,25 @@
-"""Counts failed sign-ins per account and per address, so that guessing a password takes years."""
+"""Counts failed sign-ins per account and per address, so that guessing a password takes years.
+
+One web server counts in memory; several count together, in the database.
+"""
 
 from __future__ import annotations
 
+import datetime as dt
 import threading
 import time
 from collections import defaultdict, deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Protocol, TypeVar
+
+from sqlalchemy import ColumnElement, Connection, and_, delete, insert, select
+from sqlalchemy.exc import OperationalError
 
 from server.http.problems import Problem
+from server.storage.db import Database
+from server.storage.node_tables import failed_attempt
+from server.storage.refusal import refusal_of
+from server.storage.tables import new_id
 
 WINDOW_S = 15 * 60.0
 MAX_PER_PAIR = 10
@@ -20,43 +32,98 @@ _MAX_KEYS = 10_000
 
 
 Key = tuple[str | None, str | None]
+Found = TypeVar("Found")
+
+
+class FailureTimes(Protocol):
+    """When what failed, by key."""
+
+    def list_times(self, key: Key) -> Sequence[float]:
+        """Times of a key, the oldest first."""
+
+    def add(self, key: Key, at: float) -> None:
+        """Note a failure."""
+
+    def remove(self, key: Key, at: float) -> None:
+        """Take one back; one that is not there is fine."""
+
+    def clear(self, key: Key) -> None:
+        """Forget those of a key."""
+
+    def clear_account(self, account: str) -> None:
+        """Forget those of an account, from wherever they came."""
+
+    def forget(self, before: float) -> None:
+        """Forget old ones, now or later."""
+
+
+class FailureStore(Protocol):
+    """Where they are kept."""
+
+    def work(self, do: Callable[[FailureTimes], Found]) -> Found:
+        """Call `do` while nobody else reads or writes them, and return what it returns."""
+
+    def look(self, do: Callable[[FailureTimes], Found]) -> Found:
+        """The same for what only reads."""
 
 
 class Throttle:
-    """Sliding window over failures; in memory, because one process serves the web."""
+    """Sliding window over failures.
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+    Parameters
+    ----------
+    clock : seconds; of all web servers the same where they count together.
+    """
+
+    def __init__(
+        self, clock: Callable[[], float] = time.monotonic, store: FailureStore | None = None
+    ) -> None:
         self._clock = clock
-        self._lock = threading.Lock()
-        self._failures: defaultdict[Key, deque[float]] = defaultdict(deque)
+        self._store: FailureStore = FailuresInMemory() if store is None else store
 
     def begin(self, account: str, address: str) -> float:
         """Check, and count this attempt as a failure before the password is looked at; returns its time.
 
         A burst of guesses cannot all pass before the first of them has failed.
         """
-        with self._lock:
-            self._require(account, address)
-            return self._count(account, address)
+
+        # who is stopped already costs others no turn
+        self.check(account, address)
+
+        def do(times: FailureTimes) -> float:
+            self._require(times, account, address)
+            return self._count(times, account, address)
+
+        return self._store.work(do)
 
     def withdraw(self, account: str, address: str, at: float) -> None:
         """Take back an attempt that `begin` counted: it was right, or nobody could look at it."""
-        with self._lock:
+
+        def do(times: FailureTimes) -> None:
             for key in _keys(account, address):
-                times = self._failures.get(key)
-                if times is not None and at in times:
-                    times.remove(at)
-                    if not times:
-                        del self._failures[key]
+                times.remove(key, at)
+
+        self._store.work(do)
 
     def check(self, account: str, address: str) -> None:
         """Raise Problem 429 with Retry-After while one of the two has failed too often."""
-        with self._lock:
-            self._require(account, address)
+        self._store.look(lambda times: self._require(times, account, address))
 
-    def _require(self, account: str, address: str) -> None:
+    def fail(self, account: str, address: str) -> None:
+        """Count one failure of this account from this address."""
+        self._store.work(lambda times: self._count(times, account, address))
+
+    def succeed(self, account: str, address: str) -> None:
+        """Forget the failures of somebody who mistyped a few times and has now signed in."""
+        self._store.work(lambda times: times.clear((account, address)))
+
+    def forgive(self, account: str) -> None:
+        """Forget all failures of an account: an administrator has given it a new password."""
+        self._store.work(lambda times: times.clear_account(account))
+
+    def _require(self, times: FailureTimes, account: str, address: str) -> None:
         now = self._clock()
-        wait = max(self._wait(key, limit, now) for key, limit in _keys(account, address).items())
+        wait = max(_wait(times.list_times(key), limit, now) for key, limit in _keys(account, address).items())
         if wait > 0:
             seconds = int(wait) + 1
             minutes = -(-seconds // 60)
@@ -67,44 +134,125 @@ class Throttle:
                 headers={"Retry-After": str(seconds)},
             )
 
-    def fail(self, account: str, address: str) -> None:
-        """Count one failure of this account from this address."""
-        with self._lock:
-            self._count(account, address)
-
-    def _count(self, account: str, address: str) -> float:
+    def _count(self, times: FailureTimes, account: str, address: str) -> float:
         now = self._clock()
-        if len(self._failures) > _MAX_KEYS:
-            self._forget(now)
+        times.forget(now - WINDOW_S)
         for key in _keys(account, address):
-            self._failures[key].append(now)
+            times.add(key, now)
         return now
 
-    def succeed(self, account: str, address: str) -> None:
-        """Forget the failures of somebody who mistyped a few times and has now signed in."""
-        with self._lock:
-            self._failures.pop((account, address), None)
 
-    def forgive(self, account: str) -> None:
-        """Forget all failures of an account: an administrator has given it a new password."""
+class FailuresInMemory:
+    """Those of one process."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._failures: defaultdict[Key, deque[float]] = defaultdict(deque)
+
+    def work(self, do: Callable[[FailureTimes], Found]) -> Found:
+        """See FailureStore."""
         with self._lock:
-            for key in [k for k in self._failures if k[0] == account]:
+            return do(self)
+
+    look = work
+
+    def list_times(self, key: Key) -> Sequence[float]:
+        """See FailureTimes."""
+        return self._failures.get(key, ())
+
+    def add(self, key: Key, at: float) -> None:
+        """See FailureTimes."""
+        self._failures[key].append(at)
+
+    def remove(self, key: Key, at: float) -> None:
+        """See FailureTimes."""
+        times = self._failures.get(key)
+        if times is not None and at in times:
+            times.remove(at)
+            if not times:
                 del self._failures[key]
 
-    def _wait(self, key: Key, limit: int, now: float) -> float:
-        failures = self._failures.get(key)
-        if failures is None:
-            return 0.0
-        while failures and failures[0] <= now - WINDOW_S:
-            failures.popleft()
-        if not failures:
-            del self._failures[key]
-            return 0.0
-        return failures[-limit] + WINDOW_S - now if len(failures) >= limit else 0.0
+    def clear(self, key: Key) -> None:
+        """See FailureTimes."""
+        self._failures.pop(key, None)
 
-    def _forget(self, now: float) -> None:
-        for key in [k for k, times in self._failures.items() if times[-1] <= now - WINDOW_S]:
+    def clear_account(self, account: str) -> None:
+        """See FailureTimes."""
+        for key in [k for k in self._failures if k[0] == account]:
             del self._failures[key]
+
+    def forget(self, before: float) -> None:
+        """See FailureTimes; when there are many."""
+        if len(self._failures) > _MAX_KEYS:
+            for key in [k for k, times in self._failures.items() if times[-1] <= before]:
+                del self._failures[key]
+
+
+class SharedFailures:
+    """Those of all web servers, in the database; in memory while its disk refuses to be written."""
+
+    def __init__(self, db: Database) -> None:
+        self._db, self._memory = db, FailuresInMemory()
+
+    def work(self, do: Callable[[FailureTimes], Found]) -> Found:
+        """See FailureStore."""
+        try:
+            with self._db.write() as c:
+                return do(_FailureRows(c))
+        except OperationalError as error:
+            if refusal_of(error) is None:
+                raise
+            return self._memory.work(do)
+
+    def look(self, do: Callable[[FailureTimes], Found]) -> Found:
+        """See FailureStore; those that wait in memory count too."""
+        self._memory.work(do)
+        with self._db.read() as c:
+            return do(_FailureRows(c))
+
+
+class _FailureRows:
+    """Those of one transaction."""
+
+    def __init__(self, c: Connection) -> None:
+        self._c = c
+
+    def list_times(self, key: Key) -> Sequence[float]:
+        query = select(failed_attempt.c.at).where(_is(key)).order_by(failed_attempt.c.at)
+        return [at.timestamp() for at in self._c.execute(query).scalars()]
+
+    def add(self, key: Key, at: float) -> None:
+        account, address = key
+        row = {"id": new_id(), "account": account, "address": address, "at": _moment(at)}
+        self._c.execute(insert(failed_attempt).values(row))
+
+    def remove(self, key: Key, at: float) -> None:
+        query = select(failed_attempt.c.id).where(_is(key), failed_attempt.c.at == _moment(at)).limit(1)
+        self._c.execute(delete(failed_attempt).where(failed_attempt.c.id.in_(query.scalar_subquery())))
+
+    def clear(self, key: Key) -> None:
+        self._c.execute(delete(failed_attempt).where(_is(key)))
+
+    def clear_account(self, account: str) -> None:
+        self._c.execute(delete(failed_attempt).where(failed_attempt.c.account == account))
+
+    def forget(self, before: float) -> None:
+        self._c.execute(delete(failed_attempt).where(failed_attempt.c.at <= _moment(before)))
+
+
+def _is(key: Key) -> ColumnElement[bool]:
+    account, address = key
+    return and_(failed_attempt.c.account == account, failed_attempt.c.address == address)
+
+
+def _moment(at: float) -> dt.datetime:
+    return dt.datetime.fromtimestamp(at, dt.UTC)
+
+
+def _wait(times: Sequence[float], limit: int, now: float) -> float:
+    """Seconds until fewer than `limit` of these failures are within the window."""
+    failures = [at for at in times if at > now - WINDOW_S]
+    return failures[-limit] + WINDOW_S - now if len(failures) >= limit else 0.0
 
 
 def _keys(account: str, address: str) -> dict[Key, int]:

@@ -12,11 +12,18 @@ from server.settings import load_settings
 def accept(data_dir: Path | None) -> int:
     """Trust the database from now on; 1 when it cannot be used."""
     from server.services import custody
+    from server.storage.blob_opening import open_blobs
     from server.storage.db import Database
-    from server.storage.migrate import MigrationError, upgrade
+    from server.storage.migrate import MigrationError, require_database, upgrade
 
     settings = load_settings({"data_dir": data_dir})
     try:
+        try:
+            custody.refuse_strangers(settings)
+        except custody.StrangersError:
+            pass  # a new beginning beside what another database knew
+        else:
+            require_database(settings.database_source)
         upgrade(settings.database_source, backups=settings.backups)
     except MigrationError as error:
         sys.stderr.write(f"{error}\n")
@@ -28,7 +35,7 @@ def accept(data_dir: Path | None) -> int:
     else:
         sys.stdout.write(
             f"{doubted}\nIt is the right one from now on. Stored files that it does not know go to "
-            f"{settings.trash} and stay 30 days; live logs stay in {settings.live}.\n"
+            f"{open_blobs(settings).trash.place} and stay 30 days; live logs stay in {settings.live}.\n"
         )
     sys.stdout.flush()
     return 0

@@ -33,7 +33,7 @@ def _list(settings: Settings) -> int:
     from server.storage.db import Database
 
     with closing(Database(settings.database_source)) as db, db.read() as c:
-        strangers = [log for log in live_logs.list_logs(c, settings.live) if not log.known]
+        strangers = [log for log in live_logs.list_logs(c, settings) if not log.known]
     for log in strangers:
         sys.stdout.write(f"{log.take_id}  {log.words}\n")
     sys.stdout.write(
@@ -48,12 +48,12 @@ def _list(settings: Settings) -> int:
 def _adopt(settings: Settings, take: str, session: str) -> int:
     from server.jobs.opening import open_queue
     from server.services import live_logs
-    from server.storage.blobs import BlobStore
+    from server.storage.blob_opening import open_blobs
     from server.storage.db import Database
 
     with closing(Database(settings.database_source)) as db:
         queue = open_queue(db, settings.lease_s)
-        live_logs.adopt(db, BlobStore(settings.blobs), settings, queue, None, take, session)
+        live_logs.adopt(db, open_blobs(settings), settings, queue, None, take, session)
     sys.stdout.write(f"It is the newest recording of /sessions/{session} now and will be analysed.\n")
     sys.stdout.flush()
     return 0

@@ -15,13 +15,10 @@ def backup(data_dir: Path | None, target: Path, key: Path | None, prune: bool) -
     from server.services.tombstones import TombstoneError
     from server.storage.archive import BackupFileError, read_key
     from server.storage.db import Database
-    from server.storage.migrate import MigrationError, exists, require_current
+    from server.storage.migrate import MigrationError, require_current
 
     settings = load_settings({"data_dir": data_dir})
     try:
-        if not exists(settings.database_source):
-            sys.stderr.write(f"There is no database in {settings.data_dir}; give the folder with --data.\n")
-            return 1
         require_current(settings.database_source)
         clinic_key = None if key is None else read_key(key)
         with closing(Database(settings.database_source)) as db:
@@ -32,6 +29,11 @@ def backup(data_dir: Path | None, target: Path, key: Path | None, prune: bool) -
         return 1
     head = "none" if made.head is None else f"{made.head.seq}:{made.head.hash}"
     sys.stdout.write(f"{made.path}: {made.files} files, {made.size} bytes, audit head {head}\n")
+    if made.left_out is not None:
+        sys.stdout.write(
+            f"The key of patients' names, {made.left_out}, is not in it: it is not encrypted (--key), or "
+            "the key cannot be read. Keep a copy of the key elsewhere.\n"
+        )
     for path in gone:
         sys.stdout.write(f"removed {path}\n")
     sys.stdout.flush()

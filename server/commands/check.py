@@ -10,26 +10,23 @@ from server.settings import load_settings
 
 
 def check(data_dir: Path | None, head: Path | None = None) -> int:
-    """Check database, stored files, live logs, trash and audit chain; 1 when something is wrong.
+    """Check database, stored files, live logs, trash, audit chain, encrypted values; 1 if something is wrong.
 
     `head`: a file of the audit log's newest row as it once was, kept elsewhere.
     """
     from server.services import checks
-    from server.storage.blobs import BlobStore
+    from server.storage.blob_opening import open_blobs
     from server.storage.db import Database
-    from server.storage.migrate import MigrationError, exists, require_current
+    from server.storage.migrate import MigrationError, require_current
 
     settings = load_settings({"data_dir": data_dir})
     try:
-        if not exists(settings.database_source):
-            sys.stderr.write(f"There is no database in {settings.data_dir}; give the folder with --data.\n")
-            return 1
         require_current(settings.database_source)
     except MigrationError as error:
         sys.stderr.write(f"{error}\n")
         return 1
     with closing(Database(settings.database_source)) as db:
-        findings = checks.check(db, BlobStore(settings.blobs), settings, kept_head=head)
+        findings = checks.check(db, open_blobs(settings), settings, kept_head=head)
     for finding in findings:
         sys.stdout.write(f"{finding.area}: {finding.message}\n")
     sys.stdout.write(f"{len(findings)} problems in {settings.data_dir}\n" if findings else "All is well.\n")

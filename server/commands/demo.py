@@ -36,6 +36,7 @@ def demo(port: int | None) -> int:
                 "port": port or 0,
                 "workers": DEMO_WORKERS,
                 "database_url": "",  # nor may they come among its patients
+                "bucket": "",
                 "backup_dir": "",  # the clinic's own backups must not be pushed out by simulated ones
             }
         )

@@ -10,10 +10,11 @@ from server.settings import load_settings
 
 def migrate(data_dir: Path | None) -> int:
     """Upgrade the database in one transaction, after a backup; 1 when it belongs to a newer version."""
-    from server.storage.migrate import MigrationError, upgrade
+    from server.storage.migrate import MigrationError, require_database, upgrade
 
     settings = load_settings({"data_dir": data_dir})
     try:
+        require_database(settings.database_source)
         backup = upgrade(settings.database_source, backups=settings.backups)
     except MigrationError as error:
         sys.stderr.write(f"{error}\n")

@@ -25,8 +25,8 @@ def move_database(data_dir: Path | None) -> int:
             raise MigrationError(f"There is no {settings.database}; give the folder with --data.")
         if aside.exists():
             raise MigrationError(f"{aside} exists already; put it elsewhere first.")
-        lock = fs.Lock(settings.lock, "a move to PostgreSQL")
-        try:
+        holder = "a move to PostgreSQL"
+        with fs.Lock(settings.lock, holder), fs.Lock(settings.workers_lock, holder):
             require_current(settings.database)
             copy_database(settings.database, settings.database_source)
             with closing(Database(settings.database_source)) as db, db.read() as c:
@@ -38,8 +38,6 @@ def move_database(data_dir: Path | None) -> int:
             fs.make_folder(settings.backups)
             fs.move_file(settings.database, aside)
             fs.sync_folder(settings.data_dir)
-        finally:
-            lock.release()
     except fs.LockedError as error:
         sys.stderr.write(f"{settings.data_dir} is in use by {error.holder}; stop it first.\n")
         return 1

@@ -30,20 +30,20 @@ def research(
     from core.errors import SagittalError
     from server.services import deidentified
     from server.storage import fs
-    from server.storage.blobs import BlobStore
+    from server.storage.blob_opening import open_blobs
     from server.storage.db import Database
     from server.storage.migrate import MigrationError, require_current
 
     settings = load_settings({"data_dir": data_dir})
     try:
-        require_current(settings.database)
+        require_current(settings.database_source)
         if out is None and who is None:
             raise SagittalError("nothing_asked", "Name the zip to write, or a pseudonym with --who.")
         is_new = not key.exists()
         if who is not None and is_new:
             raise SagittalError("no_key", f"{key} is not there; give the key of the pseudonym.")
         secret = deidentified.open_key(key)
-        with closing(Database(settings.database)) as db:
+        with closing(Database(settings.database_source)) as db:
             with db.read() as c:
                 if who is not None:
                     found = deidentified.find_person(c, secret, who)
@@ -57,7 +57,7 @@ def research(
             fs.make_folder(target.parent)
             with fs.IncomingFile(target.parent) as incoming:
                 for piece in deidentified.export_deidentified(
-                    db, BlobStore(settings.blobs), secret, chosen, with_signals=signals
+                    db, open_blobs(settings), secret, chosen, with_signals=signals
                 ):
                     incoming.write(piece)
                 incoming.keep(target)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from server.settings import load_settings
+from server.settings import Settings, load_settings
 
 
 def restore(data_dir: Path | None, archive: Path, key: Path | None, erased: Path | None, test: bool) -> int:
     """Restore a backup, everything verified first; 1 when nothing was put in place."""
     from server.services import restoring
+    from server.services.restore_room import RestoreError
     from server.services.tombstones import TombstoneError, read_tombstones
     from server.storage.archive import BackupFileError, read_key
 
@@ -22,7 +23,7 @@ def restore(data_dir: Path | None, archive: Path, key: Path | None, erased: Path
         else:
             gone = None if erased is None else read_tombstones(erased)
             found = restoring.restore(archive.absolute(), settings, clinic_key, gone)
-    except (BackupFileError, TombstoneError, restoring.RestoreError) as error:
+    except (BackupFileError, TombstoneError, RestoreError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
     sys.stdout.write(
@@ -33,5 +34,27 @@ def restore(data_dir: Path | None, archive: Path, key: Path | None, erased: Path
     )
     if found.missing:
         sys.stdout.write(f"{found.missing} files were gone when the backup was made; see `sagittal check`.\n")
+    if not found.names_open:
+        sys.stdout.write(
+            "The key that opens patients' names was not in the backup. It has to be at "
+            f"{settings.identity_key_file}; `sagittal check` says whether it opens them.\n"
+        )
+    elif not test:
+        sys.stdout.write(_tell_names_key(settings))
     sys.stdout.flush()
     return 0
+
+
+def _tell_names_key(settings: Settings) -> str:
+    """What to do with the key of patients' names that came with the backup where its place is another."""
+    from server.services.backups import IDENTITY_KEY
+
+    came, place = settings.data_dir / IDENTITY_KEY, settings.identity_key_file
+    if came == place or not came.is_file():
+        return ""
+    if place.is_file() and place.read_bytes() != came.read_bytes():
+        return (
+            f"The key of patients' names lies in {came}; another one is at {place}. Keep that one aside, as "
+            "other backups may need it, and put the key of this backup in its place.\n"
+        )
+    return f"The key of patients' names lies in {came}. Move it to {place}.\n"

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
-from server.settings import Settings, load_settings
+from server.settings import Settings, SettingsError, load_settings
 
 
 def serve(data_dir: Path | None, host: str | None, port: int | None, workers: int | None) -> int:
@@ -33,13 +33,21 @@ def serve(data_dir: Path | None, host: str | None, port: int | None, workers: in
 
 def run(settings: Settings, announce: Callable[[str], None]) -> int:
     """Run web server and workers; `announce` gets the address once requests are answered."""
+    from core.errors import SagittalError
     from server.app import create_app
     from server.log import start_log
+    from server.nodes.registry import Nodes
     from server.processes.supervisor import Workers
-    from server.services.custody import StrangersError, refuse_strangers
+    from server.services.custody import (
+        StrangersError,
+        refuse_half_restored,
+        refuse_strangers,
+        refuse_wrong_clock,
+    )
     from server.storage import fs
+    from server.storage.blob_opening import note_bucket, open_blobs, require_use, warn_of_leftovers
     from server.storage.db import Database
-    from server.storage.migrate import MigrationError, upgrade
+    from server.storage.migrate import MigrationError, read_revision, upgrade
     from server.web_server.build import build_server
     from server.web_server.connection import ConnectionLimits
     from server.web_server.listener import make_room, open_listener
@@ -48,29 +56,41 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
     start_log(settings)
     # what SQLite and libraries make is for the server's user only, as what we make is
     os.umask(0o077)
-    fs.make_folder(settings.data_dir)
+    served, holder = contextlib.ExitStack(), f"process {os.getpid()}"
     try:
-        lock = fs.Lock(settings.lock, f"process {os.getpid()}")
-    except fs.LockedError as error:
-        sys.stderr.write(
-            f"Another server ({error.holder}) is running on {settings.data_dir}; stop it first.\n"
-        )
-        return 1
-    served = contextlib.ExitStack()
-    try:
+        fs.make_folder(settings.data_dir)
+        served.enter_context(fs.Lock(settings.lock, holder, shared=bool(settings.node_name)))
+        # before anything else is made in a folder that `sagittal restore` wants empty
+        refuse_half_restored(settings)
+        if settings.node_name:
+            fs.make_folder(settings.node_folder)
+            served.enter_context(fs.Lock(settings.node_lock, holder))
+        let_in = require_use(open_blobs(settings))
         refuse_strangers(settings)
+        read_revision(settings.database_source)  # says why PostgreSQL is not reached
+        if settings.node_name:
+            with closing(Database(settings.database_source)) as db:
+                refuse_wrong_clock(db, settings)
+        # last: who is refused changes nothing
+        listener = served.enter_context(open_listener(settings.host, settings.port))
+        if let_in:
+            note_bucket(settings)
+        warn_of_leftovers(settings)
         upgrade(settings.database_source, backups=settings.backups)
         db = served.enter_context(closing(Database(settings.database_source)))
-        if not served.enter_context(db.serve_alone()):
-            raise StrangersError(
-                "Another server is running on this PostgreSQL database; stop it first. To share its work, "
-                "start `sagittal worker` here instead."
-            )
-        listener = open_listener(settings.host, settings.port)
-    except (StrangersError, MigrationError, OSError) as error:
-        sys.stderr.write(f"{error}\n")
+        if not served.enter_context(db.serve(settings.node_name)):
+            raise StrangersError(_explain_other(settings))
+        if settings.node_name:
+            Nodes(settings, db, lambda: None).refuse_strangers()
+    except fs.LockedError as error:
         served.close()
-        lock.release()
+        sys.stderr.write(f"Another server ({error.holder}) is running on {error.folder}; stop it first.\n")
+        return 1
+    except (StrangersError, MigrationError, SettingsError, SagittalError, OSError) as error:
+        served.close()
+        if isinstance(error, OSError) and error.filename is not None:
+            raise  # told with what to look at, as of every command
+        sys.stderr.write(f"{error}\n")
         return 1
     workers, keeper = Workers(settings), BackupKeeper(settings)
     app = create_app(settings)
@@ -91,10 +111,20 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
     finally:
         keeper.stop()
         workers.stop()
-        listener.close()
         served.close()
-        lock.release()
     return 0 if server.started else 1
+
+
+def _explain_other(settings: Settings) -> str:
+    if settings.node_name:
+        return (
+            f"A server named '{settings.node_name}', or one without a name, is running on this PostgreSQL "
+            "database. Stop it first, or give this one another SAGITTAL_NODE_NAME."
+        )
+    return (
+        "Another server is running on this PostgreSQL database; stop it first. To share its work, start "
+        "`sagittal worker` here instead, or give every server a SAGITTAL_NODE_NAME."
+    )
 
 
 def say(text: str) -> None:

@@ -12,19 +12,26 @@ from server.settings import load_settings
 def trash(data_dir: Path | None, restore: bool) -> int:
     """List the trash, or put back what the database refers to; 1 when the database cannot be used."""
     from server.services import sweep
-    from server.storage.blobs import BlobStore
+    from server.storage.blob_opening import open_blobs
     from server.storage.db import Database
-    from server.storage.migrate import MigrationError, require_current
-    from server.storage.trash import Trash
+    from server.storage.migrate import MigrationError, require_current, require_database
 
     settings = load_settings({"data_dir": data_dir})
     if not restore:
-        files = list(Trash(settings.trash).files())
+        discarded = open_blobs(settings).trash
+        files = list(discarded.files())
+        if not files:  # those of a lost database are listed without it
+            try:
+                require_database(settings.database_source)
+            except MigrationError as error:
+                sys.stderr.write(f"{error}\n")
+                return 1
         for one in files:
             sys.stdout.write(
-                f"{one.since:%Y-%m-%d %H:%M}Z, until {one.until:%Y-%m-%d}: {one.size} bytes, {one.path}\n"
+                f"{one.since:%Y-%m-%d %H:%M}Z, until {one.until:%Y-%m-%d}: {one.size} bytes, "
+                f"{discarded.place}/{one.way}\n"
             )
-        sys.stdout.write(f"{len(files)} files in {settings.trash}\n")
+        sys.stdout.write(f"{len(files)} files in {discarded.place}\n")
         sys.stdout.flush()
         return 0
     try:
@@ -33,7 +40,8 @@ def trash(data_dir: Path | None, restore: bool) -> int:
         sys.stderr.write(f"{error}\n")
         return 1
     with closing(Database(settings.database_source)) as db:
-        back = sweep.put_back(db, BlobStore(settings.blobs), settings)
-    sys.stdout.write(f"{back} files that the database refers to are back in {settings.blobs}\n")
+        blobs = open_blobs(settings)
+        back = sweep.put_back(db, blobs)
+    sys.stdout.write(f"{back} files that the database refers to are back in {blobs.place}\n")
     sys.stdout.flush()
     return 0

@@ -23,7 +23,7 @@ def user(data_dir: Path | None, name: str, role: str) -> int:
     from server.auth.roles import Role
     from server.http.problems import Problem
     from server.storage.db import Database
-    from server.storage.migrate import upgrade
+    from server.storage.migrate import MigrationError, exists, upgrade
     from server.storage.tables import user as table
 
     settings = load_settings({"data_dir": data_dir})
@@ -32,6 +32,7 @@ def user(data_dir: Path | None, name: str, role: str) -> int:
     )
     try:
         hashed = hash_password(password)
+        is_new = not exists(settings.database_source)
         upgrade(settings.database_source, backups=settings.backups)
         with closing(Database(settings.database_source)) as db, db.write() as c:
             known = c.execute(
@@ -45,9 +46,11 @@ def user(data_dir: Path | None, name: str, role: str) -> int:
                 second_factor.remove(c, known)
                 api_tokens.revoke_all(c, known)
                 audit.record(c, None, "user.password_changed", "user", known, {"by": "console"})
-    except Problem as error:
-        sys.stderr.write(f"{error.detail}\n")
+    except (Problem, MigrationError) as error:
+        sys.stderr.write(f"{error.detail if isinstance(error, Problem) else error}\n")
         return 1
+    if is_new:
+        sys.stdout.write(f"There was no database in {settings.data_dir}: a new clinic begins there.\n")
     sys.stdout.write(f"{name} can sign in.\n")
     sys.stdout.flush()
     return 0

@@ -13,6 +13,7 @@ from server.settings import load_settings
 def worker(data_dir: Path | None) -> int:
     """Work until SIGTERM or Ctrl-C; 1 when database or folder are not the server's."""
     from server.services.custody import StrangersError
+    from server.storage import fs
     from server.storage.migrate import MigrationError
     from server.worker.worker import run_worker
 
@@ -21,6 +22,9 @@ def worker(data_dir: Path | None) -> int:
     os.umask(0o077)
     try:
         run_worker(settings)
+    except fs.LockedError as error:
+        sys.stderr.write(f"{settings.data_dir} is in use by {error.holder}; start this worker after it.\n")
+        return 1
     except (MigrationError, StrangersError) as error:
         sys.stderr.write(f"{error}\n")
         return 1

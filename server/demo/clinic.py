@@ -19,6 +19,7 @@ from server.jobs.opening import open_queue
 from server.services import analyses, patients, prescriptions, recordings, sessions
 from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings, load_settings
+from server.storage.blob_opening import open_blobs
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.tables import now
@@ -146,7 +147,7 @@ def fill(settings: Settings) -> None:
     from core.simulate import mt_files
 
     with closing(Database(settings.database_source)) as db:
-        blobs = BlobStore(settings.blobs)
+        blobs = open_blobs(settings)
         known: dict[str, str] = {}
         with db.write() as c:
             for person in dict.fromkeys(v.person for v in VISITS):

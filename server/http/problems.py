@@ -23,6 +23,7 @@ from core.errors import SagittalError
 from server.http.headers import add_security_headers
 from server.http.templates import render
 from server.log import request_id
+from server.storage.blobs import StoreAway
 from server.storage.refusal import is_busy, refusal_of
 
 log = logging.getLogger(__name__)
@@ -69,6 +70,8 @@ def as_problem(error: Exception) -> Problem:
     """Translate any exception; what we did not foresee says nothing about its cause."""
     if isinstance(error, Problem):
         return error
+    if isinstance(error, StoreAway):
+        return Problem(503, error.code, SENTENCES[error.code], headers={"Retry-After": "5"})
     if isinstance(error, SagittalError):
         return Problem(getattr(error, "status", 422), error.code, error.message)
     if isinstance(error, RequestValidationError):
@@ -214,5 +217,8 @@ SENTENCES = {
     "method_not_allowed": "This address does not offer that method; see /api/v1/openapi.json.",
     "database_busy": "Another change takes unusually long. Try again in some seconds.",
     "not_storable": "A text is too long or has a character that cannot be stored. Change it, then try again.",
+    "store_away": "The stored files cannot be reached now, so nothing was changed. Try again in a minute; if "
+    "it lasts, tell the administrator.",
+    "store_refuses": "The store of files refuses the server. Tell the administrator, then try again.",
     "internal_error": "Something went wrong on the server. The server's log has the details; try again.",
 }

@@ -24,7 +24,7 @@ from sqlalchemy import Connection, func, select
 
 from server.jobs.queue import Wait
 from server.jobs.table import TableQueue
-from server.storage.postgres import DELIVERY_SCHEMA
+from server.storage.postgres import APPLICATION, DELIVERY_SCHEMA
 
 log = logging.getLogger(__name__)
 
@@ -124,7 +124,7 @@ class DeliveryLine:
             min_size=1,
             max_size=2,
             timeout=PATIENCE_S,
-            kwargs={"application_name": "sagittal", "options": f"-c search_path={DELIVERY_SCHEMA}"},
+            kwargs={"application_name": APPLICATION, "options": f"-c search_path={DELIVERY_SCHEMA}"},
         )
         app = App(connector=connector)
 

@@ -172,7 +172,7 @@ class JobQueue(Protocol):
         """Report that the attempt ended without a word: run again, the third time give up."""
 
     def release(self, claim: Claim) -> bool:
-        """Give the job back unharmed because the worker shuts down."""
+        """Give the job back unharmed: the worker shuts down, or its files cannot be reached now."""
 
     def listen(self) -> AbstractContextManager[Wait]:
         """While the block runs, an idle worker can wait for a job that may be claimed."""

@@ -88,9 +88,8 @@ class TableQueue:
 
     def get(self, job_id: str) -> JobView | None:
         """See JobQueue."""
-        with self._db.read() as c:
-            row = c.execute(select(*VIEW_COLUMNS).where(job.c.id == job_id)).first()
-        return job_view(row) if row else None
+        found = self._db.ask(select(*VIEW_COLUMNS).where(job.c.id == job_id))
+        return job_view(found[0]) if found else None
 
     def cancel(self, c: Connection, job_id: str) -> JobView | None:
         """See JobQueue."""
@@ -108,9 +107,8 @@ class TableQueue:
         """See JobQueue; an idle worker only reads, so it does not stand in the way of writers."""
         time = self._clock()
         claimable = and_(job.c.state == "queued", job.c.kind.in_(kinds))
-        with self._db.read() as c:
-            if c.execute(select(job.c.seq).where(or_(claimable, self._dead(time))).limit(1)).first() is None:
-                return None
+        if not self._db.ask(select(job.c.seq).where(or_(claimable, self._dead(time))).limit(1)):
+            return None
         with self._db.write() as c:
             self._bury(c, self._dead(time))
             first = (
@@ -152,16 +150,16 @@ class TableQueue:
 
     def look(self, claim: Claim) -> LeaseState:
         """See JobQueue."""
-        with self._db.read() as c:
-            row = c.execute(select(job.c.cancel_requested, job.c.priority).where(_fence(claim))).first()
-            if row is None:
-                return LeaseState.LOST
-            if row.cancel_requested:
-                return LeaseState.CANCEL
-            if row.priority < Priority.BEHIND:
-                return LeaseState.OURS  # it leaves no checkpoints: what is done of it would be lost
-            urgent = select(job.c.seq).where(job.c.state == "queued", job.c.priority < row.priority).limit(1)
-            return LeaseState.OURS if c.execute(urgent).first() is None else LeaseState.YIELD
+        found = self._db.ask(select(job.c.cancel_requested, job.c.priority).where(_fence(claim)))
+        if not found:
+            return LeaseState.LOST
+        [row] = found
+        if row.cancel_requested:
+            return LeaseState.CANCEL
+        if row.priority < Priority.BEHIND:
+            return LeaseState.OURS  # it leaves no checkpoints: what is done of it would be lost
+        urgent = select(job.c.seq).where(job.c.state == "queued", job.c.priority < row.priority).limit(1)
+        return LeaseState.YIELD if self._db.ask(urgent) else LeaseState.OURS
 
     def progress(self, claim: Claim, stage: str, fraction: float, message: str | None = None) -> bool:
         """See JobQueue."""

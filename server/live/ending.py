@@ -55,7 +55,7 @@ class Ending:
         pool: EstimatorPool,
         over: Callable[[live.LiveTakeRecord], None],
     ) -> None:
-        self._keep = (db, blobs, settings, queue)
+        self._keep = (db, blobs, queue)
         self._settings = settings
         self._rows = rows
         self._journal, self._pool, self._over = journal, pool, over
@@ -73,6 +73,15 @@ class Ending:
     def draining(self, take_id: str) -> ActiveTake | None:
         """A take that is over and whose estimator still speaks."""
         return self._draining.get(take_id)
+
+    async def refuse_erased(self, take: ActiveTake) -> None:
+        """Raise NotFound where a take was erased just before its log was there, which goes too."""
+        try:
+            await asyncio.to_thread(self._rows.take, take.id)
+        except NotFound:
+            await take.recorder.close()
+            await asyncio.to_thread(fs.remove_file, take.recorder.path)
+            raise
 
     async def complete(self, take: ActiveTake, end: TakeEnd, forget: Callable[[], None]) -> None:
         """Take all steps; `forget` is called once the take is over in the database."""
@@ -112,9 +121,10 @@ class Ending:
 
     async def _store(self, take_id: str) -> str | None:
         """Store until it works: the log holds acknowledged samples."""
+        path = live_recordings.log_path(self._settings.live, take_id)
         while True:
             try:
-                return await asyncio.to_thread(live_recordings.keep, *self._keep, take_id)
+                return await asyncio.to_thread(live_recordings.keep, *self._keep, path)
             except Exception:
                 log.exception("live take %s is not stored yet; trying again", take_id)
             await asyncio.sleep(AGAIN_S)

@@ -13,6 +13,7 @@ from collections.abc import Coroutine
 from typing import Any, Final
 
 import msgspec
+from sqlalchemy.exc import SQLAlchemyError
 
 from core.formats.live_log import Hello
 from server import audit
@@ -37,8 +38,9 @@ from server.live.recorder import open_recorder
 from server.live.room import Room
 from server.live.rows import Rows
 from server.live.take import ActiveTake, TabletLink, describe_unjoined
+from server.nodes.registry import Nodes
 from server.services import live, live_recordings
-from server.services.errors import Conflict
+from server.services.errors import NODE_AWAY, Conflict
 from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
 from server.storage.db import Database
@@ -51,6 +53,8 @@ STATE_S: Final = 1.0
 """How often the running counters are told."""
 GRACE_S: Final = 3.0
 """Time a take that is just ending has when the server stops; after a kill the next start does the rest."""
+MIND_S: Final = 2.0
+"""How often a web server among several looks whether its takes are still its own."""
 ABANDONED_S: Final = live.TOKEN_LIFE.total_seconds()
 """A take that no tablet has spoken to for so long is ended: no token opens it any more."""
 
@@ -58,7 +62,10 @@ ABANDONED_S: Final = live.TOKEN_LIFE.total_seconds()
 class Hub:
     """Registry of all running takes and of who watches them."""
 
-    def __init__(self, settings: Settings, db: Database, reviewed: ReviewedAnalyses, queue: JobQueue) -> None:
+    def __init__(
+        self, settings: Settings, db: Database, reviewed: ReviewedAnalyses, queue: JobQueue, nodes: Nodes
+    ) -> None:
+        self.nodes = nodes
         self._settings, self._db, self._blobs, self._queue = settings, db, reviewed.blobs, queue
         self.journal = Journal(db)
         self.rows = Rows(db, reviewed)
@@ -70,9 +77,14 @@ class Hub:
         self._takes: dict[str, ActiveTake] = {}
         self._rooms: dict[str, Room] = {}
         self._entering = asyncio.Lock()
-        self._ticking: asyncio.Task[None] | None = None
+        self._ticking: list[asyncio.Task[None]] = []
         self._loop: asyncio.AbstractEventLoop | None = None
         self._tasks: set[asyncio.Task[None]] = set()
+
+    @property
+    def owner(self) -> live.TakeOwner:
+        """This web server as the owner of takes."""
+        return live.TakeOwner(self.nodes.name, self.nodes.run)
 
     async def start(self) -> None:
         """Warm the estimators, finish what a crash left and open the takes that are still open."""
@@ -90,12 +102,14 @@ class Hub:
             except Exception:
                 # its log stays as it is; the other takes and the clinic go on
                 log.exception("live take %s could not be opened again", take_id)
-        self._ticking = asyncio.create_task(self._tick())
+        self._ticking = [asyncio.create_task(self._tick())]
+        if self.nodes.is_one_of_several:
+            self._ticking.append(asyncio.create_task(self._mind_rows()))
 
     async def stop(self) -> None:
         """Acknowledge what has come, send the tablets away (they come back), end the estimators."""
-        if self._ticking is not None:
-            self._ticking.cancel()
+        for ticking in self._ticking:
+            ticking.cancel()
         if self._tasks:
             await asyncio.wait(self._tasks, timeout=GRACE_S)
         for task in tuple(self._tasks):
@@ -115,19 +129,21 @@ class Hub:
     # the tablet
 
     async def enter(self, row: live.LiveTakeRecord, hello: Hello | None) -> ActiveTake:
-        """The open take of a tablet, with its log; raises ProtocolError, InputError."""
+        """The open take of a tablet, with its log; raises ProtocolError, InputError, NodeAway, NotFound."""
         async with self._entering:
             take = self._takes.get(row.id)
             if take is not None:
                 if take.recorder.failure is not None:
                     await take.recorder.reopen()
                 return take
+            row = await asyncio.to_thread(self.rows.claim, row, self.owner)
             training, earlier = await asyncio.to_thread(self.rows.prepare, row)
             room = self.room(row.session_id)
             room.clear()
             take = ActiveTake(self, row, room, training, earlier)
             path = live_recordings.log_path(self._settings.live, row.id)
             take.recorder = await open_recorder(path, hello, self._committer, take)
+            await self._ending.refuse_erased(take)
             take.source = take.recorder.hello.source
             self._takes[row.id] = take
             take.note_growth(take.recorder.size)
@@ -160,7 +176,7 @@ class Hub:
     async def command(
         self, actor: audit.Actor | None, session_id: str, name: str, value: Any, at_s: float | None = None
     ) -> dict[str, Any]:
-        """Carry a command out, keep it, and return the state; raises Conflict, ServiceError bad_value.
+        """Carry a command out, keep it, and return the state; raises Conflict, NodeAway, ServiceError.
 
         Parameters
         ----------
@@ -169,6 +185,7 @@ class Hub:
         row = await asyncio.to_thread(self.rows.open_take, session_id)
         take = self._takes.get(row.id)
         if take is None:
+            self.owner.require(row)
             raise Conflict("no_tablet", "No tablet has joined this take yet; enter its code on the tablet.")
         live.check_value(name, value)
         if name in ("start", "stop"):
@@ -188,11 +205,15 @@ class Hub:
         return take.standing()
 
     async def close(self, actor: audit.Actor | None, session_id: str) -> live.LiveTakeRecord:
-        """End a take without the tablet; what has come becomes the recording; raises Conflict."""
+        """End a take without the tablet; what has come becomes the recording; raises Conflict.
+
+        One of a web server that is away is over here, too; that one stores what it has when it is back.
+        """
         row = await asyncio.to_thread(self.rows.open_take, session_id)
         take = self._takes.get(row.id)
         if take is None:
-            over = await asyncio.to_thread(self.rows.end, actor, row.id, "closed", TakeEnd(0, ""))
+            end = TakeEnd(0, "", None if self.owner.has(row) else NODE_AWAY)
+            over = await asyncio.to_thread(self.rows.end, actor, row.id, "closed", end)
             self._tell_over(over)
             return over
         self._ending.ask(take, actor)
@@ -211,11 +232,14 @@ class Hub:
     async def drop(self, session_ids: list[str]) -> None:
         """Let go of takes whose session is about to be erased."""
         for take in [t for t in self._takes.values() if t.session_id in session_ids]:
-            self.pool.leave(take.id)
-            del self._takes[take.id]
-            await take.recorder.close()
-            if take.tablet is not None:
-                take.tablet.shut(CloseCode.ENDED, "take_ended")
+            await self._let_go(take)
+
+    async def _let_go(self, take: ActiveTake) -> None:
+        self.pool.leave(take.id)
+        self._takes.pop(take.id, None)
+        await take.recorder.close()
+        if take.tablet is not None:
+            take.tablet.shut(CloseCode.ENDED, "take_ended")
 
     # browsers
 
@@ -231,14 +255,18 @@ class Hub:
 
     def take_of(self, session_id: str) -> ActiveTake | None:
         """The session's take that a tablet has joined, None when there is none."""
-        return next((t for t in self._takes.values() if t.session_id == session_id), None)
+        return next((t for t in tuple(self._takes.values()) if t.session_id == session_id), None)
 
     def standing(self, session_id: str) -> dict[str, Any]:
         """The state of a session's newest take for the browsers; blocks."""
         take = self.take_of(session_id)
         if take is not None:
             return take.standing()
-        return describe_unjoined(self.rows.current(session_id))
+        row = self.rows.current(session_id)
+        found = describe_unjoined(row)
+        if row is not None and row.is_open and not self.owner.has(row):
+            found["problem"] = NODE_AWAY
+        return found
 
     def tell_state(self, take: ActiveTake) -> None:
         """Tell the browsers where a take stands; of one that is over `_tell_over` has the last word."""
@@ -331,6 +359,30 @@ class Hub:
                 if tell and take.state == "streaming":
                     self.tell_state(take)
             told = now if tell else told
+
+    async def _mind_rows(self) -> None:
+        """Let go of takes that were erased or taken over elsewhere, and end those that were ended there."""
+        while True:
+            await asyncio.sleep(MIND_S)
+            try:
+                await self._mind_once()
+            except SQLAlchemyError:
+                continue  # the database is away: nothing is known, everything goes on
+            except Exception:
+                log.exception("whose the live takes are could not be looked up; trying again")
+
+    async def _mind_once(self) -> None:
+        mine = dict(self._takes)
+        rows = await asyncio.to_thread(self.rows.takes, list(mine)) if mine else {}
+        for take_id, take in mine.items():
+            if self._takes.get(take_id) is not take or take.recorder.end is not None:
+                continue
+            row = rows.get(take_id)
+            if row is None or (row.node, row.node_run) != (self.owner.node, self.owner.run):
+                await self._let_go(take)
+            elif not row.is_open:
+                self._ending.ask(take, None)
+                take.recorder.finish()
 
     def _spawn(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(work)

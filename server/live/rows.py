@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Collection
 
 from server import audit
 from server.live.intake import TakeEnd
 from server.services import live
 from server.services.errors import NotFound
+from server.services.live_claims import claim_take
 from server.services.live_training import LiveTraining, training_of
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
@@ -18,6 +20,18 @@ class Rows:
 
     def __init__(self, db: Database, reviewed: ReviewedAnalyses) -> None:
         self._db, self._reviewed = db, reviewed
+
+    def claim(self, row: live.LiveTakeRecord, owner: live.TakeOwner) -> live.LiveTakeRecord:
+        """Have a take from now on; raises NodeAway, NotFound."""
+        if owner.node is None and row.node is None:
+            return row  # one server alone: nothing to write
+        with self._db.write() as c:
+            return claim_take(c, row.id, owner)
+
+    def takes(self, take_ids: Collection[str]) -> dict[str, live.LiveTakeRecord]:
+        """Those of these takes that are still there."""
+        with self._db.read() as c:
+            return live.find_many(c, take_ids)
 
     def admit(self, take_id: str, token: str) -> live.LiveTakeRecord | None:
         """The take a token opens, over or not."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import deque
-from typing import Final
+from typing import Final, NoReturn
 
 from fastapi import APIRouter, WebSocket
 from starlette.websockets import WebSocketDisconnect
@@ -22,7 +22,10 @@ from server.live.hub import Hub
 from server.live.intake import IntakeAnswer
 from server.live.protocol import HELLO_WITHIN_S, CloseCode, ProtocolError
 from server.live.take import ActiveTake
+from server.nodes.forwarding import UnreachableError, carry_tablet
+from server.nodes.passage import ASKED_BY
 from server.services import live
+from server.services.errors import NodeAway, NotFound
 
 router = APIRouter(include_in_schema=False)
 
@@ -99,6 +102,14 @@ async def stream(ws: WebSocket) -> None:
         await asyncio.gather(sending, return_exceptions=True)
 
 
+def _not_valid() -> ProtocolError:
+    return ProtocolError(
+        "token_not_valid",
+        "The token is not valid for this take, or has expired; pair with a new code.",
+        CloseCode.UNAUTHORISED,
+    )
+
+
 async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None:
     """The take that the first message opens; None after a refusal, which is on its way then."""
     try:
@@ -111,14 +122,12 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None
             raise ProtocolError("hello_missing", "The first message must be a hello.")
         row = await asyncio.to_thread(hub.rows.admit, said.take, said.token)
         if row is None:
-            raise ProtocolError(
-                "token_not_valid",
-                "The token is not valid for this take, or has expired; pair with a new code.",
-                CloseCode.UNAUTHORISED,
-            )
+            raise _not_valid()
         if not row.is_open:
             _say_over(tablet, row)
             return None
+        if not hub.owner.has(row):
+            await _carry(ws, hub, row, message)
         take = await hub.enter(row, said)
     except TimeoutError:
         _refuse(
@@ -126,6 +135,10 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None
         )
     except ProtocolError as error:
         _refuse(tablet, error)
+    except NotFound:  # erased since
+        _refuse(tablet, _not_valid())
+    except NodeAway as error:
+        _refuse(tablet, ProtocolError(error.code, error.message, CloseCode.GOING_AWAY))
     except InputError as error:
         _refuse(tablet, ProtocolError(error.code, error.message))
     else:
@@ -135,6 +148,19 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None
             hub.attach(take, tablet)
             return take
     return None
+
+
+async def _carry(ws: WebSocket, hub: Hub, row: live.LiveTakeRecord, first: str | bytes) -> NoReturn:
+    """Carry the line to the web server that has the take, until it ends; raises NodeAway."""
+    node = None if ASKED_BY in ws.scope or row.node is None else hub.nodes.find(row.node)
+    if node is None:
+        raise NodeAway(row.node)
+    try:
+        await carry_tablet(hub.nodes, node, ws, first)
+    except UnreachableError:
+        hub.nodes.suspect(node)
+        raise NodeAway(row.node) from None
+    raise WebSocketDisconnect
 
 
 async def _receive(ws: WebSocket, take: ActiveTake, tablet: Tablet) -> None:

@@ -38,6 +38,7 @@ DEEDS: Final[Mapping[str, str]] = {
     "patient.created": "added the patient",
     "patient.changed": "changed what is said of the patient",
     "patient.code_refused": "tried to give somebody else the code of the patient, from outside the care team",
+    "patient.hidden": "tried to open the patient, from outside the care team",
     "patient.exported": "took along everything that is stored of the patient",
     "patient.deidentified": "took along results of the patient for research, without the name",
     "care_teams.on": "switched care teams on",
@@ -45,6 +46,7 @@ DEEDS: Final[Mapping[str, str]] = {
     "care_team.changed": "changed who is in the care team of the patient",
     "care_team.opened": "looked at the care team of the patient",
     "emergency.opened": "opened the patient in an emergency, from outside the care team",
+    "emergency.ended": "ended an access in an emergency",
     "emergency.refused": "asked for a patient in an emergency by a code that nobody has",
     "patient.erased": "deleted the patient with all recordings",
     "note.added": "wrote a note",
@@ -52,6 +54,11 @@ DEEDS: Final[Mapping[str, str]] = {
     "consent.given": "wrote down what the patient agreed to",
     "consent.withdrawn": "wrote down that the patient no longer agrees",
     "consents.opened": "read what the patient agreed to",
+    "identity.opened": "looked at who the patient is",
+    "identity.changed": "changed who the patient is",
+    "identity.printed": "put the patient's name on a report",
+    "identity.discarded": "removed who the patient is, which no key could read",
+    "identities.key_changed": "changed the key of patients' names",
     "notes.opened": "read the notes",
     "sessions.opened": "listed the visits",
     "trends.opened": "looked at the trends",
@@ -148,6 +155,14 @@ DEEDS: Final[Mapping[str, str]] = {
 }
 """Action → what was done, to follow the name of who did it."""
 
+SIGNED_IN_BY: Final[Mapping[str, str]] = {
+    "password": "signed in by the password alone",
+    "code": "signed in by the password and a code",
+    "recovery_code": "signed in by the password and a recovery code",
+    "security_key": "signed in by the password and a security key",
+}
+"""Factor of a sign-in (`accounts.Factor`) → what was done; rows from before say none."""
+
 NOBODY: Final = "The system"
 STRANGER: Final = "Somebody"
 BY_STRANGERS: Final = ("sign_in.failed", "report_link.opened", "report_link.refused")
@@ -194,12 +209,16 @@ def describe_rows(c: Connection, rows: Sequence[Row[Any]]) -> list[AuditSentence
         whom, of, href = code, None, None if code is None else f"/patients/{row.resource_id}"
         if visit is not None:
             whom, of, href = visit.code, day(visit.performed_on), f"/sessions/{visit.id}"
-        found.append(AuditSentence(_name(row), describe_deed(row.action), whom, of, href, why, row))
+        found.append(
+            AuditSentence(_name(row), describe_deed(row.action, row.detail), whom, of, href, why, row)
+        )
     return found
 
 
-def describe_deed(action: str) -> str:
-    """What an action is in words; of one without words its own name."""
+def describe_deed(action: str, detail: Mapping[str, Any] | None = None) -> str:
+    """What an action is in words, with the factor of a sign-in; of one without words its own name."""
+    if action == "sign_in" and detail and detail.get("factor") in SIGNED_IN_BY:
+        return SIGNED_IN_BY[detail["factor"]]
     return DEEDS.get(action, action.replace("_", " ").replace(".", ": "))
 
 

@@ -61,7 +61,12 @@ def show_device(
     """One sensor over its takes."""
     with db.read() as c:
         known = devices.get(c, device_id)
-    view = {"d": _row(known), "charts": _charts(known), "takes": _takes(known), "limits": LIMITS}
+    view: dict[str, Any] = {
+        "d": _row(known),
+        "charts": _charts(known),
+        "takes": _takes(known),
+        "limits": LIMITS,
+    }
     return render_page(request, db, who, "device.html", "devices", **view)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Request
@@ -11,13 +12,13 @@ from sqlalchemy import Connection
 from starlette.responses import Response
 
 from core.change import parameter_changes
-from core.errors import FormatError
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.result import Parameter
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Db, Id, Reviewed
+from server.context import Config, Db, Id, Reviewed
+from server.pages.identity import offers_identity
 from server.pages.job_views import find_active_jobs, follow_few
 from server.pages.patients import view_patient
 from server.pages.prescription import make_card
@@ -42,9 +43,9 @@ from server.services import (
 )
 from server.services.histories import AnalysedSession
 from server.services.programmes import PlannedVisit
-from server.services.reviewed import ReviewedAnalyses
+from server.services.reviewed import UNREADABLE, ReviewedAnalyses
 from server.services.visits import SPEED, ClinicVisit, TakesFigure
-from server.storage.blobs import IntegrityError
+from server.storage.blobs import StoreAway
 from server.storage.tables import now
 from web.words import number
 
@@ -66,6 +67,7 @@ def show_patient(
     request: Request,
     db: Db,
     reviewed: Reviewed,
+    settings: Config,
     pid: Id,
     who: Annotated[Identity, require(Action.READ_PATIENT)],
 ) -> Response:
@@ -79,13 +81,14 @@ def show_patient(
         written_down = notes.of_patient(c, pid)
         agreed = consents.of_patient(c, pid)
         written = prescriptions.of_patient(c, pid) if results else []
-        team = view_team(c, pid)
+        team = view_team(c, who, pid)
     record_opening(request, who, "patient", pid)
     trend = None
     if results:
         trained = next((w.content for w in written if w.ended_at is None), None)
-        history = histories.read_history(reviewed, patient, done, plans)
-        trend = draw_figures(history, None if trained is None else trained.parameter)
+        with suppress(StoreAway):  # the visits say that they cannot be read; the next one can be begun
+            history = histories.read_history(reviewed, patient, done, plans)
+            trend = draw_figures(history, None if trained is None else trained.parameter)
     walked = histories.baseline([a for a in done if a.session.protocol in sessions.WALKS])
     return render_page(
         request, db, who, "patient.html", "patients",
@@ -95,10 +98,11 @@ def show_patient(
         consents=[(one, PURPOSE_WORDS[one.purpose]) for one in agreed], purposes=list(PURPOSE_WORDS.items()),
         programme=view_programme(plans[0], now().date()) if plans else None,
         team=team, trend=trend, comparable=len(done) > 1 and results, feedback=make_card(written),
+        identity_kept=offers_identity(settings),
     )  # fmt: skip
 
 
-def view_team(c: Connection, patient_id: str) -> dict[str, Any] | None:
+def view_team(c: Connection, who: Identity, patient_id: str) -> dict[str, Any] | None:
     """The care team and who opened the patient in an emergency; None where the clinic has no teams."""
     if not care_teams.are_on(c):
         return None
@@ -106,7 +110,10 @@ def view_team(c: Connection, patient_id: str) -> dict[str, Any] | None:
     return {
         "members": [one for one, is_in in people if is_in],
         "choices": people,
-        "emergencies": care_teams.list_accesses(c, patient_id),
+        "emergencies": [
+            (one, one.is_open and care_teams.may_end(one, who))
+            for one in care_teams.list_accesses(c, patient_id)
+        ],
     }
 
 
@@ -115,7 +122,7 @@ def list_facts(patient: patients.Patient, walks: str | None) -> list[tuple[str, 
     facts = [
         ("Note", patient.note),
         ("Affected side", patient.affected_side or ""),
-        ("Walks", walks or ""),
+        ("Condition", walks or ""),
         ("Height", "" if patient.height_m is None else f"{patient.height_m:.2f}\u202fm"),
         ("Serves as", "reference of this clinic" if patient.is_control else ""),
     ]
@@ -209,7 +216,7 @@ def _measure(reviewed: ReviewedAnalyses, visit: ClinicVisit) -> TakesFigure | No
     """The walking speed of every take and their mean; None where it cannot be read or was not measured."""
     try:
         return visits.measure_visit(reviewed, visit).get((SPEED, None))
-    except (IntegrityError, FormatError):  # its own page says what is wrong; the others stay in reach
+    except UNREADABLE:
         return None
 
 

@@ -51,16 +51,15 @@ def show_patients(
 ) -> Response:
     """All patients, the latest visit first."""
     with db.read() as c:
-        found = patients.list_patients(c, who, search=q, limit=PATIENTS_SHOWN)
-        rows = list_patients(c, reviewed, found, results=who.may(Action.READ_RESULT))
-        total = patients.count(c, who)
-        in_teams = not who.is_admin and care_teams.are_on(c)
+        found = patients.list_counted(c, who, search=q, limit=PATIENTS_SHOWN)
+        rows = list_patients(c, reviewed, found.patients, results=who.may(Action.READ_RESULT))
     record_listing(request, who, "patient")
     return render_page(
-        request, db, who, "patients.html", "patients",
-        patients=rows, query=q, total=total,
+        request, db, who, "patients.html", "patients", found.active_jobs,
+        patients=rows, query=q, total=found.total,
         filters=[(key, words, sum(not key or key in r["kinds"] for r in rows)) for key, words in FILTERS],
-        results=who.may(Action.READ_RESULT), in_teams=in_teams, hours=care_teams.EMERGENCY // HOUR,
+        results=who.may(Action.READ_RESULT), in_teams=found.teams_on and not who.is_admin,
+        hours=care_teams.EMERGENCY // HOUR,
     )  # fmt: skip
 
 
@@ -77,11 +76,13 @@ def list_patients(
     streaming = {take.patient_id: take.session_id for take in live.list_streaming(c)}
     newest = sessions.newest_of(c, [p.id for p in found])
     running = find_active_jobs(c, [p.id for p in found], lambda j: j.patient_id)
-    shown = analyses.latest_of(c, [s.id for s in newest.values()]) if results else {}
-    edits = edit_log.edits_of_all(c, [a.id for a in shown.values()])
-    speeds = visits.read_newest_speeds(c, reviewed, [p.id for p in found]) if results else {}
     today = now().date()
-    planned = programmes.list_running(c, [p.id for p in found], today)
+    plans = programmes.read_plans(c, [p.id for p in found], today)
+    walks = visits.choose_newest_walks(c, [p.id for p in found], plans.kinds) if results else {}
+    wanted = {s.id for s in newest.values()} | {w.id for chosen in walks.values() for w in chosen}
+    shown = analyses.latest_of(c, wanted) if results else {}
+    edits = edit_log.edits_of_all(c, [a.id for a in shown.values()])
+    speeds = visits.read_newest_speeds(reviewed, walks, shown, edits)
     for p in found:
         if p.id in newest:
             last = judge_visit(reviewed, newest[p.id], shown.get(newest[p.id].id), edits)
@@ -97,7 +98,7 @@ def list_patients(
         row["speed"] = None if speed is None else number(speed.mean.mean, CATALOGUE[visits.SPEED].digits)
         row["change"] = None if speed is None or speed.change is None else change_words(speed.change)
         kinds = {
-            "programme": p.id in planned,
+            "programme": p.id in plans.running,
             "today": p.last_visit == today,
             "check": last["kind"] in {"warn", "bad"},
         }

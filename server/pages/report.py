@@ -11,9 +11,11 @@ from starlette.responses import Response
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.auth.sight import find_emergency
 from server.context import Blobs, Config, Db, Failures, Id, OpenTrail, Reviewed, address_of
 from server.http.json_body import StrictJsonRoute
 from server.http.templates import language_of
+from server.pages.identity import name_on_paper
 from server.pages.paper import hide_person, print_pdf, show_document, show_pdf, write_document
 from server.pages.session import PAPER, choose_template, gather_report
 from server.pages.session_context import read_context
@@ -45,6 +47,7 @@ def show_desk(request: Request, db: Db, sid: Id, who: Reader) -> Response:
         context["versions"] = signed_reports.of_session(c, sid)
         context["in_force"] = next((r for r in context["versions"] if r.in_force), None)
         context["links"] = report_links.of_session(c, sid)
+        context["emergency"] = find_emergency(c, who, context["patient"].id)
     context["numbers"] = {r.id: r.number for r in context["versions"]}
     context |= {"usual_days": report_links.USUAL_DAYS, "most_days": report_links.MOST_DAYS}
     record_opening(request, who, "session", sid)
@@ -60,10 +63,12 @@ def make_draft(
     settings: Config,
     sid: Id,
     who: Reader,
+    named: bool = False,
 ) -> Response:
-    """The report as it stands now, as PDF; it says that it is not signed."""
+    """The report as it stands now, as PDF; it says that it is not signed, and whose it is if asked for."""
     context = _gather(db, reviewed, sid, who)
     trail.record_opened(who, "report.opened", "session", sid)
+    context |= name_on_paper(request, db, settings, who, context["patient"].id, named=named)
     return print_pdf(request, settings, choose_template(PAPER, context), context, f"report-{sid[:8]}.pdf")
 
 

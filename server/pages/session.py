@@ -17,7 +17,7 @@ from core.parameters.catalogue.entry import SQUAT
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Db, Id, Reviewed
+from server.context import Config, Db, Id, Reviewed
 from server.pages import daily
 from server.pages.charts import (
     COLUMNS,
@@ -29,6 +29,7 @@ from server.pages.charts import (
 )
 from server.pages.figures import draw_beginning, draw_contact
 from server.pages.first_sheet import has_room_for_profile
+from server.pages.identity import name_on_paper
 from server.pages.profile import view_profile
 from server.pages.report_rows import (
     FIRST_ROWS,
@@ -145,11 +146,18 @@ def show_print(
     request: Request,
     db: Db,
     reviewed: Reviewed,
+    settings: Config,
     sid: Id,
     who: Annotated[Identity, require(Action.READ_RESULT)],
+    named: bool = False,
 ) -> Response:
-    """Sheets of A4 for the browser's own print: in short, all values, curves."""
-    return _show_report(request, db, reviewed, sid, who, PAPER)
+    """Sheets of A4 for the browser's own print: in short, all values, curves; with the name if asked for."""
+    context = gather_report(db, reviewed, sid, who, PAPER)
+    if context["report"] is None:
+        return RedirectResponse(f"/sessions/{sid}", status_code=303)
+    record_opening(request, who, "session", sid)
+    context |= name_on_paper(request, db, settings, who, context["patient"].id, named=named)
+    return render_sheets(request, who, choose_template(PAPER, context), **context)
 
 
 def _show_report(
@@ -161,8 +169,6 @@ def _show_report(
     template: str,
 ) -> Response:
     context = gather_report(db, reviewed, sid, who, template)
-    if context["report"] is None and template == PAPER:
-        return RedirectResponse(f"/sessions/{sid}", status_code=303)
     if template == CURVES and (elsewhere := lead_to_days(context)):
         return elsewhere
     if template == VALUES:
@@ -170,8 +176,6 @@ def _show_report(
     else:
         record_opening(request, who, "session", sid)
     shown = choose_template(template, context)
-    if template == PAPER:
-        return render_sheets(request, who, shown, **context)
     return render_page(request, db, who, shown, "patients", **context)
 
 

@@ -41,11 +41,22 @@ def record_listing(request: Request, who: Identity, resource: str) -> None:
 
 
 def render_page(
-    request: Request, db: Database, who: Identity, template: str, here: str, **context: object
+    request: Request,
+    db: Database,
+    who: Identity,
+    template: str,
+    here: str,
+    running: int | None = None,
+    **context: object,
 ) -> Response:
-    """Render a page; `here` = its entry in the navigation."""
-    with db.read() as c:
-        running = jobs.count_active(c, who)
+    """Render a page.
+
+    Parameters
+    ----------
+    here : its entry in the navigation. running : `jobs.count_active`, where it is read already.
+    """
+    if running is None:
+        running = jobs.count_active(db, who)
     return render_sheets(request, who, template, nav=NAVIGATION, here=here, running=running, **context)
 
 

@@ -14,6 +14,7 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Config, Db
+from server.nodes.registry import Nodes, WebNode
 from server.pages.shell import render_page
 from server.services import backup_schedule, patients
 from server.services.backup_schedule import BackupState, Outcome
@@ -31,6 +32,7 @@ PART_WORDS: Final = {
     "disk": "Free disk space",
     "workers": "Workers",
     "estimators": "Estimators of live takes",
+    "node": "This web server among the others",
 }
 
 
@@ -45,13 +47,21 @@ def show_system(
         overdue = _list_overdue(c, settings.retention_years)
     parts = [(PART_WORDS[name], None if said == "ok" else said) for name, said in checks.items()]
     state = backup_schedule.read_state(settings)
+    nodes: Nodes = request.app.state.nodes
     upcoming = backup_schedule.next_time(settings, dt.datetime.now().astimezone())
     return render_page(
         request, db, who, "system.html", "system",
         parts=parts, head=head, folder=settings.backup_dir, encrypted=bool(settings.backup_key),
         backups=describe_backups(state, now()), upcoming=upcoming,
-        years=settings.retention_years, overdue=overdue,
+        nodes=_describe_nodes(nodes, now()), years=settings.retention_years, overdue=overdue,
     )  # fmt: skip
+
+
+def _describe_nodes(nodes: Nodes, at: dt.datetime) -> list[tuple[WebNode, bool]]:
+    """Every web server and whether it is there; none where one serves alone."""
+    if not nodes.is_one_of_several:
+        return []
+    return [(node, nodes.is_living(node, at)) for node in nodes.list_all()]
 
 
 def _list_overdue(c: Connection, years: int) -> list[Patient]:

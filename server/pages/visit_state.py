@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from core.errors import FormatError
 from server.services import analyses, edit_log, sessions
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.blobs import IntegrityError
+from server.services.reviewed import UNREADABLE, ReviewedAnalyses
 
 STATES: Final[Mapping[str, tuple[str, str]]] = {
     "empty": ("none", "No recording yet"),
@@ -37,6 +35,6 @@ def judge_visit(
         return describe_state(s.state)
     try:
         kind, text = reviewed.read_verdict(shown, edits[shown.id])
-    except (IntegrityError, FormatError):  # its own page says what is wrong; the others stay in reach
+    except UNREADABLE:
         kind, text = "bad", "Cannot be read"
     return {"kind": kind, "text": text}

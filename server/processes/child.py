@@ -9,12 +9,14 @@ allow.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import resource
 import signal
 import socket
 import subprocess
 import sys
+from typing import Final
 
 from server.log import start_log
 from server.processes.channel import Channel
@@ -22,9 +24,22 @@ from server.processes.environment import make_environment
 from server.processes.lifeline import call_when_parent_ends, die_with
 from server.settings import Settings, load_settings
 
+BEHIND: Final = 5
+"""Added to the niceness of a worker, and again to that of who computes for it: pages and live takes have the
+processor first, then leases. Not more: on a machine that is busy with other things jobs must get on."""
+FAR_BEHIND: Final = 2 * BEHIND
+"""Of a process beside the web server that computes for long."""
 
-def start_child(module: str, settings: Settings) -> tuple[subprocess.Popen[bytes], socket.socket]:
-    """Run a module that begins with `enter_child`; return the process and our end of the line to it."""
+
+def start_child(
+    module: str, settings: Settings, behind: int = 0
+) -> tuple[subprocess.Popen[bytes], socket.socket]:
+    """Run a module that begins with `enter_child`; return the process and our end of the line to it.
+
+    Parameters
+    ----------
+    behind : by how much it is nicer than this process, from its first import on.
+    """
     ours, theirs = socket.socketpair()
     with theirs:
         process = subprocess.Popen(  # noqa: S603 - our own interpreter and module; a fork takes milliseconds
@@ -33,14 +48,28 @@ def start_child(module: str, settings: Settings) -> tuple[subprocess.Popen[bytes
             stdin=subprocess.PIPE,
             pass_fds=[theirs.fileno()],
         )
+    _put_behind(process.pid, behind)
     return process, ours
 
 
-def start_module(module: str, settings: Settings) -> subprocess.Popen[bytes]:
-    """Run a module of ours without a line; it can tell our end by its standard input (lifeline.py)."""
-    return subprocess.Popen(  # noqa: S603 - our own interpreter and module
+def start_module(module: str, settings: Settings, behind: int = 0) -> subprocess.Popen[bytes]:
+    """Run a module of ours without a line; it can tell our end by its standard input (lifeline.py).
+
+    Parameters
+    ----------
+    behind : by how much it is nicer than this process, from its first import on.
+    """
+    process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
         [sys.executable, "-m", module], env=make_environment(settings), stdin=subprocess.PIPE
     )
+    _put_behind(process.pid, behind)
+    return process
+
+
+def _put_behind(pid: int, behind: int) -> None:
+    """Make a process nicer than this one, if it has not ended already."""
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + behind)
 
 
 def end_process(process: subprocess.Popen[bytes]) -> None:

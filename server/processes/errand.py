@@ -38,15 +38,19 @@ class ErrandTurn:
             self._places.release()
 
 
-def run_errand(module: str, settings: Settings, order: bytes, longest_s: float) -> bytes:
+def run_errand(module: str, settings: Settings, order: bytes, longest_s: float, behind: int = 0) -> bytes:
     """Start a module that begins with `enter_child`, give it an order and return what it answers.
+
+    Parameters
+    ----------
+    behind : by how much the process is nicer than this one.
 
     Raises
     ------
     TimeoutError
         there was no answer within `longest_s`. EOFError, OSError: the process ended without one.
     """
-    process, end = start_child(module, settings)
+    process, end = start_child(module, settings, behind)
     line = Channel(end)
     try:
         line.send(order)

@@ -69,8 +69,13 @@ def _tell(f: DeviceFinding, days: Sequence[dt.date]) -> str:
     if f.quantity == "gyro_bias":
         return f"Bias moved by {format_number(degrees(f.value), 1)} °/s{since}"
     if f.quantity == "scale":
-        way = "more" if f.value > 0 else "less"
-        return f"Gravity reads {format_number(100 * abs(f.value), 1)} % {way}{since}"
+        percent = format_number(100 * abs(f.value), 1)
+        if f.since is None:
+            return f"Gravity reads {percent} % more" if f.value > 0 else f"Gravity reads {percent} % less"
+        moved = day(days[f.since])
+        if f.value > 0:
+            return f"Gravity reads {percent} % more since {moved}"
+        return f"Gravity reads {percent} % less since {moved}"
     if f.quantity == "scale_off":
         way = "much" if f.value > 0 else "little"
         return f"Gravity reads {format_number(100 * abs(f.value), 1)} % too {way}"

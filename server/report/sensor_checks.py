@@ -67,13 +67,16 @@ def _row(s: Mapping[str, Any]) -> SensorCheck:
 
 
 def _clock(s: Mapping[str, Any]) -> tuple[str, str]:
-    done = ", put right" if s["shifted"] else ", left so"
+    done = "put right" if s["shifted"] else "left so"
     if s["drift_ms"] is not None:
         which = "slow" if s["drift_ms"] > 0 else "fast"
-        return f"Clock runs {which}, {format_number(abs(s['drift_ms']))}\u202fms over the take{done}", "warn"
+        return (
+            f"Clock runs {which}, {format_number(abs(s['drift_ms']))}\u202fms over the take, {done}",
+            "warn",
+        )
     if s["lag_ms"] is not None:
         which = "late" if s["lag_ms"] > 0 else "early"
-        return f"Clock {format_number(abs(s['lag_ms']))}\u202fms {which}{done}", "warn"
+        return f"Clock {format_number(abs(s['lag_ms']))}\u202fms {which}, {done}", "warn"
     if s.get("clock_doubted"):
         return "Clock seems wrong, see notices", "warn"
     return ("Clock agrees", "ok") if s["clock_judged"] else (f"Clock {NOT_JUDGED}", "")

@@ -49,6 +49,17 @@ class SensorPlaces:
     knees: tuple[KneeAxisRow, ...]
 
 
+JOINTS: Final = {
+    ("left", "hip"): "Left hip",
+    ("left", "knee"): "Left knee",
+    ("left", "ankle"): "Left ankle",
+    ("right", "hip"): "Right hip",
+    ("right", "knee"): "Right knee",
+    ("right", "ankle"): "Right ankle",
+}
+"""Side and joint → what it is called."""
+
+
 def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
     """View of `sensor_places` in analysis.json; None where motion was not asked."""
     if stored is None:
@@ -60,7 +71,7 @@ def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
         ),
         joints=tuple(
             _view_place(
-                f"{x['side']} {x['joint']}".capitalize() + f", in the {place_words(x['segment'])}",
+                f"{JOINTS[x['side'], x['joint']]}, in the {place_words(x['segment'])}",
                 x["side"] == "left",
                 x,
                 [x["measured"]] * len(AXES),

@@ -36,7 +36,8 @@ class TrendStripLine:
     ----------
     values : as printed, one per shown visit; "–" where there is none. estimated : which of them are.
     change : of the last visit since `since`, None where either has no value. limit : its measurement error
-        (MDC), "" where none is known. since : day of the visit that it counts from, None = the first one.
+        (MDC), "" where none is known. why_none : no change is said, "" where one is or the last visit has
+        no value. since : day of the visit that it counts from, None = the first one.
     """
 
     title: str
@@ -47,6 +48,7 @@ class TrendStripLine:
     svg: str
     change: ChangeWords | None
     limit: str
+    why_none: str
     since: dt.date | None
 
 
@@ -113,8 +115,20 @@ def _write_line(
         _draw_line(line, visits),
         None if change is None else change_words(change),
         "" if change is None or change.limit is None else format_limit(change.limit, term),
+        _explain_none(line, visits),
         None if not base or change is None else visits[base].performed_on,
     )
+
+
+def _explain_none(line: TrendSeries, visits: Sequence[AnalysedVisit]) -> str:
+    last = line.points[-1]
+    if last.change is not None or last.visit != len(visits) - 1:
+        return ""
+    if line.base is None:
+        return "not compared: trainings only, no assessment"
+    if visits[-1].feedback:
+        return "not compared: walked with feedback"
+    return "first value to compare with"
 
 
 def _explain(visit: AnalysedVisit, name: str, side: Side | None) -> str:

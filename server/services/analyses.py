@@ -5,11 +5,14 @@ from __future__ import annotations
 import datetime as dt
 import hashlib
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
 from typing import Any
 
-from sqlalchemy import Connection, Select, func, insert, select, update
+from sqlalchemy import Connection, Result, Select, bindparam, func, insert, select, update
 
 from server import audit
 from server.jobs.queue import Claim, JobQueue, JobView
@@ -17,6 +20,7 @@ from server.services import recordings, sessions
 from server.services.errors import NotFound
 from server.services.provenance import CODE_VERSION
 from server.storage.blobs import Blob, BlobStore
+from server.storage.columns import make_all
 from server.storage.tables import analysis, analysis_file, job, new_id, now, patient, recording, session
 
 
@@ -102,16 +106,16 @@ def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob], config_sha2
 
 def get(c: Connection, analysis_id: str) -> AnalysisRecord:
     """One analysis; raises NotFound."""
-    row = c.execute(_QUERY.where(analysis.c.id == analysis_id)).first()
-    if row is None:
+    found = _analyses(c, c.execute(_QUERY.where(analysis.c.id == analysis_id)))
+    if not found:
         raise NotFound("analysis", analysis_id)
-    return _analyses(c, [row])[0]
+    return found[0]
 
 
 def of_session(c: Connection, session_id: str) -> list[AnalysisRecord]:
     """All analyses of a session, the one that counts first: last asked for, else newest."""
-    rows = c.execute(_QUERY.where(session.c.id == session_id).order_by(*_COUNTS_FIRST)).all()
-    return _analyses(c, rows)
+    query = _QUERY.where(session.c.id == session_id).order_by(*_COUNTS_FIRST)
+    return _analyses(c, c.execute(query))
 
 
 def latest(c: Connection, session_id: str) -> AnalysisRecord | None:
@@ -119,17 +123,29 @@ def latest(c: Connection, session_id: str) -> AnalysisRecord | None:
     return latest_of(c, [session_id]).get(session_id)
 
 
-def latest_of(c: Connection, session_ids: Collection[str] | Select[tuple[str]]) -> dict[str, AnalysisRecord]:
+def latest_of(
+    c: Connection,
+    session_ids: Collection[str] | Select[tuple[str]],
+    values: Mapping[str, object] = MappingProxyType({}),
+) -> dict[str, AnalysisRecord]:
     """`latest` of many sessions, by session, in two statements; a session without a result is left out.
 
     Parameters
     ----------
-    session_ids : ids, or the statement that selects them.
+    session_ids : ids, or the statement of a module that selects them. values : its parameters.
     """
+    if isinstance(session_ids, Select):
+        result = c.execute(_select_latest(session_ids), dict(values))
+    else:
+        result = c.execute(_select_latest(_IDS), {"session_ids": list(session_ids)})
+    return {found.session_id: found for found in _analyses(c, result)}
+
+
+@cache
+def _select_latest(session_ids: Select[tuple[str]]) -> Select[Any]:
     place = func.row_number().over(partition_by=session.c.id, order_by=_COUNTS_FIRST).label("place")
     ranked = _joined(select(analysis.c.id, place)).where(session.c.id.in_(session_ids)).subquery()
-    rows = c.execute(_QUERY.where(analysis.c.id.in_(select(ranked.c.id).where(ranked.c.place == 1)))).all()
-    return {found.session_id: found for found in _analyses(c, rows)}
+    return _QUERY.where(analysis.c.id.in_(select(ranked.c.id).where(ranked.c.place == 1)))
 
 
 def get_shown(c: Connection, session_id: str) -> AnalysisRecord:
@@ -165,13 +181,21 @@ _COUNTS_FIRST = (
 )
 
 
-def _analyses(c: Connection, rows: Sequence[Any]) -> list[AnalysisRecord]:
+_IDS = select(session.c.id).where(session.c.id.in_(bindparam("session_ids", expanding=True)))
+_FILES = (
+    select(*(analysis_file.c[name] for name in ("analysis_id", "name", "sha256", "size")))
+    .where(analysis_file.c.analysis_id.in_(bindparam("analysis_ids", expanding=True)))
+    .order_by(analysis_file.c.name)
+)
+
+
+def _analyses(c: Connection, result: Result[Any]) -> list[AnalysisRecord]:
     """Analyses with their files, all read in one statement."""
-    files: dict[str, dict[str, Blob]] = {row.id: {} for row in rows}
-    query = select(analysis_file).where(analysis_file.c.analysis_id.in_(files))
-    for f in c.execute(query.order_by(analysis_file.c.name)) if files else ():
-        files[f.analysis_id][f.name] = Blob(f.sha256, f.size)
-    return [AnalysisRecord(**row._asdict(), files=files[row.id]) for row in rows]
+    files: defaultdict[str, dict[str, Blob]] = defaultdict(dict)
+    made = make_all(lambda **row: AnalysisRecord(**row, files=files[row["id"]]), result)
+    for of, name, sha256, size in c.execute(_FILES, {"analysis_ids": list(files)}) if files else ():
+        files[of][name] = Blob(sha256, size)
+    return made
 
 
 def complete_manifest(c: Connection, session_id: str, manifest: Mapping[str, Any] | None) -> dict[str, Any]:

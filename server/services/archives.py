@@ -92,10 +92,10 @@ def write_archive(
 
 def _settings(blobs: BlobStore, recording: StoredRecording, found: AnalysisRecord) -> Mapping[str, Any]:
     """What the analysis was computed with, also where it came in an archive among the recording's files."""
-    from core.formats.source import SourceFile  # slow import
-    from server.services.analysing import choose_config
+    from server.services.analysing import choose_config  # slow imports
+    from server.storage.blob_source import open_source
 
-    files = [SourceFile.of_path(blobs.path(recording.patient_id, f.sha256), f.name) for f in recording.files]
+    files = [open_source(blobs, recording.patient_id, f.name, f.size, f.sha256) for f in recording.files]
     return choose_config(files, found.config)
 
 

@@ -16,7 +16,8 @@ from typing import Any, Final
 
 from core.formats.json_tree import read_json
 from server.services.backups import BackupError, list_backups, make_backup, prune
-from server.services.restoring import RestoreError, try_restore
+from server.services.restore_room import RestoreError
+from server.services.restoring import try_restore
 from server.services.tombstones import TombstoneError
 from server.settings import Settings
 from server.storage import fs
@@ -38,6 +39,12 @@ NOT_TESTED: Final = (
     "It is encrypted for a key that is not on this computer. Try it where the key is: "
     "sagittal restore FILE --key FILE --test."
 )
+
+LEFT_OUT: Final = (
+    "The key of patients' names is not in it: it is not encrypted, or the key cannot be read. "
+    "Keep a copy on paper."
+)
+CLOSED: Final = "Patients' names in it need their key, which is not in it or is another one."
 
 
 @dataclass(frozen=True)
@@ -117,11 +124,11 @@ def run(settings: Settings) -> BackupState:
         with closing(Database(settings.database_source)) as db:
             made = make_backup(db, settings, folder, key)
         prune(folder)
-        said = (
-            f"{len(made.missing)} stored files are gone or damaged; see sagittal check."
-            if made.missing
-            else ""
-        )
+        said = ""
+        if made.left_out is not None:
+            said = LEFT_OUT
+        if made.missing:
+            said = f"{len(made.missing)} stored files are gone or damaged; see sagittal check."
         backup = Outcome(now(), not made.missing, made.path.name, said, made.size)
     except (BackupFileError, BackupError, MigrationError, TombstoneError, OSError) as error:
         log.error("no backup was made: %s", error)
@@ -149,7 +156,10 @@ def _test(settings: Settings, folder: Path, key: ClinicKey | None) -> Outcome:
         log.error("the newest backup could not be restored: %s", error)
         return Outcome(now(), False, newest.name, str(error))
     said = f"{found.patients} patients, {found.sessions} visits, {found.files} files."
-    return Outcome(now(), True, newest.name, said)
+    if found.names_open:
+        return Outcome(now(), True, newest.name, said)
+    # what is not encrypted never holds the key; what is should
+    return Outcome(now(), key is None, newest.name, f"{said} {CLOSED}")
 
 
 def _parse(tree: Any) -> Outcome | None:

@@ -21,7 +21,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 
 from sqlalchemy import Connection, func, select, update
 
@@ -32,12 +32,12 @@ from server.services.tombstones import find_tombstones, keep_tombstones
 from server.settings import Settings
 from server.storage import fs
 from server.storage.archive import ArchiveWriter, ClinicKey, write_archive
-from server.storage.blobs import BlobStore
+from server.storage.blob_opening import open_blobs
+from server.storage.blobs import BlobStore, StoreAway
 from server.storage.db import Database
 from server.storage.high_water import HighWater, read_newest
 from server.storage.migrate import copy_database, read_revision
 from server.storage.tables import job, new_id, now, patient, session
-from server.storage.trash import Trash
 
 log = logging.getLogger(__name__)
 
@@ -45,6 +45,8 @@ FORMAT: Final = 1
 """Version of the manifest; a later one may add keys, never change these."""
 MANIFEST: Final = "manifest.json"
 DATABASE: Final = "sagittal.db"
+IDENTITY_KEY: Final = "identity.key"
+"""The key of patients' names, wherever it is kept; in encrypted backups only."""
 ENDS: Final = (".tar", ".tar.age")
 """How the name of a backup ends; any other name is a folder that is not there."""
 DAYS, WEEKS, MONTHS = 7, 4, 12
@@ -78,6 +80,7 @@ class MadeBackup:
     path, size : the file, bytes. files : how many stored files and live logs are in it.
     head : newest audit row.
     missing : (space, sha256) of files that the database refers to and that are gone or damaged, so not in it.
+    left_out : the key of patients' names, where it is not in it: not encrypted, or the key cannot be read.
     """
 
     path: Path
@@ -85,6 +88,7 @@ class MadeBackup:
     files: int
     head: HighWater | None
     missing: list[tuple[str, str]]
+    left_out: Path | None
 
 
 @dataclass
@@ -130,6 +134,8 @@ def make_backup(
         raise BackupError("Another backup is being made; wait for it.") from error
     except OSError as error:
         raise BackupError(f"{path} could not be written ({error.strerror or error}).") from error
+    except StoreAway as error:
+        raise BackupError(f"The stored files cannot be read ({error.detail}); no backup was made.") from error
     with db.write() as c:
         detail = {"files": made.files, "size": made.size, "missing": len(made.missing)}
         audit.record(c, actor, "backup.made", "database", None, detail)
@@ -205,6 +211,7 @@ def _write(
             content.missing = [one for one in content.missing if one[0] not in erased.patients]
             if settings.second_factor_key.exists():
                 _add(archive, settings.second_factor_key.name, settings.second_factor_key, content)
+            left_out = _add_names_key(archive, settings, content, encrypted=key is not None)
             manifest = {
                 "format": FORMAT,
                 "created_at": at.isoformat(),
@@ -220,7 +227,7 @@ def _write(
             text = json.dumps(manifest).encode()
             archive.add(MANIFEST, io.BytesIO(text), len(text))
         file.keep(path)
-        return MadeBackup(path, file.size, len(content.files) - 1, head, content.missing)
+        return MadeBackup(path, file.size, len(content.files) - 1, head, content.missing, left_out)
 
 
 @contextlib.contextmanager
@@ -238,14 +245,38 @@ def _snapshot(db: Database, settings: Settings) -> Iterator[Path]:
 
 def _add(archive: ArchiveWriter, name: str, path: Path, content: _Content) -> None:
     with path.open("rb") as source:
-        # a live log grows meanwhile: what is there now is a whole beginning of it
-        size = path.stat().st_size
-        content.files.append((name, size, archive.add(name, source, size)))
+        _add_open(archive, name, source, content)
+
+
+def _add_open(archive: ArchiveWriter, name: str, source: BinaryIO, content: _Content) -> None:
+    # a live log grows meanwhile: what is there now is a whole beginning of it
+    size = source.seek(0, io.SEEK_END)
+    source.seek(0)
+    content.files.append((name, size, archive.add(name, source, size)))
+
+
+def _add_names_key(
+    archive: ArchiveWriter, settings: Settings, content: _Content, *, encrypted: bool
+) -> Path | None:
+    """Add the key of patients' names where it is safe; returns its file where it was left out."""
+    file = settings.identity_key_file
+    try:
+        with file.open("rb") as source:
+            data = source.read()
+    except FileNotFoundError:
+        return None
+    except OSError:
+        log.exception("the key of patients' names cannot be read, and is not in the backup")
+        return file
+    if not encrypted:
+        return file
+    content.files.append((IDENTITY_KEY, len(data), archive.add(IDENTITY_KEY, io.BytesIO(data), len(data))))
+    return None
 
 
 def _add_live(archive: ArchiveWriter, settings: Settings, content: _Content) -> None:
     for pattern in ("*.log", "*.damaged"):
-        for path in sorted(settings.live.glob(pattern)):
+        for path in sorted(one for folder in settings.live_folders for one in folder.glob(pattern)):
             with contextlib.suppress(FileNotFoundError):  # its take has just ended: a recording by now
                 _add(archive, f"live/{path.name}", path, content)
 
@@ -253,14 +284,14 @@ def _add_live(archive: ArchiveWriter, settings: Settings, content: _Content) -> 
 def _add_blobs(
     archive: ArchiveWriter, settings: Settings, used: Iterable[tuple[str, str]], content: _Content
 ) -> None:
-    blobs = BlobStore(settings.blobs)
+    blobs = open_blobs(settings)
     for space, sha256 in used:
-        path = _find(blobs, settings, space, sha256)
-        try:
-            _add(archive, f"blobs/{space}/{sha256}", path, content)
-        except FileNotFoundError:
+        source = _open(blobs, space, sha256)
+        if source is None:
             content.missing.append((space, sha256))
             continue
+        with source:
+            _add_open(archive, f"blobs/{space}/{sha256}", source, content)
         name, _, found = content.files[-1]
         if found != sha256:
             # its bytes stay in the archive for whoever can mend them; a restore takes it for what it is
@@ -268,13 +299,16 @@ def _add_blobs(
             content.missing.append((space, sha256))
 
 
-def _find(blobs: BlobStore, settings: Settings, space: str, sha256: str) -> Path:
-    """Where a file is: in its place, or in the trash since the snapshot."""
-    path = blobs.path(space, sha256)
-    if path.is_file():
-        return path
-    trashed = (one.path for one in Trash(settings.trash).files() if (one.space, one.name) == (space, sha256))
-    return next(trashed, path)
+def _open(blobs: BlobStore, space: str, sha256: str) -> BinaryIO | None:
+    """A file in its place, or in the trash since the snapshot; None = it is in neither."""
+    found = blobs.open_unverified(space, sha256)
+    if found is not None:
+        return found
+    for one in blobs.trash.files():
+        if (one.space, one.name) == (space, sha256):
+            with contextlib.suppress(FileNotFoundError):
+                return blobs.trash.open(one)
+    return None
 
 
 def _clear(folder: Path, least_age_s: float) -> None:

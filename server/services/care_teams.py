@@ -8,17 +8,17 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 from unicodedata import normalize
 
-from sqlalchemy import Connection, delete, exists, insert, select, union
+from sqlalchemy import Connection, Row, Select, case, delete, exists, insert, select, union, update
 
 from server import audit
 from server.auth.identity import Identity
 from server.auth.roles import Role
-from server.auth.sight import CARE_TEAMS, TEAMS_ARE_ON, may_open
-from server.services import patients
-from server.services.errors import Conflict, NotFound, ServiceError
+from server.auth.sight import CARE_TEAMS, TEAMS_ARE_ON, is_emergency_open, may_open
+from server.services import patients, report_links
+from server.services.errors import Conflict, NotAllowed, NotFound, ServiceError
 from server.storage.care_tables import care_team_member, clinic_option, emergency_access
 from server.storage.tables import audit as audit_table
 from server.storage.tables import new_id, now, patient, session, user
@@ -29,7 +29,13 @@ SHOWN: Final = dt.timedelta(days=90)
 """How long the patient's page shows that; the audit log keeps it."""
 REASON: Final = (10, 500)
 """Characters of a reason, at least and at most."""
-_NOT_OF_A_TEAM: Final = ("emergency.opened", "patient.code_refused", "study.exported")
+_NOT_OF_A_TEAM: Final = (
+    "emergency.opened",
+    "emergency.ended",
+    "patient.code_refused",
+    "patient.hidden",
+    "study.exported",
+)
 """Rows of the audit log that put nobody into a team: from outside it, or of a study over many visits."""
 
 
@@ -44,19 +50,22 @@ class TeamMember:
 
 @dataclass(frozen=True)
 class EmergencyAccess:
-    """Somebody outside the team opened the patient: by whom, why, from when to when."""
+    """Somebody outside the team opened the patient: by whom (name, account), why, from when to when.
+
+    Parameters
+    ----------
+    ended_at : somebody ended it then, before its time. is_open : it went on when it was read.
+    """
 
     id: str
     patient_id: str
     by: str
+    by_id: str
     reason: str
     opened_at: dt.datetime
     ends_at: dt.datetime
-
-    @property
-    def is_open(self) -> bool:
-        """Whether it goes on."""
-        return self.ends_at > now()
+    ended_at: dt.datetime | None
+    is_open: bool
 
 
 def are_on(c: Connection) -> bool:
@@ -171,23 +180,73 @@ def open_in_emergency(c: Connection, who: Identity, code: str, reason: str) -> E
     # the reason stays with the patient, and goes when the patient is erased; the row of the log does not
     detail = {"access": row["id"], "hours": EMERGENCY / dt.timedelta(hours=1)}
     audit.record(c, who, "emergency.opened", "patient", found, detail)
-    return EmergencyAccess(**row, by=who.display_name or who.name)
+    return _get_access(c, row["id"])
+
+
+def may_end(access: EmergencyAccess, who: Identity) -> bool:
+    """Whether somebody may end an access: whose it is, and administrators."""
+    return who.is_admin or access.by_id == who.user_id
+
+
+def end_emergency(c: Connection, who: Identity, access_id: str) -> EmergencyAccess:
+    """End an access in an emergency now, and the links that were made in it; one that is over stays as it is.
+
+    Raises
+    ------
+    NotFound; NotAllowed `not_yours`, of somebody else's.
+    """
+    found = _get_access(c, access_id)
+    if not may_end(found, who):
+        raise NotAllowed(
+            "not_yours", f"{found.by} opened this patient. Ask that person or an administrator to end it."
+        )
+    if found.is_open:
+        mine = emergency_access.c.id == access_id
+        c.execute(update(emergency_access).where(mine).values(ended_at=now()))
+        report_links.end_of_emergency(c, who, access_id)
+        audit.record(c, who, "emergency.ended", "patient", found.patient_id, {"access": access_id})
+    return _get_access(c, access_id)
+
+
+def end_all_emergencies(c: Connection) -> None:
+    """End every access in an emergency: of a database put back, who ended one since is not known."""
+    # those that are over too: the clock of this computer may be ahead
+    unended = update(emergency_access).where(emergency_access.c.ended_at.is_(None))
+    over = case((is_emergency_open(), now()), else_=emergency_access.c.ends_at)
+    c.execute(unended.values(ended_at=over))
 
 
 def list_accesses(c: Connection, patient_id: str) -> list[EmergencyAccess]:
     """Who opened a patient in an emergency of late, the newest first."""
-    query = (
-        select(emergency_access, user.c.name, user.c.display_name)
-        .join(user, user.c.id == emergency_access.c.user_id)
-        .where(emergency_access.c.patient_id == patient_id, emergency_access.c.opened_at > now() - SHOWN)
-        .order_by(emergency_access.c.opened_at.desc())
+    of_late = (emergency_access.c.patient_id == patient_id) & (emergency_access.c.opened_at > now() - SHOWN)
+    query = _select_accesses().where(of_late).order_by(emergency_access.c.opened_at.desc())
+    return [_make_access(row) for row in c.execute(query)]
+
+
+def _select_accesses() -> Select[Any]:
+    columns = (emergency_access, is_emergency_open().label("is_open"), user.c.name, user.c.display_name)
+    return select(*columns).join(user, user.c.id == emergency_access.c.user_id)
+
+
+def _get_access(c: Connection, access_id: str) -> EmergencyAccess:
+    row = c.execute(_select_accesses().where(emergency_access.c.id == access_id)).first()
+    if row is None:
+        raise NotFound("access in an emergency", access_id)
+    return _make_access(row)
+
+
+def _make_access(row: Row[Any]) -> EmergencyAccess:
+    return EmergencyAccess(
+        row.id,
+        row.patient_id,
+        row.display_name or row.name,
+        row.user_id,
+        row.reason,
+        row.opened_at,
+        row.ends_at,
+        row.ended_at,
+        row.is_open,
     )
-    return [
-        EmergencyAccess(
-            row.id, row.patient_id, row.display_name or row.name, row.reason, row.opened_at, row.ends_at
-        )
-        for row in c.execute(query)
-    ]
 
 
 def _list_past(c: Connection) -> list[tuple[str, str]]:

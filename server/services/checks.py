@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +10,11 @@ from sqlalchemy.exc import DatabaseError
 
 from core.errors import SagittalError
 from server import audit
-from server.services import custody, live_logs
+from server.auth import second_factor
+from server.services import custody, identities, live_logs
 from server.services.references import list_referenced
 from server.settings import Settings
-from server.storage.blobs import BlobStore
+from server.storage.blobs import BlobStore, StoreAway, digest_open
 from server.storage.db import Database
 from server.storage.high_water import explain_lost_rows
 from server.storage.trash import Trash, TrashedFile
@@ -26,7 +26,7 @@ class StorageDefect:
 
     Parameters
     ----------
-    area : database, files, live, trash or audit.
+    area : database, files, live, trash, audit, or keys: what cannot be read by its key.
     message : what, and where.
     """
 
@@ -42,12 +42,17 @@ def check(
     known_missing: Collection[tuple[str, str]] = (),
     kept_head: Path | None = None,
 ) -> list[StorageDefect]:
-    """Check database, stored files by their hash, live logs, trash and audit chain.
+    """Check database, stored files by their hash, live logs, trash, audit chain and what is encrypted.
 
     Parameters
     ----------
     known_missing : files (space, sha256) of which it is known already that they are not there.
     kept_head : a file like `audit.mark` that was kept elsewhere: the log must still hold that row.
+
+    Raises
+    ------
+    StoreAway
+        the stored files cannot be looked at now.
     """
     try:
         found = [StorageDefect("database", text) for text in db.problems()]
@@ -56,6 +61,11 @@ def check(
             found += [StorageDefect("audit", text) for text in audit.find_problems(c)]
             cut = None if kept_head is None else explain_lost_rows(c, kept_head)
             doubted = custody.find_doubt(c, settings)
+            unread = [
+                *identities.find_problems(c, settings.identity_key_file),
+                *second_factor.find_problems(c, settings.second_factor_key),
+            ]
+            found += [StorageDefect("keys", text) for text in unread]
     except DatabaseError as error:
         return [StorageDefect("database", f"cannot be read ({error.orig}); restore it from a backup")]
     if doubted is not None:
@@ -65,13 +75,15 @@ def check(
         cut = f"There is no file {kept_head}, so nobody knows whether the audit log is whole."
     if cut is not None:
         found.append(StorageDefect("audit", cut))
-    trash = list(Trash(settings.trash).files())
+    trash = list(blobs.trash.files())
     waiting = {(one.space, one.name) for one in trash}
     for space, sha256 in used:
         if (space, sha256) in known_missing:
             continue
         try:
             blobs.open(space, sha256).close()
+        except StoreAway:
+            raise
         except SagittalError as error:
             text = f"patient {space}: {error.message}"
             if (space, sha256) in waiting:
@@ -79,27 +91,32 @@ def check(
             found.append(StorageDefect("files", text))
         except OSError as error:
             found.append(StorageDefect("files", f"patient {space}, file {sha256[:12]}…: {error.strerror}"))
-    return [*found, *_check_live(db, settings), *(f for one in trash for f in _check_discarded(one))]
+    return [
+        *found,
+        *_check_live(db, settings),
+        *(f for one in trash for f in _check_discarded(blobs.trash, one)),
+    ]
 
 
 def _check_live(db: Database, settings: Settings) -> list[StorageDefect]:
     found = []
     with db.read() as c:
-        for log in live_logs.list_logs(c, settings.live):
+        for log in live_logs.list_logs(c, settings):
             if not log.known:
                 text = f"the database knows nothing of {log.path.name} ({log.words}); see `sagittal adopt`."
                 found.append(StorageDefect("live", text))
             if log.damage is not None:
                 found.append(StorageDefect("live", f"{log.path.name}: {log.damage.sentence}"))
-    for path in live_logs.list_originals(settings.live):
+    for path in live_logs.list_originals(settings):
         text = f"{path.name} is the original of a damaged log; remove it when nobody needs it any more."
         found.append(StorageDefect("live", text))
     return found
 
 
-def _check_discarded(one: TrashedFile) -> list[StorageDefect]:
+def _check_discarded(trash: Trash, one: TrashedFile) -> list[StorageDefect]:
     try:
-        whole = hashlib.sha256(one.path.read_bytes()).hexdigest() == one.name
+        with trash.open(one) as file:
+            whole = digest_open(file) == one.name
     except OSError as error:
-        return [StorageDefect("trash", f"{one.path}: {error.strerror}")]
-    return [] if whole else [StorageDefect("trash", f"{one.path} has changed on the disk.")]
+        return [StorageDefect("trash", f"{trash.place}/{one.way}: {error.strerror}")]
+    return [] if whole else [StorageDefect("trash", f"{trash.place}/{one.way} has changed on the disk.")]

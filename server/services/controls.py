@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, bindparam, select
 
 from core.condition import WalkingCondition
 from core.norms.controls import ControlGroup, ControlSession, control_group, mean_curves
@@ -43,29 +43,35 @@ def list_visits(c: Connection, this: Patient, session: Session) -> tuple[Control
 
     The pace is theirs: of these visits those count that are as fast as the person (`make_group`).
     """
-    theirs = (
-        select(session_table.c.id)
-        .join(patient, patient.c.id == session_table.c.patient_id)
-        .where(
-            patient.c.is_control,
-            patient.c.id != this.id,
-            session_table.c.protocol == session.protocol,
-        )
-    )
-    shown = analyses.latest_of(c, theirs)
+    values = {"this_id": this.id, "this_protocol": session.protocol}
+    shown = analyses.latest_of(c, _THEIRS, values)
     edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
-    query = (
-        select(session_table, patient.c.code, patient.c.sex, patient.c.birth_year)
-        .join(patient, patient.c.id == session_table.c.patient_id)
-        .where(session_table.c.id.in_(theirs))
-        .order_by(session_table.c.id)
-    )
     return tuple(
         ControlVisit(row.code, row.sex, row.birth_year, row.performed_on, found, edits[found.id])
-        for row in c.execute(query)
+        for row in c.execute(_PEOPLE, values)
         if (found := shown.get(row.id)) is not None
         and WalkingCondition(aid=row.aid, orthosis=row.orthosis, feedback=row.feedback).is_unaided
     )
+
+
+_THEIRS: Final = (
+    select(session_table.c.id)
+    .join(patient, patient.c.id == session_table.c.patient_id)
+    .where(
+        patient.c.is_control,
+        patient.c.id != bindparam("this_id"),
+        session_table.c.protocol == bindparam("this_protocol"),
+    )
+)
+_PEOPLE: Final = (
+    select(
+        *(session_table.c[name] for name in ("id", "performed_on", "aid", "orthosis", "feedback")),
+        *(patient.c[name] for name in ("code", "sex", "birth_year")),
+    )
+    .join(patient, patient.c.id == session_table.c.patient_id)
+    .where(session_table.c.id.in_(_THEIRS))
+    .order_by(session_table.c.id)
+)
 
 
 def make_group(

@@ -7,8 +7,10 @@ accept(db, settings)            # somebody answers: this database is the right o
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
+from collections.abc import Callable
 from contextlib import closing
 
 from sqlalchemy import Connection, func, select
@@ -17,12 +19,15 @@ from sqlalchemy.exc import DatabaseError
 from server import audit
 from server.services import erasure
 from server.settings import Settings
-from server.storage.blobs import INCOMING, BlobStore
+from server.storage.blob_opening import open_blobs
+from server.storage.blobs import INCOMING, StoreAway
 from server.storage.db import Database
 from server.storage.high_water import explain_lost_rows, read_newest, set_mark
 from server.storage.migrate import exists
 from server.storage.tables import audit as audit_table
 from server.storage.tables import patient
+
+log = logging.getLogger(__name__)
 
 ACCEPTED = "database.accepted"
 
@@ -37,23 +42,42 @@ def refuse_strangers(settings: Settings) -> None:
     Creates no database; a file that cannot be read is left to `storage.migrate`, which says so.
     """
     if not exists(settings.database_source):
-        if settings.restoring.exists():
-            raise StrangersError(
-                f"A restore into {settings.data_dir} was interrupted. Run `sagittal restore` again; to begin "
-                f"an empty clinic instead, remove {settings.restoring} first."
-            )
-        text = _strangers(settings, erased=set())
+        refuse_half_restored(settings)
+        text = _strangers_if_known(settings, erased=set())
     else:
         with closing(Database(settings.database_source)) as db:
             try:
                 with db.read() as c:
-                    text = _strangers_of(c, settings)
+                    text = _strangers_of(c, settings, _strangers_if_known)
             except DatabaseError as error:
                 if "no such table" not in str(error.orig):
                     return
-                text = _strangers(settings, erased=set())
+                text = _strangers_if_known(settings, erased=set())
     if text is not None:
         raise StrangersError(text)
+
+
+def refuse_half_restored(settings: Settings) -> None:
+    """Raise StrangersError where a restore was cut off before it put the database in place; makes nothing."""
+    if settings.restoring.exists() and not exists(settings.database_source):
+        raise StrangersError(
+            f"A restore into {settings.data_dir} was interrupted. Run `sagittal restore` again; to begin "
+            f"an empty clinic instead, remove {settings.restoring} first."
+        )
+
+
+def refuse_wrong_clock(db: Database, settings: Settings) -> bool:
+    """Raise StrangersError where this host's clock is not the database's; False = the database is here."""
+    theirs = db.read_clock()
+    if theirs is None:
+        return False
+    apart = abs(time.time() - theirs)
+    if apart > settings.lease_s / 3:
+        raise StrangersError(
+            f"This computer's clock and PostgreSQL's are {apart:.1f} s apart, allowed are "
+            f"{settings.lease_s / 3:.1f}. Set both by NTP."
+        )
+    return True
 
 
 def refuse_foreign_folder(
@@ -65,15 +89,8 @@ def refuse_foreign_folder(
     clocks that agree. The server writes the mark some seconds after the first row of the audit log; until
     there is one nobody has work, and this waits (`stop` ends it).
     """
-    theirs = db.read_clock()
-    if theirs is None:
+    if not refuse_wrong_clock(db, settings):
         return
-    apart = abs(time.time() - theirs)
-    if apart > settings.lease_s / 3:
-        raise StrangersError(
-            f"This computer's clock and PostgreSQL's are {apart:.1f} s apart, allowed are "
-            f"{settings.lease_s / 3:.1f}. Set both by NTP."
-        )
     until = time.monotonic() + patience_s
     while not settings.mark.exists() and not stop.wait(0.2):
         with db.read() as c:
@@ -95,32 +112,54 @@ def refuse_foreign_folder(
 
 def find_doubt(c: Connection, settings: Settings) -> str | None:
     """Why no stored file may be taken away on the word of this database, as a sentence; None = it may."""
-    return explain_lost_rows(c, settings.mark) or _strangers_of(c, settings)
+    try:
+        return _doubt(c, settings)
+    except StoreAway:
+        return (
+            f"The database in {settings.data_dir} knows no patient, and {settings.bucket} does not say now "
+            "whether stored files are there."
+        )
 
 
 def accept(db: Database, settings: Settings) -> str | None:
-    """Trust this database from now on; returns what was doubted, None = nothing was."""
+    """Trust this database from now on; returns what was doubted, None = nothing was. Raises StoreAway."""
     with db.write() as c:
-        doubted = find_doubt(c, settings)
+        doubted = _doubt(c, settings)
         if doubted is not None:
             audit.record(c, None, ACCEPTED, "database", None, {"by": "console", "doubt": doubted})
     set_mark(db, settings.mark)
     return doubted
 
 
-def _strangers_of(c: Connection, settings: Settings) -> str | None:
+def _doubt(c: Connection, settings: Settings) -> str | None:
+    return explain_lost_rows(c, settings.mark) or _strangers_of(c, settings, _strangers)
+
+
+def _strangers_of(
+    c: Connection, settings: Settings, look: Callable[[Settings, set[str]], str | None]
+) -> str | None:
     if c.execute(select(func.count()).select_from(patient)).scalar_one():
         return None
     if c.execute(select(audit_table.c.seq).where(audit_table.c.action == ACCEPTED).limit(1)).first():
         return None
-    return _strangers(settings, erasure.list_erased_spaces(c))
+    return look(settings, erasure.list_erased_spaces(c))
+
+
+def _strangers_if_known(settings: Settings, erased: set[str]) -> str | None:
+    """As `_strangers`; None also when the files are in a bucket that is away: then nobody knows."""
+    try:
+        return _strangers(settings, erased)
+    except StoreAway:
+        log.warning("%s cannot be asked whether it holds another clinic's files", settings.bucket)
+        return None
 
 
 def _strangers(settings: Settings, erased: set[str]) -> str | None:
     spaces, takes = erasure.list_unfinished(settings)
     leaving = erased | spaces | {INCOMING}
-    files = sum(1 for f in BlobStore(settings.blobs).files() if f.space not in leaving)
-    logs = sum(1 for p in settings.live.glob("*.log") if p.stem not in takes)
+    files = sum(1 for f in open_blobs(settings).files() if f.space not in leaving)
+    found = (path for folder in settings.live_folders for path in folder.glob("*.log"))
+    logs = sum(1 for path in found if path.stem not in takes)
     if not files and not logs:
         return None
     return (

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Final
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, bindparam, select
 
 from core.events.edits import Edit, read_edit
 from server.storage.tables import edit as rows
@@ -61,18 +61,20 @@ def edits_of(c: Connection, analysis_id: str) -> EditHistory:
     return edits_of_all(c, [analysis_id])[analysis_id]
 
 
+_OF_ALL: Final = (
+    select(rows, user.c.display_name)
+    .join(user, user.c.id == rows.c.user_id, isouter=True)
+    .where(rows.c.analysis_id.in_(bindparam("analysis_ids", expanding=True)))
+    .order_by(rows.c.seq)
+)
+
+
 def edits_of_all(c: Connection, analysis_ids: Collection[str]) -> dict[str, EditHistory]:
     """The live edits of many analyses by analysis, in one statement."""
-    query = (
-        select(rows, user.c.display_name)
-        .join(user, user.c.id == rows.c.user_id, isouter=True)
-        .where(rows.c.analysis_id.in_(analysis_ids))
-        .order_by(rows.c.seq)
-    )
     made: dict[str, list[MadeEdit]] = {found: [] for found in analysis_ids}
     version = dict.fromkeys(made, 0)
     changed_at: dict[str, dt.datetime] = {}
-    for row in c.execute(query) if made else ():
+    for row in c.execute(_OF_ALL, {"analysis_ids": list(made)}) if made else ():
         version[row.analysis_id], changed_at[row.analysis_id] = row.seq, row.at
         if row.kind == UNDO:
             made[row.analysis_id].pop()

@@ -12,11 +12,12 @@ import json
 import logging
 import re
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, delete, select, update
+from sqlalchemy.exc import SQLAlchemyError
 
 from core.formats.json_tree import read_json
 from server import audit
@@ -26,11 +27,11 @@ from server.services.references import list_referenced
 from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
 from server.storage import fs
-from server.storage.blobs import BlobStore
+from server.storage.blobs import BlobStore, StoreAway
 from server.storage.care_tables import care_team_member, emergency_access
 from server.storage.db import Database
 from server.storage.live_tables import live_event, live_take
-from server.storage.person_tables import consent
+from server.storage.person_tables import consent, patient_identity
 from server.storage.report_tables import assessment, report_file, report_link, signed_report
 from server.storage.tables import (
     analysis,
@@ -55,7 +56,6 @@ from server.storage.tables import (
     tuning,
 )
 from server.storage.tables import audit as audit_table
-from server.storage.trash import Trash
 
 log = logging.getLogger(__name__)
 
@@ -92,7 +92,7 @@ def erase_patient(
         c.execute(delete(programme).where(programme.c.patient_id == patient_id))
         c.execute(delete(prescription).where(prescription.c.patient_id == patient_id))
         c.execute(delete(patient_note).where(patient_note.c.patient_id == patient_id))
-        for table in (consent, care_team_member, emergency_access):
+        for table in (patient_identity, consent, care_team_member, emergency_access):
             c.execute(delete(table).where(table.c.patient_id == patient_id))
         c.execute(delete(patient).where(patient.c.id == patient_id))
         audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": found.sessions})
@@ -157,11 +157,11 @@ def finish(db: Database, blobs: BlobStore, settings: Settings) -> None:
             log.error("%s cannot be read; what it was to erase is not known any more", path)
             continue
         try:
-            # under the write lock: whoever wrote the note has either committed or given up
-            with db.write() as c:
-                _remove(c, blobs, settings, note)
+            # a store that is away is found out before the lock, which others wait for
+            blobs.has("0" * 32, "0" * 64)
+            _remove(db, blobs, settings, note)
             is_gone = db.fold()
-        except (OSError, sqlite3.Error):
+        except (OSError, sqlite3.Error, SQLAlchemyError, StoreAway):
             log.exception("what %s is to erase cannot be removed; it will be tried again", path.name)
             continue
         if not is_gone:
@@ -173,16 +173,19 @@ def finish(db: Database, blobs: BlobStore, settings: Settings) -> None:
 
 def discard(db: Database, blobs: BlobStore, space: str, names: Iterable[str]) -> None:
     """Remove files for good that were stored for something that has been erased meanwhile."""
-    with db.write() as c:
-        used = list_referenced(c)
-        for name in set(names):
-            if (space, name) not in used:
-                blobs.remove(space, name)
+    wanted = sorted(set(names))
+    for group in (wanted[i : i + blobs.moved_at_once] for i in range(0, len(wanted), blobs.moved_at_once)):
+        with db.write() as c:
+            used = list_referenced(c)
+            blobs.remove(space, *(name for name in group if (space, name) not in used))
 
 
-def list_erased_spaces(c: Connection) -> set[str]:
-    """Ids of all patients that were erased, as the audit log has them."""
-    found = set(c.execute(select(audit_table.c.resource_id).where(audit_table.c.action == ERASED)).scalars())
+def list_erased_spaces(c: Connection, among: Collection[str] | None = None) -> set[str]:
+    """Ids of all patients that were erased, or of those among some, as the audit log has them."""
+    query = select(audit_table.c.resource_id).where(audit_table.c.action == ERASED)
+    if among is not None:
+        query = query.where(audit_table.c.resource == "patient", audit_table.c.resource_id.in_(among))
+    found = set(c.execute(query).scalars())
     return found - set(c.execute(select(patient.c.id)).scalars())
 
 
@@ -231,27 +234,37 @@ def _read(path: Path) -> dict[str, Any] | None:
     return {"spaces": spaces, "files": files, "takes": takes, "parts": parts}
 
 
-def _remove(c: Connection, blobs: BlobStore, settings: Settings, note: dict[str, Any]) -> None:
-    """Remove what a note lists and no row needs; the rows are still there when the erasure was given up."""
-    trash = Trash(settings.trash)
-    there = set(c.execute(select(patient.c.id).where(patient.c.id.in_(note["spaces"]))).scalars())
-    for space in set(note["spaces"]) - there:
+def _remove(db: Database, blobs: BlobStore, settings: Settings, note: dict[str, Any]) -> None:
+    """Remove what a note lists and no row needs; the rows are still there when the erasure was given up.
+
+    Under the write lock, where whoever wrote the note has either committed or given up, only what may be
+    stored again is removed, some at a time: an erased patient, take or upload never comes back.
+    """
+    with db.write() as c:
+        spaces, takes, parts = (
+            set(note[key]) - set(c.execute(select(ids).where(ids.in_(note[key]))).scalars())
+            for key, ids in (("spaces", patient.c.id), ("takes", live_take.c.id), ("parts", file_upload.c.id))
+        )
+        used = list_referenced(c) if note["files"] else set()
+    trash = blobs.trash
+    for space in spaces:
         blobs.erase(space)
         trash.remove(space)
-    used = list_referenced(c) if note["files"] else set()
+    of_files: dict[str, list[str]] = {}
     for space, name in note["files"]:
         if (space, name) not in used:
-            blobs.remove(space, name)
-            trash.remove(space, [name])
-    takes = set(c.execute(select(live_take.c.id).where(live_take.c.id.in_(note["takes"]))).scalars())
-    for take in set(note["takes"]) - takes:
-        for path in settings.live.glob(f"{take}.*"):
+            of_files.setdefault(space, []).append(name)
+    for space, names in of_files.items():
+        discard(db, blobs, space, names)
+        trash.remove(space, names)
+    for take in takes:
+        for path in (one for folder in settings.live_folders for one in folder.glob(f"{take}.*")):
             fs.remove_file(path)
-    coming = set(c.execute(select(file_upload.c.id).where(file_upload.c.id.in_(note["parts"]))).scalars())
-    for part in set(note["parts"]) - coming:
+    for part in parts:
         fs.remove_file(blobs.part(part))
-    spaces = [blobs.root / space for space, _ in note["files"]]
-    for folder in (blobs.root, blobs.incoming, settings.live, *spaces):
+    blobs.settle(of_files)
+    for folder in (blobs.incoming, *settings.live_folders):
         if folder.is_dir():
             fs.sync_folder(folder)
-    trash.tidy()
+    with db.write():  # a sweep makes folders there under this lock
+        trash.tidy()

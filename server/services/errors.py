@@ -2,7 +2,7 @@
 
 403 not_yours
 404 not_found · 409 code_taken, name_taken, no_files, not_confirmed · 413 file_too_large, set_too_large,
-too_many_files · 422 bad_value · 507 disk_full · 500 blob_damaged, blob_missing
+too_many_files · 422 bad_value · 503 node_away · 507 disk_full · 500 blob_damaged, blob_missing
 """
 
 from __future__ import annotations
@@ -35,6 +35,22 @@ class Conflict(ServiceError):  # noqa: N818 - the name of the HTTP status
     """The present state does not allow it; the message says what to do first."""
 
     status = 409
+
+
+NODE_AWAY = "node_away"
+"""Also the problem of a take whose web server is away, or was when the take was ended."""
+
+
+class NodeAway(ServiceError):  # noqa: N818 - what the person reads
+    """The web server that has a live take is away."""
+
+    status = 503
+
+    def __init__(self, name: str | None) -> None:
+        super().__init__(
+            NODE_AWAY,
+            f"This live take is on the server '{name}', which is away. Try again in a moment.",
+        )
 
 
 class TooLarge(ServiceError):  # noqa: N818 - the name of the HTTP status

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from core.formats.json_tree import read_json
-from core.formats.live_log import LATEST_US, MOST_FRAME_BYTES, record
+from core.formats.live_log import LATEST_US, MOST_FRAME_BYTES, LogRecord, record
 from core.formats.live_reader import find_start_us
 from server import audit
 from server.services import erasure, live, live_recordings, recordings, videos
@@ -81,6 +81,7 @@ class FilmIntake:
 
     def __init__(self, settings: Settings, db: Database, blobs: BlobStore) -> None:
         self._settings, self._db, self._blobs = settings, db, blobs
+        self._owner = live.TakeOwner(settings.node_name or None)
         self._open: dict[str, _OpenFilm] = {}
         self._lock, self._settling = threading.Lock(), threading.Lock()
 
@@ -89,7 +90,7 @@ class FilmIntake:
 
         Raises
         ------
-        TokenNotValid; ServiceError no_consent; DiskFull.
+        TokenNotValid; ServiceError no_consent; DiskFull; NodeAway.
         """
         take = self._admit(take_id, token)
         videos.require_consent(consent)
@@ -139,8 +140,9 @@ class FilmIntake:
             if film is not None:
                 film.log.close()
         with self._settling:
-            if film_path(self._settings.live, take_id).exists():
-                return settle(self._db, self._blobs, self._settings, take_id)
+            path = film_path(self._settings.live, take_id)
+            if path.exists():
+                return settle(self._db, self._blobs, self._settings, path)
         with self._db.read() as c:
             return videos.find(c, take.session_id) is not None
 
@@ -156,6 +158,7 @@ class FilmIntake:
             take = live.by_token(c, take_id, token)
         if take is None:
             raise TokenNotValid
+        self._owner.require(take)
         return take
 
     def _find(self, take_id: str) -> _OpenFilm | None:
@@ -195,8 +198,12 @@ def film_path(folder: Path, take_id: str) -> Path:
     return folder / f"{take_id}.film"
 
 
-def settle(db: Database, blobs: BlobStore, settings: Settings, take_id: str) -> bool:
+def settle(db: Database, blobs: BlobStore, settings: Settings, path: Path) -> bool:
     """Set what has come of a film beside its take; without a recording, or a picture, it is discarded.
+
+    Parameters
+    ----------
+    path : of the film, named by the take, beside its log.
 
     Returns
     -------
@@ -207,12 +214,12 @@ def settle(db: Database, blobs: BlobStore, settings: Settings, take_id: str) -> 
     Conflict take_open while the take is not over and stored. NotFound the take: the film is left as it is,
     since the database may have been put back from a backup.
     """
-    path = film_path(settings.live, take_id)
+    take_id = path.stem
     with db.read() as c:
         take = live.get(c, take_id)
         opener = live_recordings.find_opener(c, take)
     stored = take.recording_id is not None
-    if take.is_open or (not stored and live_recordings.log_path(settings.live, take_id).exists()):
+    if take.is_open or (not stored and live_recordings.log_path(path.parent, take_id).exists()):
         raise Conflict("take_open", "The take is not over and stored yet; ask again in a moment.")
     try:
         kept = stored and _keep(db, blobs, settings, opener, take, path)
@@ -228,10 +235,10 @@ def settle(db: Database, blobs: BlobStore, settings: Settings, take_id: str) -> 
 def settle_abandoned(db: Database, blobs: BlobStore, settings: Settings) -> None:
     """Settle films whose tablet has not come back for so long that no token opens its take any more."""
     limit = now().timestamp() - live.TOKEN_LIFE.total_seconds()
-    for path in sorted(settings.live.glob("*.film")):
+    for path in sorted(one for folder in settings.live_folders for one in folder.glob("*.film")):
         try:
             if path.stat().st_mtime < limit:
-                settle(db, blobs, settings, path.stem)
+                settle(db, blobs, settings, path)
         except (Conflict, FileNotFoundError):
             continue
         except NotFound:
@@ -278,11 +285,16 @@ def _find_offset_s(
         return None
     with db.read() as c:
         this = recordings.get(c, take.recording_id)
-    origin = find_start_us(
-        one for f in this.files for _, one in segments.read_records(blobs.path(take.patient_id, f.sha256))
-    )
+    origin = find_start_us(_read_stored(blobs, take.patient_id, this))
     offset_s = None if origin is None else (origin - head.began_us) / 1e6
     return offset_s if offset_s is not None and abs(offset_s) <= videos.MOST_OFFSET_S else None
+
+
+def _read_stored(blobs: BlobStore, space: str, this: recordings.StoredRecording) -> Iterator[LogRecord]:
+    for stored in this.files:
+        with blobs.open(space, stored.sha256) as file:
+            for _, one in segments.read_open_records(file):
+                yield one
 
 
 def _read_pieces(path: Path) -> Iterator[bytes]:

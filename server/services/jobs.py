@@ -6,13 +6,14 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, func, join, select
+from sqlalchemy import Connection, Select, bindparam, func, join, select
 
 from server import audit
 from server.auth.identity import Identity
 from server.auth.sight import only_seen
 from server.jobs.queue import VIEW_COLUMNS, JobQueue, JobView
 from server.services.errors import NotFound
+from server.storage.db import Database
 from server.storage.tables import ACTIVE_STATES, job, patient, recording, session
 
 
@@ -44,18 +45,22 @@ def list_active(c: Connection, patient_ids: Collection[str]) -> list[ListedJob]:
     ]
 
 
-def count_active(c: Connection, who: Identity) -> int:
+def count_active(db: Database, who: Identity) -> int:
     """How many jobs of the patients that a person may open wait or run."""
-    query = only_seen(select(func.count()).select_from(_JOBS), who)
-    return int(c.execute(query.where(job.c.state.in_(ACTIVE_STATES))).scalar_one())
+    [[count]] = db.ask(select_active_count(who))
+    return int(count)
+
+
+def select_active_count(who: Identity) -> Select[Any]:
+    """The statement that counts them."""
+    query = select(func.count()).select_from(_JOBS).where(job.c.state.in_(ACTIVE_STATES))
+    return only_seen(query, who)
 
 
 def of_session(c: Connection, session_id: str, *, kind: str | None = None) -> list[JobView]:
     """Jobs of one session, the newest first."""
-    query = _QUERY.where(session.c.id == session_id).order_by(job.c.seq.desc())
-    if kind is not None:
-        query = query.where(job.c.kind == kind)
-    return [_listed(row) for row in c.execute(query)]
+    query = _OF_SESSION if kind is None else _OF_SESSION.where(job.c.kind == kind)
+    return [_listed(row) for row in c.execute(query, {"of_session": session_id})]
 
 
 def get(c: Connection, job_id: str) -> ListedJob:
@@ -87,6 +92,8 @@ _QUERY = select(
     patient.c.id.label("patient_id"),
     patient.c.code.label("patient_code"),
 ).select_from(_JOBS)
+
+_OF_SESSION = _QUERY.where(session.c.id == bindparam("of_session")).order_by(job.c.seq.desc())
 
 
 def _listed(row: Any) -> ListedJob:

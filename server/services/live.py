@@ -13,18 +13,18 @@ from __future__ import annotations
 import datetime as dt
 import hmac
 import secrets
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
-from sqlalchemy import Connection, insert, select, update
+from sqlalchemy import Connection, bindparam, insert, select, update
 
 from core.errors import ParameterError
 from core.recording import GivenLimits
 from server import audit
 from server.auth.tokens import new_token, token_hash
 from server.services import devices, sessions
-from server.services.errors import Conflict, NotFound, ServiceError
+from server.services.errors import Conflict, NodeAway, NotFound, ServiceError
 from server.storage.live_tables import OPEN_TAKE_STATES, live_event, live_take
 from server.storage.tables import new_id, now, patient, session, user
 
@@ -54,7 +54,8 @@ class LiveTakeRecord:
         tablet ended it), closed (ended here). source : what the tablet streams, None before its first.
     count, sha256 : batches and the tablet's digest of their payloads, at the end.
     recording_id : what the take became; None while it runs and when nothing came.
-    problem : code of what was wrong at the end, finish_mismatch.
+    problem : code of what was wrong at the end, finish_mismatch or node_away.
+    node, node_run : the web server that has its log and which start of it; None = one without a name.
     """
 
     id: str
@@ -71,11 +72,33 @@ class LiveTakeRecord:
     code_expires_at: dt.datetime | None
     created_at: dt.datetime
     finished_at: dt.datetime | None
+    node: str | None
+    node_run: int | None
 
     @property
     def is_open(self) -> bool:
         """Whether samples may still come."""
         return self.state in OPEN_TAKE_STATES
+
+
+@dataclass(frozen=True)
+class TakeOwner:
+    """A web server as the owner of live takes; without a name it serves alone and every take is its own."""
+
+    node: str | None = None
+    run: int | None = None
+
+    def has(self, take: LiveTakeRecord) -> bool:
+        """Whether a take is this one's, or nobody's."""
+        return self.node is None or take.node in (None, self.node)
+
+    def require(self, take: LiveTakeRecord) -> None:
+        """Raise NodeAway of a take that another one has."""
+        if not self.has(take):
+            raise NodeAway(take.node)
+
+
+ALONE = TakeOwner()
 
 
 @dataclass(frozen=True)
@@ -104,8 +127,10 @@ class LiveEvent:
     at: dt.datetime
 
 
-def open_take(c: Connection, actor: audit.Actor | None, session_id: str) -> tuple[LiveTakeRecord, str]:
-    """Open a take and return it with its code; raises NotFound, Conflict take_open."""
+def open_take(
+    c: Connection, actor: audit.Actor | None, session_id: str, owner: TakeOwner = ALONE
+) -> tuple[LiveTakeRecord, str]:
+    """Open a take of this web server and return it with its code; raises NotFound, Conflict take_open."""
     sessions.get(c, session_id)
     earlier = current(c, session_id)
     if earlier is not None and earlier.is_open:
@@ -120,6 +145,8 @@ def open_take(c: Connection, actor: audit.Actor | None, session_id: str) -> tupl
             state="pairing",
             opened_by=actor.user_id if actor else None,
             created_at=now(),
+            node=owner.node,
+            node_run=owner.run,
             **_code_columns(code),
         )
     )
@@ -272,10 +299,15 @@ def get(c: Connection, take_id: str) -> LiveTakeRecord:
     return LiveTakeRecord(**row._asdict())
 
 
+def find_many(c: Connection, take_ids: Collection[str]) -> dict[str, LiveTakeRecord]:
+    """Those of these takes that are there, by id."""
+    rows = c.execute(_QUERY.where(live_take.c.id.in_(take_ids)))
+    return {row.id: LiveTakeRecord(**row._asdict()) for row in rows}
+
+
 def current(c: Connection, session_id: str) -> LiveTakeRecord | None:
     """The session's newest take, None before the first."""
-    query = _QUERY.where(live_take.c.session_id == session_id)
-    row = c.execute(query.order_by(live_take.c.created_at.desc(), live_take.c.id).limit(1)).first()
+    row = c.execute(_NEWEST, {"of_session": session_id}).first()
     return None if row is None else LiveTakeRecord(**row._asdict())
 
 
@@ -335,16 +367,19 @@ def is_own_notice(content: Mapping[str, Any]) -> bool:
 
 def list_damages(c: Connection, session_id: str) -> list[str]:
     """What was lost of a session's live takes because the disk damaged their logs, as sentences."""
-    query = (
-        select(live_event.c.content["text"].as_string())
-        .join(live_take, live_take.c.id == live_event.c.take_id)
-        .where(
-            live_take.c.session_id == session_id,
-            live_event.c.kind == "notice",
-            live_event.c.content["code"].as_string() == DAMAGED,
-        )
+    return list(c.execute(_DAMAGES, {"of_session": session_id}).scalars())
+
+
+_DAMAGES: Final = (
+    select(live_event.c.content["text"].as_string())
+    .join(live_take, live_take.c.id == live_event.c.take_id)
+    .where(
+        live_take.c.session_id == bindparam("of_session"),
+        live_event.c.kind == "notice",
+        live_event.c.content["code"].as_string() == DAMAGED,
     )
-    return list(c.execute(query.order_by(live_event.c.seq)).scalars())
+    .order_by(live_event.c.seq)
+)
 
 
 def takes_of(c: Connection, session_id: str) -> list[LiveTakeRecord]:
@@ -356,6 +391,11 @@ def takes_of(c: Connection, session_id: str) -> list[LiveTakeRecord]:
 _EVENT_COLUMNS = tuple(live_event.c[name] for name in LiveEvent.__dataclass_fields__ if name in live_event.c)
 _COLUMNS = tuple(live_take.c[name] for name in LiveTakeRecord.__dataclass_fields__ if name in live_take.c)
 _QUERY = select(*_COLUMNS, session.c.patient_id).join(session, session.c.id == live_take.c.session_id)
+_NEWEST = (
+    _QUERY.where(live_take.c.session_id == bindparam("of_session"))
+    .order_by(live_take.c.created_at.desc(), live_take.c.id)
+    .limit(1)
+)
 
 
 def _new_code() -> str:

@@ -1,4 +1,4 @@
-"""The files in `live/`: what they hold, which of them the database knows, and giving a stranger to a session.
+"""The logs of all web servers: what they hold, which the database knows, and adopting a stranger.
 
 A log may outlive its row: the database was put back from a backup. It is kept until somebody adopts it or
 removes it by hand.
@@ -58,9 +58,9 @@ class LiveLog:
         return f"{self.written_at:%Y-%m-%d %H:%M}Z, {self.sensors} sensors, {self.batches} batches{long}"
 
 
-def list_logs(c: Connection, folder: Path) -> Iterator[LiveLog]:
+def list_logs(c: Connection, settings: Settings) -> Iterator[LiveLog]:
     """Every log in `live/`, by name; one that vanishes meanwhile (its take has ended) is passed over."""
-    for path in sorted(folder.glob("*.log")):
+    for path in _list_files(settings, "*.log"):
         found = c.execute(select(live_take.c.id).where(live_take.c.id == path.stem)).first()
         try:
             yield read_log(path, known=found is not None)
@@ -68,9 +68,13 @@ def list_logs(c: Connection, folder: Path) -> Iterator[LiveLog]:
             continue
 
 
-def list_originals(folder: Path) -> list[Path]:
+def list_originals(settings: Settings) -> list[Path]:
     """The copies kept of damaged logs."""
-    return sorted(folder.glob("*.damaged"))
+    return _list_files(settings, "*.damaged")
+
+
+def _list_files(settings: Settings, pattern: str) -> list[Path]:
+    return sorted(path for folder in settings.live_folders for path in folder.glob(pattern))
 
 
 def read_log(path: Path, *, known: bool) -> LiveLog:
@@ -116,8 +120,10 @@ def adopt(
     ------
     NotFound no such log or session; Conflict `take_known`, `take_empty`.
     """
-    path = live_recordings.log_path(settings.live, take_id)
-    if not _ID.fullmatch(take_id) or not path.is_file():
+    if not _ID.fullmatch(take_id):
+        raise NotFound("live log", take_id)
+    path = next(iter(_list_files(settings, f"{take_id}.log")), None)
+    if path is None:
         raise NotFound("live log", take_id)
     log = read_log(path, known=False)
     if not log.batches:
@@ -140,7 +146,7 @@ def adopt(
         )
         detail = {"take_id": take_id, "count": log.batches}
         audit.record(c, actor, "live.adopted", "session", session_id, detail)
-    made = live_recordings.keep(db, blobs, settings, queue, take_id)
+    made = live_recordings.keep(db, blobs, queue, path)
     if made is None:
         raise NotFound("session", session_id)
     fs.remove_file(path)

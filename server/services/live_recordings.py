@@ -47,14 +47,18 @@ def file_name(take: live.LiveTakeRecord) -> str:
     return f"live-{take.created_at:%Y%m%dT%H%M%SZ}.sagittal-live"
 
 
-def keep(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue, take_id: str) -> str | None:
+def keep(db: Database, blobs: BlobStore, queue: JobQueue, path: Path) -> str | None:
     """Make the log of a take that is over its session's newest recording; done already is fine.
+
+    Parameters
+    ----------
+    path : of the log, named by the take.
 
     Returns
     -------
     The recording's id; None when no sample ever came or the session has been erased. The log may go.
     """
-    path = log_path(settings.live, take_id)
+    take_id = path.stem
     try:
         with db.read() as c:
             take = live.get(c, take_id)
@@ -81,6 +85,7 @@ def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) 
     Ids of the takes that are still open and have a log.
     """
     fs.make_folder(settings.live)
+    _take_in(db, settings)
     waiting = []
     for path in sorted(settings.live.glob("*.log")):
         with db.read() as c:
@@ -92,12 +97,43 @@ def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) 
             waiting.append(path.stem)
             continue
         try:
-            keep(db, blobs, settings, queue, path.stem)
+            keep(db, blobs, queue, path)
             fs.remove_file(path)
         except Exception:
             # one take that cannot be stored must not keep the clinic closed; its log stays for the next start
             log.exception("live take %s could not be stored", path.stem)
     return waiting
+
+
+def _take_in(db: Database, settings: Settings) -> None:
+    """Move here the logs and films of web servers that cannot run beside this one, whose takes are ours then.
+
+    That is the one without a name, or, where this one has none, all others.
+    """
+    left = [one for one in settings.live_folders if one != settings.live and one.is_dir()]
+    if settings.node_name:
+        left = [one for one in left if one.parent == settings.data_dir]
+    if any(any(folder.iterdir()) for folder in left):
+        # two servers that start at once: the second finds nothing
+        with db.write():
+            for folder in left:
+                for path in sorted(folder.iterdir()):
+                    fs.move_file(path, settings.live / path.name)
+                fs.sync_folder(folder)
+            fs.sync_folder(settings.live)
+    _note_owner(db, settings)
+
+
+def _note_owner(db: Database, settings: Settings) -> None:
+    """Let the takes whose files are here belong to this server, also where a crash came after the move."""
+    here = {path.name.partition(".")[0] for path in settings.live.iterdir()}
+    node = settings.node_name or None
+    strange = live_take.c.id.in_(here) & live_take.c.node.is_distinct_from(node)
+    with db.read() as c:
+        if c.execute(select(live_take.c.id).where(strange).limit(1)).first() is None:
+            return
+    with db.write() as c:
+        c.execute(update(live_take).where(strange).values(node=node, node_run=None))
 
 
 def _store(

@@ -1,8 +1,9 @@
 """Everything that is stored of one patient as one zip, for the person or for another clinic.
 
-    for piece in export_patient(db, blobs, patient_id): ...        # in pieces, whatever the size
+    for piece in export_patient(db, blobs, patient_id, key_file): ...        # in pieces, whatever the size
 
-`patient.json` has every row that belongs to the patient, by table, with the names of who wrote it,
+`patient.json` has every row that belongs to the patient, by table, with the names of who wrote it; who the
+patient is stands there in clear for who may read that, else not at all.
 `audit.json` who opened or changed what of it, `files/<table>/<id>/<name>` the files, recordings as uploaded.
 What belongs to a patient is found by the references of the tables, so a new table is in it by itself.
 """
@@ -14,22 +15,26 @@ import json
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 from sqlalchemy import Connection, Table, or_, select
 
 from server.export.zipping import ZipSink
-from server.services import patients
+from server.services import identities, patients
 from server.services.provenance import CODE_VERSION
 from server.storage.archive import PIECE
 from server.storage.blobs import BlobStore, IntegrityError
 from server.storage.db import Database
+from server.storage.field_cipher import KeyUnusable, ValueUnreadable
+from server.storage.person_tables import patient_identity
 from server.storage.tables import audit, metadata, now, patient, user
 
 _INTO: Final = "w"
 """How a zip's own file is opened; on the disk nothing is."""
 SECRET: Final = frozenset({"code_sha256", "token_sha256"})
 """Columns that open something; they are nobody's data."""
+_ENCRYPTED: Final = patient_identity.name
 
 
 @dataclass(frozen=True)
@@ -52,7 +57,7 @@ def list_rows(c: Connection, patient_id: str) -> dict[str, list[dict[str, Any]]]
         for table in metadata.sorted_tables:
             # whoever wrote a row is not whom it is about
             keys = [key for key in table.foreign_keys if key.column.table.name in ids.keys() - {user.name}]
-            if keys:
+            if keys and table.name != _ENCRYPTED:
                 mine = or_(*(key.parent.in_(ids[key.column.table.name]) for key in keys))
                 grows = _keep(c, table, mine, found, ids) or grows
     return {name: list(rows.values()) for name, rows in sorted(found.items())}
@@ -71,14 +76,30 @@ def list_files(rows: dict[str, list[dict[str, Any]]]) -> list[ExportedFile]:
     return list(found.values())
 
 
-def export_patient(db: Database, blobs: BlobStore, patient_id: str) -> Iterator[bytes]:
-    """The zip in pieces; a file that is gone or damaged is named in `missing.json` instead."""
+def export_patient(
+    db: Database, blobs: BlobStore, patient_id: str, identity_key: Path | None = None
+) -> Iterator[bytes]:
+    """The zip in pieces; what is gone or damaged is named in `missing.json` instead.
+
+    Parameters
+    ----------
+    identity_key : file with the key of patients' names; None = who asks may not read them.
+    """
+    missing = []
     with db.read() as c:
         rows = list_rows(c, patient_id)
+        if identity_key is not None and identities.are_kept(c, identity_key):
+            try:
+                who = identities.get(c, identity_key, patient_id)
+            except (KeyUnusable, ValueUnreadable) as error:
+                missing.append({"name": _ENCRYPTED, "why": error.message})
+            else:
+                if who.changed_at is not None:
+                    rows[_ENCRYPTED] = [{k: _plain(v) for k, v in vars(who).items()}]
         ids = [row["id"] for its_rows in rows.values() for row in its_rows if "id" in row]
         trail = c.execute(select(audit).where(audit.c.resource_id.in_(ids)).order_by(audit.c.seq)).all()
         people = c.execute(select(user.c.id, user.c.name)).all()
-    return _zip(blobs, patient_id, rows, [row._asdict() for row in trail], dict(map(tuple, people)))
+    return _zip(blobs, patient_id, rows, [row._asdict() for row in trail], dict(map(tuple, people)), missing)
 
 
 def _zip(
@@ -87,9 +108,9 @@ def _zip(
     rows: dict[str, list[dict[str, Any]]],
     trail: list[dict[str, Any]],
     people: dict[str, str],
+    missing: list[dict[str, str]],
 ) -> Iterator[bytes]:
     sink = ZipSink()
-    missing = []
     # stored as it is: recordings hardly shrink, and the server has others to serve
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_STORED) as archive:
         text = json.dumps(rows, ensure_ascii=False)

@@ -9,9 +9,10 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
-from sqlalchemy import Connection, insert, select, update
+from sqlalchemy import Connection, Select, bindparam, insert, select, update
 
 from core.change import ChangeLimit, find_detectable_change
 from core.change.limits import Limb
@@ -172,6 +173,23 @@ class TrainedTake:
 
 def trainings(c: Connection, patient_id: str) -> list[TrainedTake]:
     """All live takes of a patient that gave cues, the oldest first."""
+    rows = c.execute(_trainings(), {"of_patient": patient_id})
+    return [
+        TrainedTake(
+            take_id,
+            session_id,
+            recording_id,
+            day,
+            prescription_id,
+            Prescription.from_json(begun["prescription"]),
+            Baseline.from_json(begun["baseline"] or {}),
+        )
+        for take_id, session_id, recording_id, day, prescription_id, begun in rows
+    ]
+
+
+@cache
+def _trainings() -> Select[Any]:
     gave = select(live_event.c.seq).where(live_event.c.take_id == live_take.c.id, live_event.c.kind == "cue")
     begun = (
         select(live_event.c.content)
@@ -180,7 +198,7 @@ def trainings(c: Connection, patient_id: str) -> list[TrainedTake]:
         .limit(1)
         .scalar_subquery()
     )
-    query = (
+    return (
         select(
             live_take.c.id,
             live_take.c.session_id,
@@ -190,17 +208,13 @@ def trainings(c: Connection, patient_id: str) -> list[TrainedTake]:
             begun,
         )
         .join(session, session.c.id == live_take.c.session_id)
-        .where(session.c.patient_id == patient_id, live_take.c.prescription_id.is_not(None), gave.exists())
+        .where(
+            session.c.patient_id == bindparam("of_patient"),
+            live_take.c.prescription_id.is_not(None),
+            gave.exists(),
+        )
         .order_by(session.c.performed_on, live_take.c.created_at, live_take.c.id)
     )
-    return [
-        TrainedTake(
-            *row[:5],
-            Prescription.from_json(row[5]["prescription"]),
-            Baseline.from_json(row[5]["baseline"] or {}),
-        )
-        for row in c.execute(query)
-    ]
 
 
 def same_training(a: Prescription, b: Prescription) -> bool:

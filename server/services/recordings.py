@@ -296,7 +296,7 @@ class DiskFull(ServiceError):  # noqa: N818 - the name of the HTTP status
 
 def require_room(blobs: BlobStore, settings: Settings, size: int) -> None:
     """Raise DiskFull when the disk cannot take so many bytes and keep the free space of the settings."""
-    if shutil.disk_usage(blobs.root).free - size < settings.min_free_bytes:
+    if shutil.disk_usage(blobs.incoming).free - size < settings.min_free_bytes:
         raise DiskFull
 
 

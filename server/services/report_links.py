@@ -14,8 +14,10 @@ from typing import Final
 from sqlalchemy import Connection, insert, select, update
 
 from server import audit
+from server.auth.identity import Identity
+from server.auth.sight import find_emergency
 from server.auth.tokens import new_token, token_hash
-from server.services import signed_reports
+from server.services import sessions, signed_reports
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.storage.db import Database
 from server.storage.report_tables import report_link, signed_report
@@ -34,6 +36,7 @@ class ReportLink:
     Parameters
     ----------
     openings, opened_at : how often it was opened, and when last.
+    emergency_id : the access in an emergency in which it was made and with which it ends; None = in none.
     """
 
     id: str
@@ -44,6 +47,7 @@ class ReportLink:
     revoked_at: dt.datetime | None
     openings: int
     opened_at: dt.datetime | None
+    emergency_id: str | None
 
     @property
     def is_open(self) -> bool:
@@ -64,9 +68,9 @@ class LinkNotFound(ServiceError):  # noqa: N818 - as NotFound
 
 
 def make(
-    c: Connection, actor: audit.Actor | None, report_id: str, days: int, name: str
+    c: Connection, actor: Identity | None, report_id: str, days: int, name: str
 ) -> tuple[ReportLink, str]:
-    """Make a link; the token is told here and never again.
+    """Make a link; the token is told here and never again. Made in an emergency it ends with that.
 
     Raises
     ------
@@ -79,6 +83,11 @@ def make(
     if not 1 <= days <= MOST_DAYS:
         raise ServiceError("bad_value", f"A link lives {days} days, expected 1 to {MOST_DAYS}.")
     token, link_id, time = new_token(), new_id(), now()
+    expires_at = time + dt.timedelta(days=days)
+    patient_id = sessions.get(c, found.session_id).patient_id
+    emergency = find_emergency(c, actor, patient_id)
+    if emergency is not None:
+        expires_at = min(expires_at, emergency.ends_at)
     c.execute(
         insert(report_link).values(
             id=link_id,
@@ -86,11 +95,14 @@ def make(
             token_sha256=token_hash(token),
             made_by=name,
             made_at=time,
-            expires_at=time + dt.timedelta(days=days),
+            expires_at=expires_at,
             openings=0,
+            emergency_id=None if emergency is None else emergency.id,
         )
     )
     detail = {"report_id": report_id, "link_id": link_id, "days": days}
+    if emergency is not None:
+        detail["access"] = emergency.id
     audit.record(c, actor, "report_link.made", "session", found.session_id, detail)
     return get(c, link_id), token
 
@@ -104,6 +116,15 @@ def revoke(c: Connection, actor: audit.Actor | None, link_id: str) -> ReportLink
         detail = {"report_id": found.report_id, "link_id": link_id}
         audit.record(c, actor, "report_link.revoked", "session", session_id, detail)
     return get(c, link_id)
+
+
+def end_of_emergency(c: Connection, actor: audit.Actor | None, access_id: str) -> None:
+    """End the links that were made in an emergency."""
+    query = select(report_link.c.id).where(
+        report_link.c.emergency_id == access_id, report_link.c.revoked_at.is_(None)
+    )
+    for link_id in c.execute(query).scalars().all():
+        revoke(c, actor, link_id)
 
 
 def reopen_report(

@@ -4,16 +4,16 @@
     restored = try_restore(archive, settings, key)       # the same into a folder that is removed again
 
 All of it is written into `restoring/` of that folder and verified there: every hash, the database by SQLite's
-own checks, the audit chain, every file that a row refers to. Who was erased since is erased again. Then four
+own checks, the audit chain, every file that a row refers to. Who was erased since is erased again. Then some
 renames, the database last (into PostgreSQL its rows, in one transaction): without it no server starts on the
-folder, and a restore that was killed is simply made again.
+folder, and a restore that was killed is simply made again. A bucket, whose prefix must be empty, is filled
+before the renames.
 """
 
 from __future__ import annotations
 
 import datetime as dt
 import re
-import shutil
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,18 +23,36 @@ from sqlalchemy import delete, select, update
 
 from core.formats.json_tree import read_json
 from server import audit
-from server.services import checks, erasure, patients
-from server.services.backups import DATABASE, FORMAT, MANIFEST, count_patients_and_sessions
+from server.services import care_teams, checks, erasure, identities, patients
+from server.services.backups import (
+    DATABASE,
+    FORMAT,
+    IDENTITY_KEY,
+    MANIFEST,
+    count_patients_and_sessions,
+)
+from server.services.restore_room import (
+    RestoreError,
+    clear_stage,
+    make_empty,
+    name_placing,
+    open_empty_bucket,
+    require_room,
+)
 from server.services.reviewed import ReviewedAnalyses
 from server.services.tombstones import NAME as TOMBSTONES
 from server.services.tombstones import Tombstones, parse_tombstones, read_tombstones
 from server.settings import Settings
 from server.storage import fs
 from server.storage.archive import PIECE, ArchivedFile, ClinicKey, read_archive
-from server.storage.blobs import BlobStore
+from server.storage.blob_folder import FolderBlobs
+from server.storage.blob_opening import write_note
+from server.storage.blobs import BlobStore, StoreAway
 from server.storage.db import Database
 from server.storage.high_water import HighWater, read_newest, set_mark
-from server.storage.migrate import MigrationError, copy_database, exists, require_current, upgrade
+from server.storage.live_tables import live_take
+from server.storage.migrate import MigrationError, copy_database, upgrade
+from server.storage.node_tables import failed_attempt, web_node
 from server.storage.person_tables import api_token
 from server.storage.report_tables import report_link
 from server.storage.tables import login_session, now, one_time_token, patient, session
@@ -42,17 +60,9 @@ from server.storage.tables import login_session, now, one_time_token, patient, s
 RESTORED: Final = "backup.restored"
 _OURS: Final = re.compile(
     r"blobs/[0-9a-f]{32}/[0-9a-f]{64}|live/[0-9a-f]{32}\.(log|\d+\.damaged)"
-    r"|second-factor\.key"
+    r"|second-factor\.key|identity\.key"
 )
 _MOST_MANIFEST: Final = 500_000_000
-_MAY_BE_THERE: Final = {"lost+found", "cache", "server.lock"}
-"""What an empty data folder may hold."""
-_MARGIN: Final = 1.1
-"""Room that a restore needs, as a part of the archive."""
-
-
-class RestoreError(Exception):
-    """Nothing was put in place; the message says why and what to do."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +93,7 @@ class RestoredClinic:
     created_at : when the backup was made. patients, sessions : how many are there now.
     files : stored files and live logs. erased_again : patients and sessions that had been erased since.
     missing : files that the backup itself said were gone.
+    names_open : whether the key in the backup opens all names of patients, or there are none.
     """
 
     created_at: dt.datetime
@@ -91,6 +102,7 @@ class RestoredClinic:
     files: int
     erased_again: int
     missing: int
+    names_open: bool
 
 
 def restore(
@@ -109,6 +121,7 @@ def restore(
     """
     if not archive.is_file():
         raise RestoreError(f"There is no file {archive}.")
+    settings = replace(settings, node_name="", node_address="")
     gone = read_tombstones(archive.parent / TOMBSTONES) | (erased or Tombstones())
     try:
         fs.make_folder(settings.data_dir)
@@ -121,6 +134,10 @@ def restore(
         raise RestoreError(f"{settings.data_dir} is in use by {error.holder}; stop it first.") from error
     except MigrationError as error:
         raise RestoreError(str(error)) from error
+    except StoreAway as error:
+        raise RestoreError(
+            f"{settings.bucket} cannot be used ({error.detail}). Mend that and restore again."
+        ) from error
     except OSError as error:
         raise RestoreError(
             f"{settings.data_dir} could not be written ({error.strerror or error}); nothing was put in place."
@@ -132,68 +149,23 @@ def try_restore(archive: Path, settings: Settings, key: ClinicKey | None) -> Res
     home = settings.backups / "restore-test"
     fs.remove_tree(home)
     try:
-        return restore(archive, replace(settings, data_dir=home, database_url=""), key)
+        return restore(archive, _at(settings, home), key)
     finally:
         fs.remove_tree(home)
 
 
 def _restore(archive: Path, settings: Settings, key: ClinicKey | None, gone: Tombstones) -> RestoredClinic:
-    _require_empty(settings)
-    _require_room(archive, settings.data_dir)
-    stage = replace(settings, data_dir=settings.restoring, database_url="")
+    make_empty(settings)
+    require_room(archive, settings.data_dir)
+    stage = _at(settings, settings.restoring)
     fs.make_folder(stage.data_dir)
     try:
         restored = _prepare(archive, stage, key, gone)
     except BaseException:
-        fs.remove_tree(stage.data_dir)
+        clear_stage(stage.data_dir)
         raise
     _put_in_place(settings, stage)
     return restored
-
-
-def _require_empty(settings: Settings) -> None:
-    """Remove what a killed restore left; raise RestoreError when anything else is here."""
-    stage = settings.restoring
-    if stage.exists() and not _has_database(settings):
-        if _placing(stage).exists():
-            # the folder was empty when this was written, so these are the restore's own
-            for folder in (settings.blobs, settings.live):
-                fs.remove_tree(folder)
-            for path in (settings.mark, settings.second_factor_key):
-                fs.remove_file(path)
-            fs.sync_folder(settings.data_dir)
-        fs.remove_tree(stage)
-    found = sorted(path.name for path in settings.data_dir.iterdir() if path.name not in _MAY_BE_THERE)
-    if _has_database(settings) and settings.database_url:
-        raise RestoreError(
-            "The PostgreSQL database holds a clinic already; nothing was changed. Make an empty one and set "
-            "SAGITTAL_DATABASE_URL to it."
-        )
-    if found:
-        raise RestoreError(
-            f"{settings.data_dir} is not empty ({', '.join(found[:5])}). Restore into an empty folder; move "
-            "the old one aside first, and keep it."
-        )
-
-
-def _has_database(settings: Settings) -> bool:
-    """Whether a clinic is in it already: a file, or rows on the server; tables of another version are one."""
-    if not settings.database_url:
-        return settings.database.exists()
-    if not exists(settings.database_source):
-        return False
-    try:
-        require_current(settings.database_source)
-    except MigrationError:
-        return True
-    with closing(Database(settings.database_source)) as db, db.read() as c:
-        return read_newest(c) is not None or count_patients_and_sessions(c) != (0, 0)
-
-
-def _require_room(archive: Path, folder: Path) -> None:
-    needed, free = int(archive.stat().st_size * _MARGIN), shutil.disk_usage(folder).free
-    if free < needed:
-        raise RestoreError(f"A restore needs {needed} bytes in {folder}; {free} are free. Make room first.")
 
 
 def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombstones) -> RestoredClinic:
@@ -201,7 +173,7 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
     manifest = _extract(archive, stage, key)
     upgrade(stage.database)
     fs.remove_tree(stage.backups)  # the copy that the upgrade made
-    blobs = BlobStore(stage.blobs)
+    blobs = FolderBlobs(stage.blobs)
     fs.make_folder(stage.live)
     with closing(Database(stage.database)) as db:
         with db.read() as c:
@@ -218,18 +190,24 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
         again = _erase_again(db, blobs, stage, gone | manifest.erased)
         with db.write() as c:
             # who had signed in then has not signed in here; what was revoked since must not work again
-            c.execute(delete(login_session))
+            for table in (login_session, failed_attempt, web_node):
+                c.execute(delete(table))
+            c.execute(update(live_take).values(node=None, node_run=None))
             c.execute(delete(api_token))
             c.execute(delete(one_time_token))
             c.execute(update(report_link).where(report_link.c.revoked_at.is_(None)).values(revoked_at=now()))
+            care_teams.end_all_emergencies(c)
             detail = {"created_at": manifest.created_at.isoformat(), "erased_again": again}
             audit.record(c, None, RESTORED, "database", None, detail)
         with db.read() as c:
             people, visits = count_patients_and_sessions(c)
+            names_open = not identities.find_problems(c, stage.identity_key_file)
         set_mark(db, stage.mark)
     fs.sync_file(stage.database)
     files = sum(1 for _ in blobs.files()) + sum(1 for _ in stage.live.iterdir())
-    return RestoredClinic(manifest.created_at, people, visits, files, again, len(manifest.missing))
+    return RestoredClinic(
+        manifest.created_at, people, visits, files, again, len(manifest.missing), names_open
+    )
 
 
 def _extract(archive: Path, stage: Settings, key: ClinicKey | None) -> BackupManifest:
@@ -305,18 +283,32 @@ def _erase_again(db: Database, blobs: BlobStore, stage: Settings, gone: Tombston
     return len(visits) + len(people)
 
 
-def _placing(stage: Path) -> Path:
-    """The file that says that the renames have begun."""
-    return stage / "placing"
+def _at(settings: Settings, folder: Path) -> Settings:
+    """The same installation in another folder, its database a file there."""
+    return replace(
+        settings, data_dir=folder, database_url="", bucket="", identity_key="", node_name="", node_address=""
+    )
+
+
+def _fill_bucket(settings: Settings, stage: Settings) -> None:
+    """Put every stored file of the stage into the bucket, so that only its note is to be put in place."""
+    bucket, staged = open_empty_bucket(settings), FolderBlobs(stage.blobs)
+    for one in staged.files():
+        bucket.adopt(one.space, staged.path(one.space, one.name), one.name)
+    fs.remove_tree(stage.blobs)
+    write_note(replace(stage, bucket=settings.bucket))
 
 
 def _put_in_place(settings: Settings, stage: Settings) -> None:
-    fs.write_file(_placing(stage.data_dir), b"")
+    fs.write_file(name_placing(stage.data_dir), settings.bucket.encode())
+    if settings.bucket:
+        _fill_bucket(settings, stage)
     for source, target in (
         (stage.blobs, settings.blobs),
         (stage.live, settings.live),
         (stage.mark, settings.mark),
         (stage.second_factor_key, settings.second_factor_key),
+        (stage.identity_key_file, settings.data_dir / IDENTITY_KEY),
         *(() if settings.database_url else ((stage.database, settings.database),)),
     ):
         if source.exists():

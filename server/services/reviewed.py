@@ -12,6 +12,7 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar, cast
 
+from core.errors import FormatError
 from core.events.edits import Edit
 from core.measure import MeasuredGait, Tracks, measure_gait
 from core.norms.controls import ControlSession
@@ -25,9 +26,12 @@ from server.report.wording import speak_places
 from server.services import analyses
 from server.services.edit_log import EditHistory
 from server.services.errors import Conflict
-from server.storage.blobs import BlobStore
+from server.storage.blobs import BlobStore, IntegrityError, StoreAway
 
 _Value = TypeVar("_Value")
+
+UNREADABLE: Final = (IntegrityError, StoreAway, FormatError)
+"""Why one visit of a list cannot be read: its own page says what is wrong, the others stay in reach."""
 
 NOT_READ: Final = ("poses.parquet", signals.NAME)
 """Files that only the replay and the drawing of signals need."""

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from sqlalchemy import Connection, case, exists, func, insert, select, update
+from sqlalchemy import Connection, bindparam, case, exists, func, insert, select, update
 
 from core.condition import CHOICES, Footwear, Orthosis, WalkingAid, WalkingCondition, WalkingPace
 from core.frames import PROTOCOLS, Protocol
@@ -16,6 +16,7 @@ from server.auth.identity import Identity
 from server.auth.sight import only_seen
 from server.jobs.queue import BESIDE
 from server.services.errors import NotFound, ServiceError
+from server.storage.columns import make_all
 from server.storage.tables import (
     ACTIVE_STATES,
     analysis,
@@ -138,7 +139,7 @@ def change(
 
 def get(c: Connection, session_id: str) -> Session:
     """One session; raises NotFound."""
-    row = c.execute(_QUERY.where(session.c.id == session_id)).first()
+    row = c.execute(_ONE, {"one_id": session_id}).first()
     if row is None:
         raise NotFound("session", session_id)
     return Session(**row._asdict())
@@ -146,8 +147,7 @@ def get(c: Connection, session_id: str) -> Session:
 
 def of_patient(c: Connection, patient_id: str) -> list[Session]:
     """All sessions of a patient, the newest day first."""
-    query = _QUERY.where(session.c.patient_id == patient_id).order_by(*_NEWEST)
-    return [Session(**row._asdict()) for row in c.execute(query)]
+    return make_all(Session, c.execute(_OF_PATIENT, {"of_patient": patient_id}))
 
 
 def search(
@@ -182,7 +182,7 @@ def search(
         query = query.where(session.c.performed_on <= until)
     if ids:
         query = query.where(session.c.id.in_(ids))
-    return [Session(**row._asdict()) for row in c.execute(query)]
+    return make_all(Session, c.execute(query))
 
 
 def newest_of(c: Connection, patient_ids: Collection[str]) -> dict[str, Session]:
@@ -192,7 +192,7 @@ def newest_of(c: Connection, patient_ids: Collection[str]) -> dict[str, Session]
         select(session.c.id, place.label("place")).where(session.c.patient_id.in_(patient_ids)).subquery()
     )
     newest = select(ranked.c.id).where(ranked.c.place == 1)
-    found = (Session(**row._asdict()) for row in c.execute(_QUERY.where(session.c.id.in_(newest))))
+    found = make_all(Session, c.execute(_QUERY.where(session.c.id.in_(newest))))
     return {s.patient_id: s for s in found}
 
 
@@ -207,9 +207,12 @@ def list_walks(c: Connection, patient_ids: Collection[str]) -> dict[str, list[Wa
         .order_by(*_NEWEST)
     )
     found: dict[str, list[WalkedSession]] = {}
-    for row in c.execute(query):
-        condition = WalkingCondition(**{n: getattr(row, n) for n in CHOICES}, protocol=row.protocol)
-        found.setdefault(row.patient_id, []).append(WalkedSession(row.id, row.performed_on, condition))
+    conditions: dict[tuple[Any, ...], WalkingCondition] = {}
+    for session_id, patient_id, performed_on, *walked in c.execute(query):
+        told = tuple(walked)
+        if told not in conditions:  # a clinic has few
+            conditions[told] = WalkingCondition(**dict(zip(("protocol", *CHOICES), told, strict=True)))
+        found.setdefault(patient_id, []).append(WalkedSession(session_id, performed_on, conditions[told]))
     return found
 
 
@@ -242,6 +245,8 @@ _HAS_VIDEO = exists().where(session_video.c.session_id == session.c.id).correlat
 _QUERY = select(
     session, patient.c.code.label("patient_code"), _HAS_VIDEO.label("has_video"), _STATE.label("state")
 ).join(patient, patient.c.id == session.c.patient_id)
+_ONE = _QUERY.where(session.c.id == bindparam("one_id"))
+_OF_PATIENT = _QUERY.where(session.c.patient_id == bindparam("of_patient")).order_by(*_NEWEST)
 
 
 def _checked(values: Mapping[str, object]) -> dict[str, Any]:

@@ -30,6 +30,7 @@ from server.services.patients import Patient
 from server.services.provenance import CODE_VERSION
 from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
+from server.storage.blobs import StoreAway
 from server.storage.db import Database
 from server.storage.tables import now
 
@@ -145,6 +146,8 @@ def _open_take(
             analysis["parameters"] = [parameter_row(p) for p in bundle.parameters]
         elif "strides.csv" in found.files:
             strides = analyses.file_bytes(reviewed.blobs, found, "strides.csv")
+    except StoreAway:
+        raise  # it is not this visit that cannot be read
     except SagittalError as refused:
         error = refused
     return StudyTake(name, labels, len(files), _hide_names(files), error, lambda: analysis, lambda: strides)

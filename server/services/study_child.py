@@ -18,7 +18,7 @@ from server.processes.child import enter_child
 from server.services.reviewed import ReviewedAnalyses
 from server.services.studies import StudyChoice, make_study
 from server.settings import Settings
-from server.storage.blobs import BlobStore
+from server.storage.blob_opening import open_blobs
 from server.storage.db import Database
 
 
@@ -46,7 +46,7 @@ def main() -> None:
 
 def _make(settings: Settings, who: Identity, choice: StudyChoice) -> StudyReply:
     with closing(Database(settings.database_source)) as db:
-        tables, visits = make_study(db, ReviewedAnalyses(BlobStore(settings.blobs)), who, choice)
+        tables, visits = make_study(db, ReviewedAnalyses(open_blobs(settings)), who, choice)
     return StudyReply(zip_files(tables.files), tuple(visits))
 
 

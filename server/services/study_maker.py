@@ -7,6 +7,7 @@ from typing import Final
 import msgspec
 
 from server.auth.identity import Identity
+from server.processes.child import FAR_BEHIND
 from server.processes.errand import ErrandTurn, TooManyErrands, run_errand
 from server.services.errors import Conflict, ServiceError
 from server.services.studies import StudyChoice, check_size, list_visits
@@ -41,7 +42,7 @@ def fetch_study(
     order = msgspec.msgpack.encode((who, choice))
     try:
         with _turn.take():
-            answer = run_errand("server.services.study_child", settings, order, LONGEST_S)
+            answer = run_errand("server.services.study_child", settings, order, LONGEST_S, FAR_BEHIND)
     except TooManyErrands as error:
         raise StudyFailed("busy", "Other studies are being made. Try again in a minute.") from error
     except TimeoutError as error:

@@ -22,12 +22,8 @@ from server.storage import fs
 from server.storage.blobs import INCOMING, BlobStore
 from server.storage.db import Database
 from server.storage.tables import now
-from server.storage.trash import Trash
 
 log = logging.getLogger(__name__)
-
-AT_ONCE = 100
-"""Files moved under one write lock: nobody else can write meanwhile."""
 
 
 def sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
@@ -35,8 +31,16 @@ def sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
 
     Returns
     -------
-    How many stored files were taken away; 0 when this database is in doubt.
+    How many stored files were taken away; 0 when this database is in doubt, or another sweep is under way.
     """
+    try:
+        with blobs.lock_sweep():
+            return _sweep(db, blobs, settings)
+    except fs.LockedError:
+        return 0
+
+
+def _sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
     erasure.finish(db, blobs, settings)
     old = [f for f in blobs.files() if f.age_s >= settings.sweep_grace_s]
     with db.read() as c:
@@ -49,25 +53,35 @@ def sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
     uploads.drop_abandoned(db, blobs)
     with db.read() as c:
         used = _list_used(c)
-    trash, at, taken = Trash(settings.trash), now(), 0
+    trash, at, taken, step = blobs.trash, now(), 0, blobs.moved_at_once
     idle = [f for f in old if (f.space, f.name) not in used]
-    for group in (idle[i : i + AT_ONCE] for i in range(0, len(idle), AT_ONCE)):
-        kept = []
+    for group in (idle[i : i + step] for i in range(0, len(idle), step)):
+        going = [(f.space, f.name) for f in group if f.space != INCOMING and f.space not in erased]
+        kept, gone = [], []
+        trash.prepare(going, at)
         with db.write() as c:
-            used = _list_used(c)
+            # again: somebody may have been erased while copies were made
+            used, since = _list_used(c), erasure.list_erased_spaces(c, {f.space for f in group})
             for stored in group:
-                if (stored.space, stored.name) in used or not stored.is_older(settings.sweep_grace_s):
+                if (stored.space, stored.name) in used or not blobs.is_older(stored, settings.sweep_grace_s):
                     continue
                 taken += 1
-                if stored.space == INCOMING or stored.space in erased:
-                    fs.remove_file(stored.path)
+                if stored.space == INCOMING or stored.space in since:
+                    gone.append(stored)
                 else:
-                    kept.append(stored)
+                    kept.append((stored.space, stored.name))
+            blobs.discard(gone)
             trash.take(kept, at)
+        trash.forget(set(going) - set(kept), at)
+        trash.settle(kept, at)
         if kept:
-            trash.settle(kept, at)
-            log.warning("%d stored files that nothing refers to are in %s now", len(kept), trash.root)
+            log.warning("%d stored files that nothing refers to are in %s now", len(kept), trash.place)
     trash.expire(now())
+    with db.read() as c:
+        erased = erasure.list_erased_spaces(c)
+    # a sweep that was killed between copying and taking leaves copies
+    if left := [one for one in trash.files() if one.space in erased]:
+        trash.drop(left)
     return taken
 
 
@@ -76,16 +90,15 @@ def _list_used(c: Connection) -> set[tuple[str, str]]:
     return list_referenced(c) | {(INCOMING, name) for name in uploads.list_parts(c)}
 
 
-def put_back(db: Database, blobs: BlobStore, settings: Settings) -> int:
+def put_back(db: Database, blobs: BlobStore) -> int:
     """Move missing files that a row refers to from the trash to their place; return how many."""
-    trash = Trash(settings.trash)
+    trash = blobs.trash
     back = 0
     with db.write() as c:
         used = list_referenced(c)
         for one in list(trash.files()):
-            target = blobs.path(one.space, one.name)
-            if (one.space, one.name) in used and not target.is_file():
-                trash.put_back(one, target)
+            if (one.space, one.name) in used and not blobs.has(one.space, one.name):
+                trash.put_back(one)
                 back += 1
     if back:
         trash.tidy()

@@ -161,10 +161,10 @@ def _check(file: SourceFile, source: Mapping[str, Any]) -> tuple[TableReading, .
 
 
 def _files(this: StoredRecording, blobs: BlobStore) -> Iterator[SourceFile]:
-    from core.formats.source import SourceFile  # slow import
+    from server.storage.blob_source import open_source  # slow import
 
     for f in this.files:
-        yield SourceFile.of_path(blobs.path(this.patient_id, f.sha256), f.name)
+        yield open_source(blobs, this.patient_id, f.name, f.size, f.sha256)
 
 
 def _tables(

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import datetime as dt
 import hashlib
-import threading
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -17,7 +16,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, delete, insert, select, update
 
 from server import audit
-from server.services import recordings
+from server.services import erasure, recordings
 from server.services.errors import Conflict, NotFound, ServiceError, TooLarge
 from server.services.recordings import RecordedFile
 from server.settings import Settings
@@ -28,9 +27,6 @@ from server.storage.tables import file_upload, new_id, now
 
 ABANDONED: Final = dt.timedelta(days=1)
 """An upload to which nothing was added for so long goes."""
-
-_growing = threading.Lock()
-"""One server has a data folder (lifespan.py), so its threads are all who add to a part."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +109,7 @@ def add_part(
     ------
     NotFound; Conflict upload_gap: they belong elsewhere; TooLarge beyond what was announced; DiskFull.
     """
-    with _growing:
+    with blobs.hold_part(upload_id):
         with db.read() as c:
             this = get(c, blobs, session_id, upload_id)
         if offset != this.offset:
@@ -157,7 +153,7 @@ def finish(
     NotFound; TooLarge. Conflict upload_incomplete: bytes are missing; upload_damaged: they are not the
     sender's, and the upload begins again at 0.
     """
-    with _growing:
+    with blobs.hold_part(upload_id):
         with db.read() as c:
             row = _find(c, session_id, upload_id)
         if row.finished_sha256 == sha256:
@@ -177,13 +173,38 @@ def finish(
                 "upload_damaged",
                 f"What came of '{this.name}' has another SHA-256 than what was sent. Send it again from 0.",
             )
-        with db.write() as c:
-            _find(c, session_id, upload_id)
+        with db.read() as c:
+            space = recordings.patient_of(c, session_id)
             recordings.check_set(c, settings, session_id, this.name, this.size)
-            blobs.adopt(recordings.patient_of(c, session_id), path, sha256)
-            stored = recordings.add_file(c, actor, session_id, this.name, Blob(sha256, this.size))
-            mine = file_upload.c.id == upload_id
-            c.execute(update(file_upload).where(mine).values(finished_sha256=sha256))
+        # before the transaction: into a bucket it takes a while
+        blobs.adopt(space, path, sha256)
+        try:
+            stored = _publish(db, blobs, settings, actor, session_id, this, sha256)
+        except NotFound:
+            # erased meanwhile: nothing of it may wait, in the trash neither
+            fs.remove_file(path)
+            erasure.discard(db, blobs, space, [sha256])
+            raise
+        fs.remove_file(path)
+        return stored
+
+
+def _publish(
+    db: Database,
+    blobs: BlobStore,
+    settings: Settings,
+    actor: audit.Actor | None,
+    session_id: str,
+    this: FileUpload,
+    sha256: str,
+) -> RecordedFile:
+    with db.write() as c:
+        _find(c, session_id, this.id)
+        blobs.require(recordings.patient_of(c, session_id), sha256)
+        recordings.check_set(c, settings, session_id, this.name, this.size)
+        stored = recordings.add_file(c, actor, session_id, this.name, Blob(sha256, this.size))
+        mine = file_upload.c.id == this.id
+        c.execute(update(file_upload).where(mine).values(finished_sha256=sha256))
     return stored
 
 
@@ -191,7 +212,7 @@ def cancel(
     db: Database, blobs: BlobStore, actor: audit.Actor | None, session_id: str, upload_id: str
 ) -> None:
     """Forget an upload with what came of it; raises NotFound. A finished file stays."""
-    with _growing:
+    with blobs.hold_part(upload_id):
         with db.write() as c:
             _find(c, session_id, upload_id)
             c.execute(delete(file_upload).where(file_upload.c.id == upload_id))
@@ -207,10 +228,10 @@ def list_parts(c: Connection) -> set[str]:
 def drop_abandoned(db: Database, blobs: BlobStore) -> None:
     """Forget uploads to which nothing was added for a day, and those that were finished before."""
     limit = now() - ABANDONED
-    with _growing:
-        with db.read() as c:
-            old = list(c.execute(_QUERY.where(file_upload.c.created_at < limit)))
-        for row in old:
+    with db.read() as c:
+        old = list(c.execute(_QUERY.where(file_upload.c.created_at < limit)))
+    for row in old:
+        with blobs.hold_part(row.id):
             path = blobs.part(row.id)
             if path.exists() and path.stat().st_mtime >= limit.timestamp():
                 continue

@@ -9,7 +9,6 @@ from __future__ import annotations
 import datetime as dt
 from dataclasses import dataclass
 from math import isfinite
-from pathlib import Path
 from typing import Final
 
 from sqlalchemy import Connection, delete, insert, select, update
@@ -62,12 +61,12 @@ def get(c: Connection, session_id: str) -> SessionVideo:
     return found
 
 
-def find_path(c: Connection, blobs: BlobStore, session_id: str) -> tuple[SessionVideo, Path]:
-    """A video and where its bytes are; raises NotFound, IntegrityError when they are gone."""
+def find_stored(c: Connection, blobs: BlobStore, session_id: str) -> tuple[SessionVideo, str]:
+    """A video and the space of its blob; raises NotFound, IntegrityError when it is gone."""
     found = get(c, session_id)
     space = sessions.get(c, session_id).patient_id
     blobs.require(space, found.sha256)
-    return found, blobs.path(space, found.sha256)
+    return found, space
 
 
 def align(c: Connection, actor: audit.Actor | None, session_id: str, offset_s: float | None) -> SessionVideo:

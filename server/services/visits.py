@@ -11,15 +11,13 @@ from sqlalchemy import Connection
 
 from core.change import Change, parameter_changes
 from core.condition import WalkingCondition, is_alike, is_comparable
-from core.errors import FormatError
 from core.frames import Side
 from core.parameters.result import Parameter
 from core.parameters.takes import join_takes
 from server.report.trends import VisitKind
-from server.services import analyses, edit_log, programmes, sessions
+from server.services import analyses, edit_log, sessions
 from server.services.histories import AnalysedSession, classify_visit
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.blobs import IntegrityError
+from server.services.reviewed import UNREADABLE, ReviewedAnalyses
 
 SPEED: Final = "gait_speed_mps"
 
@@ -132,24 +130,39 @@ def _is_assessment(visit: ClinicVisit, planned: Mapping[str, VisitKind]) -> bool
     return any(classify_visit(t.session, planned.get(t.session.id)) == "assessment" for t in visit.takes)
 
 
-def read_newest_speeds(
-    c: Connection, reviewed: ReviewedAnalyses, patient_ids: Collection[str]
-) -> dict[str, NewestSpeed]:
-    """Walking speed of the newest visit of each patient, in as many statements for all as for one.
+def choose_newest_walks(
+    c: Connection, patient_ids: Collection[str], planned: Mapping[str, VisitKind]
+) -> dict[str, list[sessions.WalkedSession]]:
+    """Takes of each patient's newest visit and of the one that it is compared with, in one statement for all.
 
-    What cannot be read is left out.
+    Parameters
+    ----------
+    planned : `programmes.list_kinds` of these patients.
     """
     rows = sessions.list_walks(c, patient_ids)
-    planned = programmes.list_kinds(c, patient_ids)
     chosen: dict[str, list[sessions.WalkedSession]] = {}
     for pid in patient_ids:
         mine = rows.get(pid, [])
         newest = next((w for w in mine if w.condition.is_at_own_pace), mine[0] if mine else None)
         if newest is not None:
             chosen[pid] = _two_days(mine, newest, planned)
-    wanted = [w.id for walks in chosen.values() for w in walks]
-    shown = analyses.latest_of(c, wanted)
-    edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
+    return chosen
+
+
+def read_newest_speeds(
+    reviewed: ReviewedAnalyses,
+    chosen: Mapping[str, Sequence[sessions.WalkedSession]],
+    shown: Mapping[str, analyses.AnalysisRecord],
+    edits: Mapping[str, edit_log.EditHistory],
+) -> dict[str, NewestSpeed]:
+    """Walking speed of the newest visit of each patient; what cannot be read is left out.
+
+    Parameters
+    ----------
+    chosen : what `choose_newest_walks` chose.
+    shown : the results that count, by session.
+    edits : by analysis.
+    """
     speeds = {}
     for pid, walks in chosen.items():
         days: dict[dt.date, list[Parameter]] = {}
@@ -173,7 +186,7 @@ def _read_speed(
         return None
     try:
         return reviewed.read_speed(found, edits)
-    except (IntegrityError, FormatError):  # its own page says what is wrong; the others stay in reach
+    except UNREADABLE:
         return None
 
 

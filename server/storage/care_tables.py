@@ -30,5 +30,6 @@ emergency_access = Table(
     Column("reason", Text, nullable=False),
     Column("opened_at", Utc, nullable=False),
     Column("ends_at", Utc, nullable=False),
+    Column("ended_at", Utc),  # before that, by somebody: for good, whatever the clock does
     CheckConstraint("ends_at > opened_at", name="ends"),
 )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import datetime as dt
 import uuid
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 from sqlalchemy import (
     JSON,
@@ -16,9 +17,12 @@ from sqlalchemy import (
     ForeignKey,
     Integer,
     MetaData,
+    Result,
     String,
     TypeDecorator,
 )
+
+Made = TypeVar("Made")
 
 metadata = MetaData(
     naming_convention={
@@ -63,6 +67,12 @@ class Utc(TypeDecorator[dt.datetime]):
         if value is None:
             return None
         return value.replace(tzinfo=dt.UTC) if value.tzinfo is None else value.astimezone(dt.UTC)
+
+
+def make_all(kind: Callable[..., Made], result: Result[Any]) -> list[Made]:
+    """Make of every row of a result what takes its columns by their names."""
+    names = tuple(result.keys())
+    return [kind(**dict(zip(names, row, strict=True))) for row in result]
 
 
 def id_column() -> Column[str]:

@@ -3,6 +3,7 @@
     db = Database(settings.database_source)
     with db.write() as c:  c.execute(insert(patient).values(...))   # alone; commit, or rollback
     with db.read() as c:   c.execute(select(patient)).all()         # one snapshot, writing refused
+    db.ask(select(patient))                                         # the rows of a single statement
 
 Statements of one engine stand in sqlite_file.py and postgres.py, and nowhere else.
 """
@@ -10,13 +11,15 @@ Statements of one engine stand in sqlite_file.py and postgres.py, and nowhere el
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-from sqlalchemy import Connection
+from sqlalchemy import Connection, Row, Select
 
 from server.storage.postgres import PostgresServer
+from server.storage.single import without_transactions
 from server.storage.sqlite_file import SqliteFile
 
 Source = Path | str
@@ -33,6 +36,7 @@ class Database:
         self._turn = threading.RLock()
         self._writer = self._engine.writer()
         self._reader = self._engine.reader()
+        self._asker = without_transactions(self._reader)
 
     @contextmanager
     def write(self) -> Iterator[Connection]:
@@ -45,6 +49,11 @@ class Database:
         """One snapshot; every statement of the block sees the same state, writing raises DBAPIError."""
         with self._reader.begin() as connection:
             yield connection
+
+    def ask(self, query: Select[Any]) -> Sequence[Row[Any]]:
+        """The rows of one statement; on PostgreSQL a word to the server instead of three."""
+        with self._asker.connect() as connection:
+            return connection.execute(query).all()
 
     @contextmanager
     def watch(self) -> Iterator[ChangeWatch]:
@@ -67,11 +76,23 @@ class Database:
         return self._engine.fold()
 
     @contextmanager
-    def serve_alone(self) -> Iterator[bool]:
-        """Be the only web server on a PostgreSQL database; False = there is one. Files have their lock."""
+    def serve(self, node: str) -> Iterator[bool]:
+        """Be a web server on a PostgreSQL database: alone, or with a name beside others; False = not now.
+
+        Files have their lock.
+        """
         if isinstance(self._engine, PostgresServer):
-            with self._engine.serve_alone() as is_alone:
-                yield is_alone
+            with self._engine.serve(node) as may_serve:
+                yield may_serve
+        else:
+            yield True
+
+    @contextmanager
+    def do_alone(self, duty: str) -> Iterator[bool]:
+        """Do a periodic duty (a word) while no other program does; False = one does. A file: always True."""
+        if isinstance(self._engine, PostgresServer):
+            with self._engine.do_alone(duty) as is_mine:
+                yield is_mine
         else:
             yield True
 

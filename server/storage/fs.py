@@ -8,14 +8,17 @@ faults.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import hashlib
 import os
 import stat
+import tempfile
 import uuid
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import BinaryIO, Self, cast
 
 
 class System:
@@ -192,6 +195,11 @@ def write_file(path: Path, content: bytes) -> None:
         incoming.keep(path)
 
 
+def open_scratch(folder: Path) -> BinaryIO:
+    """Open a file without a name, to be written and read; it is gone when it is closed, or its process."""
+    return cast("BinaryIO", tempfile.TemporaryFile(dir=folder))
+
+
 def sync_file(path: Path) -> None:
     """Make a file that somebody else wrote (SQLite) survive a power cut, its name too."""
     fd = system.open(path, os.O_RDONLY)
@@ -271,16 +279,32 @@ def remove_tree(folder: Path) -> None:
     sync_folder(folder.parent)
 
 
+@contextlib.contextmanager
+def hold_lock(path: Path) -> Iterator[None]:
+    """Wait until no other thread or process holds the lock of this file, and hold it while the block runs."""
+    fd = system.open(path, os.O_RDWR | os.O_CREAT)
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX)
+        yield
+    finally:
+        system.close(fd)
+
+
 class LockedError(Exception):
     """Another process holds the lock; `holder` is the text it left there."""
 
     def __init__(self, path: Path, holder: str) -> None:
         super().__init__(f"{path} is locked by {holder or 'another process'}")
         self.holder = holder
+        self.folder = path.parent
 
 
 class Lock:
-    """An exclusive lock that ends with its holder, also by kill -9.
+    """A lock that ends with its holder, also by kill -9.
+
+    Parameters
+    ----------
+    shared : others may share it, and nobody has it for himself meanwhile.
 
     Raises
     ------
@@ -288,10 +312,10 @@ class Lock:
         somebody else has it.
     """
 
-    def __init__(self, path: Path, holder: str) -> None:
+    def __init__(self, path: Path, holder: str, *, shared: bool = False) -> None:
         self._fd = system.open(path, os.O_RDWR | os.O_CREAT)
         try:
-            fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(self._fd, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
         except BlockingIOError:
             text = path.read_text("utf-8", "replace").strip()
             system.close(self._fd)
@@ -302,6 +326,12 @@ class Lock:
         except BaseException:
             system.close(self._fd)
             raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.release()
 
     def release(self) -> None:
         """Let the next one in; the file stays, so that two processes never lock two files of one name."""

@@ -118,7 +118,7 @@ def _write(path: Path, last: HighWater | None) -> None:
 
 
 class MarkKeeper:
-    """The thread that follows the audit log with the mark; one per data folder, in the web process."""
+    """The thread that follows the audit log with the mark; one in each web process."""
 
     def __init__(self, db: Database, path: Path, interval_s: float = INTERVAL_S) -> None:
         self._db, self._path, self._interval_s = db, path, interval_s
@@ -142,8 +142,12 @@ class MarkKeeper:
                 try:
                     due = changes.has_changed() or due
                     if due:
-                        raise_mark(self._db, self._path)
-                    due = refused = False
+                        # one at a time: else the slower of two would put the mark back
+                        with self._db.do_alone("mark") as is_mine:
+                            if is_mine:
+                                raise_mark(self._db, self._path)
+                        due = not is_mine
+                    refused = False
                 except (OSError, SQLAlchemyError, sqlite3.Error) as error:
                     # a full disk must not end the clinic; the mark only lags, and follows later
                     if not refused:

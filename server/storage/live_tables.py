@@ -33,6 +33,8 @@ live_take = Table(
     Column("problem", String(64)),  # code of what was wrong at the end
     Column("created_at", Utc, nullable=False),
     Column("finished_at", Utc),
+    Column("node", String(32)),  # the web server that has its log (node_tables.py); None: one without a name
+    Column("node_run", Integer),  # which start of it has it
     one_of("state", TAKE_STATES),
     CheckConstraint("(state IN ('finished', 'closed')) = (finished_at IS NOT NULL)", name="finished"),
 )

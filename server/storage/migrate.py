@@ -16,7 +16,7 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy.exc import DatabaseError
+from sqlalchemy.exc import DatabaseError, OperationalError
 
 import server
 from server.storage import fs
@@ -34,6 +34,19 @@ NO_DRIVER = (
     "PostgreSQL needs the libraries psycopg and procrastinate, which are not installed. Install Sagittal "
     "with its extra: pip install '.[postgres]'."
 )
+
+
+_OTHERS_SERVE = (
+    "The database is to be changed for this version, and web servers are running on it. Stop all of them, "
+    "then start this version. Nothing was changed."
+)
+_OTHERS_WORK = (
+    "The database is to be changed for this version, and other programs of Sagittal work on it, workers "
+    "perhaps (at {}). Stop them, then start this version. Nothing was changed."
+)
+OTHERS_LEAVE_S = 5.0
+"""How long a migration waits for other programs, which may only have looked, to leave the database."""
+_OTHER_MIGRATES = "Another program is changing the database for its version. Start again when it is done."
 
 
 class MigrationError(RuntimeError):
@@ -81,6 +94,17 @@ def exists(database: Source) -> bool:
     return database.exists() if isinstance(database, Path) else read_revision(database) is not None
 
 
+def require_database(database: Source) -> None:
+    """Raise MigrationError where there is no database: a command in a wrong folder begins no clinic there."""
+    if exists(database):
+        return
+    if isinstance(database, Path):
+        raise MigrationError(f"There is no database in {database.parent}; give the folder with --data.")
+    raise MigrationError(
+        "The database that SAGITTAL_DATABASE_URL names has no clinic. Check its name, or start the server."
+    )
+
+
 def upgrade(
     database: Source, *, target: str = "head", scripts: Path | None = None, backups: Path | None = None
 ) -> Path | None:
@@ -93,7 +117,7 @@ def upgrade(
     Raises
     ------
     MigrationError
-        the database was made by a version that this one does not know.
+        the database was made by a version that this one does not know; web servers or workers run on it.
     """
     config = configuration(database, scripts)
     if isinstance(database, Path):
@@ -102,15 +126,45 @@ def upgrade(
         backups = backups or database.parent / "backups"
     at = _known(config, database)
     wanted = ScriptDirectory.from_config(config).as_revision_number(target)
-    backup = None
-    if at != wanted:
-        if at is not None:
-            if backups is None:
-                raise MigrationError("The database is older. Start the server, or run `sagittal migrate`.")
-            backup = _backup(database, at, backups, scripts)
-        command.upgrade(config, target)
-    if isinstance(database, str):
-        _prepare_delivery(database)
+    if isinstance(database, Path):
+        return None if at == wanted else _change(config, database, target, backups, scripts)
+    if at == wanted and _has_delivery(database):
+        return None
+    server = PostgresServer(database)
+    with contextlib.ExitStack() as held:
+        try:
+            held.enter_context(server.take_turn_to_migrate())
+        except OperationalError as error:
+            raise MigrationError(_OTHER_MIGRATES) from error
+        if _known(config, database) == wanted and _has_delivery(database):
+            return None  # whoever had the turn before has done it
+        if not held.enter_context(server.serve("")):
+            raise MigrationError(_OTHERS_SERVE)
+        if _known(config, database) is not None:
+            _await_being_alone(server)
+        backup = _change(config, database, target, backups, scripts)
+        _prepare_delivery(server)
+        return backup
+
+
+def _await_being_alone(server: PostgresServer) -> None:
+    until = time.monotonic() + OTHERS_LEAVE_S
+    while others := server.list_others():
+        if time.monotonic() > until:
+            raise MigrationError(_OTHERS_WORK.format(", ".join(others)))
+        time.sleep(0.1)
+
+
+def _change(
+    config: Config, database: Source, target: str, backups: Path | None, scripts: Path | None
+) -> Path | None:
+    """Migrate, after a backup of what is there, whose path is returned."""
+    backup, at = None, _known(config, database)
+    if at is not None and at != ScriptDirectory.from_config(config).as_revision_number(target):
+        if backups is None:
+            raise MigrationError("The database is older. Start the server, or run `sagittal migrate`.")
+        backup = _backup(database, at, backups, scripts)
+    command.upgrade(config, target)
     return backup
 
 
@@ -138,7 +192,8 @@ def copy_database(source: Source, target: Source, scripts: Path | None = None) -
 
 
 def require_current(database: Source, scripts: Path | None = None) -> None:
-    """Raise MigrationError unless the schema is exactly this version's."""
+    """Raise MigrationError unless there is a database and its schema is exactly this version's."""
+    require_database(database)
     config = configuration(database, scripts)
     head = ScriptDirectory.from_config(config).get_current_head()
     at = _known(config, database)
@@ -154,8 +209,7 @@ def require_current(database: Source, scripts: Path | None = None) -> None:
         )
 
 
-def _prepare_delivery(database: str) -> None:
-    server = PostgresServer(database)
+def _prepare_delivery(server: PostgresServer) -> None:
     try:
         server.prepare_delivery()
     except ModuleNotFoundError as error:

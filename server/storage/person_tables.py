@@ -1,4 +1,4 @@
-"""Tables of what opens an account besides its password, and of what a patient has agreed to.
+"""Tables of what opens an account besides its password, of who a patient is, and of what was agreed to.
 
 By the rules of storage/tables.py.
 """
@@ -35,6 +35,27 @@ consent = Table(
     reference("created_by", "user", nullable=True, index=False),
     one_of("purpose", CONSENT_PURPOSES),
     CheckConstraint("withdrawn_on >= given_on", name="withdrawn"),
+)
+
+patient_identity = Table(
+    "patient_identity",  # every value encrypted, bound to patient and field (storage/field_cipher.py)
+    metadata,
+    owner("patient_id", "patient"),
+    Column("name", LargeBinary),
+    Column("born_on", LargeBinary),
+    Column("record_number", LargeBinary),
+    Column("insurance_number", LargeBinary),
+    Column("contact", LargeBinary),
+    Column("changed_at", Utc, nullable=False),
+)
+
+identity_key = Table(
+    "identity_key",  # which key seals all of patient_identity; no row: none has been used yet
+    metadata,
+    Column("purpose", String(16), primary_key=True),
+    Column("name", String(16), nullable=False),
+    Column("since", Utc, nullable=False),
+    one_of("purpose", ("seal",)),
 )
 
 api_token = Table(

@@ -2,20 +2,28 @@
 
 Writing transactions take one advisory lock first, as BEGIN IMMEDIATE does on SQLite: who reads before it
 writes sees what the one before it committed, and the audit log cannot fork. Reading ones see one snapshot.
+
+Each word to the server and back costs two changes of processes, which a busy machine makes wait: the driver
+begins no transaction (BEGIN and lock are one word, a single statement needs none), and no connection is asked
+before its use whether it lives, but where something has come on its line or it was idle for long.
 """
 
 from __future__ import annotations
 
+import select
 import time
+import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, inspect, make_url
 from sqlalchemy.engine import ExceptionContext
-from sqlalchemy.exc import DBAPIError, OperationalError
+from sqlalchemy.exc import DBAPIError, InvalidatePoolError, OperationalError
+from sqlalchemy.pool import ConnectionPoolEntry
 
 from server.storage.columns import metadata
+from server.storage.single import begin_with
 
 MAX_READERS = 45
 """As on SQLite; PostgreSQL's own limit, 100 in all, is for all programs together."""
@@ -25,8 +33,16 @@ MIGRATION_WAIT_MS = 120_000
 """How long a program waits for another one that migrates."""
 FORGOTTEN_S = 60
 """A writing transaction of a frozen or unreachable program is ended after so long without a word."""
+IDLE_S = 5.0
+"""A connection that was not used for so long is asked whether it lives: the line may have broken silently."""
 WRITING, SERVING = 0x5A610001, 0x5A610002
-"""Numbers of the advisory locks: whoever writes, and the web server of a database."""
+"""Numbers of the advisory locks: whoever writes, and the web server of a database; several share it."""
+MIGRATING = 0x5A610005
+"""Of whoever migrates; the others wait."""
+NODES, DUTIES = 0x5A610003, 0x5A610004
+"""First halves of those of one web server among several, and of one periodic duty."""
+APPLICATION = "sagittal"
+"""How its connections are called in PostgreSQL's list of them."""
 DELIVERY_SCHEMA = "procrastinate"
 """PostgreSQL schema of procrastinate's tables, by which job ids are delivered; no backup has them."""
 
@@ -45,13 +61,13 @@ class PostgresServer:
 
     def writer(self) -> Engine:
         """An engine whose transactions hold the write lock from their first statement."""
-        return self._locking(WAIT_MS, forgotten_s=FORGOTTEN_S)
+        return self._locking(WAIT_MS, idle_in_transaction_session_timeout=f"{FORGOTTEN_S}s")
 
     def reader(self) -> Engine:
         """An engine whose transactions see one snapshot and cannot write."""
-        return self._engine(
-            WAIT_MS, execution_options={"isolation_level": "REPEATABLE READ", "postgresql_readonly": True}
-        )
+        engine = self._engine(WAIT_MS, default_transaction_read_only="on")
+        begin_with(engine, "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY")
+        return engine
 
     def migrator(self) -> Engine:
         """An engine for Alembic: a second program that migrates waits for the first, and finds it done."""
@@ -86,7 +102,7 @@ class PostgresServer:
     @contextmanager
     def watch(self) -> Iterator[Callable[[], object]]:
         """Give a question for a word which every commit that wrote something changes."""
-        engine = self._engine(WAIT_MS, isolation_level="AUTOCOMMIT", pool_size=1)
+        engine = self._engine(WAIT_MS)
 
         def ask() -> object:
             with engine.connect() as c:
@@ -138,7 +154,7 @@ class PostgresServer:
 
         False when somebody has been reading an older state all the time, so that it had to stay.
         """
-        engine = self._engine(WAIT_MS, isolation_level="AUTOCOMMIT", pool_size=1)
+        engine = self._engine(WAIT_MS)
         try:
             with engine.connect() as c:
                 if not _outlive_readers(c):
@@ -152,14 +168,46 @@ class PostgresServer:
         return True
 
     @contextmanager
-    def serve_alone(self) -> Iterator[bool]:
-        """Hold the lock of the one web server while the block runs; False = another one has it."""
-        engine = self._engine(WAIT_MS, isolation_level="AUTOCOMMIT", pool_size=1)
+    def hold(self, *questions: str, wait_ms: int = WAIT_MS) -> Iterator[bool]:
+        """Hold advisory locks while the block runs, or until the connection breaks; False = one is taken."""
+        engine = self._engine(wait_ms)
         try:
             with engine.connect() as c:
-                yield bool(c.exec_driver_sql(f"SELECT pg_try_advisory_lock({SERVING})").scalar_one())
+                yield all(c.exec_driver_sql(f"SELECT {one}").scalar_one() for one in questions)
         finally:
             engine.dispose()
+
+    def serve(self, node: str) -> AbstractContextManager[bool]:
+        """Hold the locks of a web server: without a name alone, with one beside others of other names."""
+        if not node:
+            return self.hold(f"pg_try_advisory_lock({SERVING})")
+        return self.hold(
+            f"pg_try_advisory_lock_shared({SERVING})", f"pg_try_advisory_lock({NODES}, {_number(node)})"
+        )
+
+    def take_turn_to_migrate(self) -> AbstractContextManager[bool]:
+        """Hold the lock of who migrates, after whoever has it; raises OperationalError after two minutes."""
+        return self.hold(f"pg_advisory_lock({MIGRATING}) IS NOT NULL", wait_ms=MIGRATION_WAIT_MS)
+
+    def list_others(self) -> list[str]:
+        """Hosts of the programs of Sagittal on this database but who serves, migrates or waits to migrate."""
+        engine = self.reader()
+        try:
+            with engine.connect() as c:
+                found = c.exec_driver_sql(
+                    "SELECT DISTINCT coalesce(host(client_addr), 'this computer') FROM pg_stat_activity AS a "
+                    "WHERE datname = current_database() AND application_name = %s "
+                    "AND pid <> pg_backend_pid() AND NOT EXISTS (SELECT FROM pg_locks WHERE pid = a.pid "
+                    "AND locktype = 'advisory' AND objsubid = 1 AND objid::bigint IN (%s, %s)) ORDER BY 1",
+                    (APPLICATION, SERVING, MIGRATING),
+                )
+                return list(found.scalars())
+        finally:
+            engine.dispose()
+
+    def do_alone(self, duty: str) -> AbstractContextManager[bool]:
+        """Hold the lock of a duty that one program does at a time."""
+        return self.hold(f"pg_try_advisory_lock({DUTIES}, {_number(duty)})")
 
     def read_clock(self, c: Connection) -> float:
         """The server's time, seconds since 1970 UTC."""
@@ -180,34 +228,70 @@ class PostgresServer:
             "SAGITTAL_DATABASE_URL."
         )
 
-    def _locking(self, wait_ms: int, forgotten_s: int = 0) -> Engine:
-        engine = self._engine(wait_ms, forgotten_s=forgotten_s)
-
-        @event.listens_for(engine, "begin")
-        def _begin(connection: Connection) -> None:
-            connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({WRITING})")
-
+    def _locking(self, wait_ms: int, **told: str) -> Engine:
+        engine = self._engine(wait_ms, **told)
+        begin_with(engine, f"BEGIN; SELECT pg_advisory_xact_lock({WRITING})")
         return engine
 
-    def _engine(self, wait_ms: int, *, forgotten_s: int = 0, **options: Any) -> Engine:
+    def _engine(self, wait_ms: int, **more: str) -> Engine:
+        """An engine whose statements are transactions of their own, unless it is told how to begin one."""
         told = {
             "timezone": "UTC",
             "synchronous_commit": "on",
             "lock_timeout": wait_ms,
-            "idle_in_transaction_session_timeout": f"{forgotten_s}s",
+            # a computer that is gone holds no lock for longer than a minute
+            "tcp_keepalives_idle": 30,
+            "tcp_keepalives_interval": 10,
+            "tcp_keepalives_count": 3,
+            # what a page asks is short: compiling it costs more than it saves
+            "jit": "off",
+            **more,
         }
-        # pre-ping: PostgreSQL may have been restarted since a connection was used last
         engine = create_engine(
             self._url,
-            **{"max_overflow": MAX_READERS, "pool_pre_ping": True, "hide_parameters": True} | options,
+            max_overflow=MAX_READERS,
+            pool_use_lifo=True,  # the one used last has what it was asked prepared
+            hide_parameters=True,
             connect_args={
+                "autocommit": True,
                 "connect_timeout": 10,
-                "application_name": "sagittal",
+                "application_name": APPLICATION,
                 "options": " ".join(f"-c {name}={value}" for name, value in told.items()),
             },
         )
         event.listen(engine, "handle_error", _hide_details)
+        _renew_broken(engine)
         return engine
+
+
+def _renew_broken(engine: Engine) -> None:
+    """Have the pool make its connections anew where PostgreSQL was restarted since one was used last.
+
+    A server that ends says so on the line, where it says nothing else unasked: a look there is no word to it.
+    """
+    refused = engine.dialect.loaded_dbapi.Error
+
+    @event.listens_for(engine, "checkin")
+    def _note_use(_: object, entry: ConnectionPoolEntry) -> None:
+        entry.info["used_at"] = time.monotonic()
+
+    @event.listens_for(engine, "checkout")
+    def _look(connection: Any, entry: ConnectionPoolEntry, _: object) -> None:
+        used_at = entry.info.get("used_at")
+        if used_at is None:
+            return
+        line = select.poll()
+        try:
+            line.register(connection.fileno(), select.POLLIN)
+            if line.poll(0) or time.monotonic() - used_at > IDLE_S:
+                connection.execute("")
+        except refused as error:
+            raise InvalidatePoolError from error
+
+
+def _number(word: str) -> int:
+    """A word as a signed number of 32 bits."""
+    return zlib.crc32(word.encode()) - 2**31
 
 
 def _hide_details(context: ExceptionContext) -> None:

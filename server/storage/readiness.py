@@ -11,7 +11,7 @@ from typing import ClassVar
 from sqlalchemy.exc import SQLAlchemyError
 
 from server.settings import Settings
-from server.storage.blobs import BlobStore
+from server.storage.blobs import BlobStore, StoreAway
 from server.storage.db import Database
 from server.storage.migrate import MigrationError, require_current
 from server.storage.refusal import Refusal, refusal_of
@@ -21,6 +21,9 @@ _WORDS = {
     Refusal.FULL: "cannot be written: the disk is full.",
     Refusal.NOT_WRITABLE: "cannot be written: the disk refuses.",
 }
+# anybody may ask, so neither names the bucket; the log does
+_AWAY = "The bucket of stored files cannot be reached; see the server's log."
+_REFUSES = "The bucket of stored files refuses the server; see its log."
 
 
 class Readiness:
@@ -50,12 +53,17 @@ class Readiness:
 
     def checks(self) -> Mapping[str, str]:
         """What each part says: "ok", or a sentence about what does not work."""
-        with self._lock:
+        # a check may wait for a bucket: who asks meanwhile gets the outcome before, and keeps no thread
+        if not self._lock.acquire(blocking=self._checked_at is None):
+            return self._found
+        try:
             at = self._clock()
             if self._checked_at is None or at - self._checked_at >= self.EVERY_S:
                 self._found = self._check()
                 self._checked_at = at
             return self._found
+        finally:
+            self._lock.release()
 
     def _check(self) -> dict[str, str]:
         settings = self._settings
@@ -66,6 +74,8 @@ class Readiness:
             checks["database"] = f"The database {_WORDS[refusal_of(error)]}"
         try:
             self._blobs.probe()
+        except StoreAway as error:
+            checks["files"] = _REFUSES if error.refuses else _AWAY
         except OSError as error:
             checks["files"] = f"The data folder {_WORDS[refusal_of(error)]}"
         try:

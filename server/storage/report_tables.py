@@ -54,5 +54,6 @@ report_link = Table(
     Column("revoked_at", Utc),
     Column("openings", Integer, nullable=False),
     Column("opened_at", Utc),  # last
+    reference("emergency_id", "emergency_access", nullable=True),  # in which it was made and ends
     CheckConstraint("openings >= 0", name="openings"),
 )

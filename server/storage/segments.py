@@ -12,7 +12,7 @@ import mmap
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 
 from core.errors import InputError
 from core.formats.live_log import (
@@ -202,17 +202,22 @@ def read_records(path: Path, start: int = 0) -> Iterator[tuple[int, LogRecord]]:
     start : 0, or the end of a record read before. `LogRecord.end` is of no use here: it counts in a chunk.
     """
     with path.open("rb") as file:
-        if start == 0:
-            start = len(FILE_MARK)
-            if file.read(start) != FILE_MARK:
-                return
-        file.seek(start)
-        rest = b""
-        while chunk := file.read(CHUNK):
-            rest += chunk
-            found, used = scan_records(rest)
-            for one in found:
-                yield start + one.end, one
-            start, rest = start + used, rest[used:]
-            if len(rest) >= _LONGEST:
-                return  # a whole record would have fitted: it is damaged
+        yield from read_open_records(file, start)
+
+
+def read_open_records(file: BinaryIO, start: int = 0) -> Iterator[tuple[int, LogRecord]]:
+    """The same of a file that is open, at its beginning."""
+    if start == 0:
+        start = len(FILE_MARK)
+        if file.read(start) != FILE_MARK:
+            return
+    file.seek(start)
+    rest = b""
+    while chunk := file.read(CHUNK):
+        rest += chunk
+        found, used = scan_records(rest)
+        for one in found:
+            yield start + one.end, one
+        start, rest = start + used, rest[used:]
+        if len(rest) >= _LONGEST:
+            return  # a whole record would have fitted: it is damaged

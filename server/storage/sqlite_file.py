@@ -16,6 +16,8 @@ from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.pool import ConnectionPoolEntry
 
+from server.storage.single import begin_with
+
 MAX_READERS = 45
 """Connections beyond the five that are kept open: more than a web process has threads."""
 BUSY_TIMEOUT_MS = 5000
@@ -102,20 +104,18 @@ class SqliteFile:
         engine = create_engine(
             f"sqlite:///{self.path}",
             max_overflow=MAX_READERS,
+            pool_use_lifo=True,  # the one used last has the pages of the database at hand
             connect_args={"timeout": BUSY_TIMEOUT_MS / 1000},
             hide_parameters=True,
         )
 
         @event.listens_for(engine, "connect")
         def _prepare(connection: DBAPIConnection, entry: ConnectionPoolEntry) -> None:
-            # None: the driver starts no transactions of its own; "begin" below is the only place that does
+            # None: the driver starts no transactions of its own
             connection.isolation_level = None
             _set_pragmas(connection, query_only, foreign_keys)
 
-        @event.listens_for(engine, "begin")
-        def _begin(connection: Connection) -> None:
-            connection.exec_driver_sql(begin)
-
+        begin_with(engine, begin)
         return engine
 
 

@@ -42,6 +42,7 @@ from sqlalchemy import (
 from server.storage import (  # noqa: F401 - `metadata` has all tables
     care_tables,
     live_tables,
+    node_tables,
     person_tables,
     report_tables,
 )

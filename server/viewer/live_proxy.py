@@ -27,7 +27,7 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail
 from server.live.hub import Hub
-from server.services import patients, sessions
+from server.services import live, patients, sessions
 from server.storage.db import Database
 from server.viewer.live_figure import LiveFigure
 from server.viewer.live_reference import LiveReference, NormAt
@@ -47,9 +47,9 @@ async def figure(
     dark: bool = False,
 ) -> JSONResponse:
     """Open the live figure of a session."""
-    body, norm = await asyncio.to_thread(_person, db, sid)
-    await asyncio.to_thread(trail.record_watched, who, "live.watched", "session", sid)
     hub: Hub = request.app.state.hub
+    body, norm = await asyncio.to_thread(_person, db, sid, hub.owner)
+    await asyncio.to_thread(trail.record_watched, who, "live.watched", "session", sid)
     views: FigureViews = request.app.state.views
 
     def draw(server: viser.ViserServer) -> LiveFigure:
@@ -62,10 +62,13 @@ async def figure(
     return JSONResponse({"src": f"/views/{view.id}/"}, headers={"Cache-Control": "no-store"})
 
 
-def _person(db: Database, sid: str) -> tuple[BodyModel, NormAt]:
-    """Body of who walks, and the norm curves of a speed; raises NotFound."""
+def _person(db: Database, sid: str, owner: live.TakeOwner) -> tuple[BodyModel, NormAt]:
+    """Body of who walks, and the norm curves of a speed; raises NotFound, NodeAway."""
     with db.read() as c:
         session = sessions.get(c, sid)
+        take = live.current(c, sid)
+        if take is not None and take.is_open:
+            owner.require(take)
         patient = patients.get(c, session.patient_id)
     height = patient.find_height(session)
     age = patient.find_age(session.performed_on)

@@ -1,19 +1,16 @@
-"""Carries messages between a browser and a viser server, and keeps out what a viewer need not send."""
+"""The way between a browser and a viser server, which keeps out what a viewer need not send."""
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 import msgspec
-from starlette.status import WS_1008_POLICY_VIOLATION
-from starlette.websockets import WebSocket, WebSocketDisconnect
-from websockets.asyncio.client import ClientConnection, connect, unix_connect
-from websockets.exceptions import ConnectionClosed
+from starlette.websockets import WebSocket
+from websockets.asyncio.client import connect, unix_connect
 
 from server.auth.sessions import CHECK_EVERY_S
 
@@ -37,35 +34,6 @@ def connect_to_viser(socket: Path, subprotocols: list[str]) -> connect:
     )
 
 
-async def carry_messages(ws: WebSocket, up: ClientConnection, is_open: Callable[[], bool]) -> None:
-    """Carry messages both ways until one side ends or the sign-in does; the close code is passed on.
-
-    Parameters
-    ----------
-    is_open : asked in a thread every `CHECK_EVERY_S`.
-    """
-    tasks = [asyncio.create_task(c) for c in (_down(ws, up), _upward(ws, up), wait_for_sign_out(is_open))]
-    try:
-        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        over = tasks[2].done()
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-        code, reason = (WS_1008_POLICY_VIOLATION, "not_signed_in") if over else _close_code(up)
-        # the browser may be gone already
-        with contextlib.suppress(RuntimeError, WebSocketDisconnect):
-            await ws.close(code, reason)
-
-
-async def wait_for_sign_out(is_open: Callable[[], bool]) -> None:
-    """Return when the sign-in has ended."""
-    while True:
-        await asyncio.sleep(CHECK_EVERY_S)
-        if not await asyncio.to_thread(is_open):
-            return
-
-
 class ViewActivity:
     """Counts use of a view as activity of the sign-in, at most every `CHECK_EVERY_S`."""
 
@@ -81,32 +49,10 @@ class ViewActivity:
             await asyncio.to_thread(self._touch)
 
 
-def is_allowed(message: bytes) -> bool:
+def is_allowed(message: str | bytes) -> bool:
     """Tell whether a message of the browser may reach viser."""
     try:
-        content = msgspec.msgpack.decode(message)
+        content = msgspec.msgpack.decode(message) if isinstance(message, bytes) else None
     except msgspec.DecodeError:
         return False
     return isinstance(content, dict) and content.get("type") in ALLOWED
-
-
-async def _down(ws: WebSocket, up: ClientConnection) -> None:
-    async for message in up:
-        await ws.send_bytes(message if isinstance(message, bytes) else message.encode())
-
-
-async def _upward(ws: WebSocket, up: ClientConnection) -> None:
-    while True:
-        event = await ws.receive()
-        if event["type"] == "websocket.disconnect":
-            return
-        message = event.get("bytes")
-        if message is not None and is_allowed(message):
-            with contextlib.suppress(ConnectionClosed):
-                await up.send(message)
-
-
-def _close_code(up: ClientConnection) -> tuple[int, str]:
-    """Code and reason to give to the browser; 1005 and 1006 mean "none given" and may not be sent."""
-    code = up.close_code
-    return (1000, "") if code is None or code in (1005, 1006) else (code, up.close_reason or "")

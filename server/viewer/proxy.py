@@ -38,12 +38,14 @@ from websockets.exceptions import WebSocketException
 
 from core.errors import SagittalError
 from core.formats.json_tree import read_json
-from server.auth.access import opens, require, still_opens
+from server.auth.access import find_end, opens, require, wait_for_end
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.http.carrying import carry_messages
 from server.http.compression import accepts
 from server.http.headers import KEPT
 from server.http.problems import Problem, as_problem
+from server.nodes.registry import Nodes
 from server.report.bundle import read_poses
 from server.report.no_figure import explain_no_figure
 from server.services import analyses, comparisons, edit_log, patients, sessions
@@ -55,15 +57,14 @@ from server.viewer.ghost import match_ghost
 from server.viewer.motion import GhostName, ReplayMotion, prepare_motion
 from server.viewer.pipe import (
     ViewActivity,
-    carry_messages,
     connect_to_viser,
     find_subprotocols,
-    wait_for_sign_out,
+    is_allowed,
 )
 from server.viewer.replay_figure import ReplayFigure
 from server.viewer.replay_reference import find_references
 from server.viewer.room import VIEWS, ViewName
-from server.viewer.views import FigureView, FigureViews
+from server.viewer.views import FigureView, FigureViews, new_id
 
 CONTENT_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; "
@@ -90,7 +91,8 @@ Reader = Annotated[Identity, require(Action.READ_RESULT)]
 
 @contextlib.asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
-    async with FigureViews().run() as views:
+    nodes: Nodes = app.state.nodes
+    async with FigureViews(make_id=lambda: nodes.make_id_here(new_id)).run() as views:
         app.state.views = views
         yield
 
@@ -136,7 +138,8 @@ async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
             return
         async with up:
             await ws.accept(subprotocol=up.subprotocol)
-            await carry_messages(ws, up, functools.partial(still_opens, ws, sid=view.session_id))
+            end = wait_for_end(functools.partial(find_end, ws, sid=view.session_id))
+            await carry_messages(ws, up, admits=is_allowed, until=end)
 
 
 def _find(connection: Request | WebSocket, view_id: str, who: Identity) -> FigureView[Any] | None:
@@ -186,7 +189,7 @@ async def replay(
         }
         activity = ViewActivity(lambda: logins.touch(who.login_id))
         cursor = asyncio.create_task(_follow(ws, opened, activity, answer))
-        over = asyncio.create_task(wait_for_sign_out(functools.partial(still_opens, ws)))
+        over = asyncio.create_task(wait_for_end(functools.partial(find_end, ws)))
         await asyncio.wait((cursor, over), return_when=asyncio.FIRST_COMPLETED)
         ended = over.done()
         for task in (cursor, over):
@@ -194,7 +197,7 @@ async def replay(
         await asyncio.gather(cursor, over, return_exceptions=True)
         if ended:
             with contextlib.suppress(RuntimeError, WebSocketDisconnect):
-                await ws.close(WS_1008_POLICY_VIOLATION, "not_signed_in")
+                await ws.close(WS_1008_POLICY_VIOLATION, over.result())
 
 
 async def _open(

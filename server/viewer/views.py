@@ -2,7 +2,7 @@
 
 Separate server objects keep patients apart by structure: nothing is ever drawn into a shared scene. A view
 of a replay belongs to the sign-in that opened it; that of a live session is shared by all who may look at it.
-One web process only: the registry lives in memory.
+The registry lives in memory; each of several web servers has those whose id leads to it (nodes/pins.py).
 """
 
 from __future__ import annotations
@@ -44,6 +44,11 @@ Key = tuple[str, ...]
 Drawn = TypeVar("Drawn", ReplayFigure, LiveFigure)
 
 
+def new_id() -> str:
+    """An unguessable id: 32 hex digits."""
+    return secrets.token_hex(16)
+
+
 @dataclass(eq=False)
 class FigureView(Generic[Drawn]):
     """One figure in one viser server.
@@ -83,10 +88,17 @@ class FigureView(Generic[Drawn]):
 
 
 class FigureViews:
-    """Registry of the open views of this process; used from its event loop only."""
+    """Registry of the open views of this process; used from its event loop only.
 
-    def __init__(self, idle_s: float = IDLE_S, limit: int = MAX_VIEWS) -> None:
-        self._idle_s, self._limit = idle_s, limit
+    Parameters
+    ----------
+    idle_s : life of a view that nobody watches. limit : views at most. make_id : gives their ids.
+    """
+
+    def __init__(
+        self, idle_s: float = IDLE_S, limit: int = MAX_VIEWS, make_id: Callable[[], str] = new_id
+    ) -> None:
+        self._idle_s, self._limit, self._make_id = idle_s, limit, make_id
         self._views: dict[str, FigureView[Any]] = {}
         self._motions: weakref.WeakValueDictionary[str, ReplayMotion] = weakref.WeakValueDictionary()
         self._opening = asyncio.Lock()
@@ -227,7 +239,7 @@ class FigureViews:
         server: viser.ViserServer,
         figure: Drawn,
     ) -> FigureView[Drawn]:
-        view = FigureView(secrets.token_hex(16), key, session_id, login_id, action, server, figure)
+        view = FigureView(self._make_id(), key, session_id, login_id, action, server, figure)
         self._views[view.id] = view
         return view
 

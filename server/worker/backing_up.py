@@ -10,11 +10,14 @@ import logging
 import os
 import subprocess
 import threading
+from contextlib import closing
 from pathlib import Path
 from typing import Final
 
+from sqlalchemy.exc import SQLAlchemyError
+
 from server.log import start_log
-from server.processes.child import end_process, start_module
+from server.processes.child import FAR_BEHIND, end_process, start_module
 from server.processes.lifeline import call_when_parent_ends
 from server.services import backup_schedule
 from server.services.tombstones import TombstoneError, find_tombstones, keep_tombstones
@@ -23,6 +26,8 @@ from server.storage.db import Database
 
 log = logging.getLogger("server.worker.backing_up")
 
+BACKUP: Final = "backup"
+"""The duty of making one, which one web server has at a time."""
 LOOK_S: Final = 20.0
 """Pause between two looks at the clock and at who has been erased."""
 
@@ -62,14 +67,21 @@ class BackupKeeper:
             end_process(self._process)
             self._process = None
         try:
-            with db.read() as c:
-                erased = find_tombstones(c)
-            if Path(self._settings.backup_dir).is_dir():
-                keep_tombstones(erased, Path(self._settings.backup_dir))
-        except (OSError, TombstoneError):
+            with db.do_alone("tombstones") as is_mine:
+                if is_mine and Path(self._settings.backup_dir).is_dir():
+                    with db.read() as c:
+                        erased = find_tombstones(c)
+                    keep_tombstones(erased, Path(self._settings.backup_dir))
+        except (OSError, SQLAlchemyError, TombstoneError):
             log.exception("who has been erased could not be written beside the backups; trying again")
-        if self._process is None and backup_schedule.is_due(self._settings, dt.datetime.now().astimezone()):
-            self._process = start_module("server.worker.backing_up", self._settings)
+        try:
+            if self._process is None and _is_due(self._settings):
+                with db.do_alone(BACKUP) as is_mine:
+                    is_free = is_mine
+                if is_free:
+                    self._process = start_module("server.worker.backing_up", self._settings, FAR_BEHIND)
+        except SQLAlchemyError:
+            log.exception("the database is away; trying again")
 
 
 def main() -> None:
@@ -77,10 +89,17 @@ def main() -> None:
     call_when_parent_ends(lambda: os._exit(1))
     settings = load_settings()
     start_log(settings)
-    os.nice(10)
-    state = backup_schedule.run(settings)
+    with closing(Database(settings.database_source)) as db, db.do_alone(BACKUP) as is_mine:
+        # another web server may have been faster
+        if not is_mine or not _is_due(settings):
+            return
+        state = backup_schedule.run(settings)
     if state.backup is not None and state.backup.ok:
         log.info("backup %s, %d bytes", state.backup.name, state.backup.size)
+
+
+def _is_due(settings: Settings) -> bool:
+    return backup_schedule.is_due(settings, dt.datetime.now().astimezone())
 
 
 if __name__ == "__main__":

@@ -6,15 +6,15 @@ Started by server/worker/runner.py as `python -m server.worker.child <socket> <p
 from __future__ import annotations
 
 import logging
-import os
-from typing import Final
 
 from core.errors import SagittalError
 from core.formats.source import SourceFile
 from server.jobs.attempt import Attempt
 from server.processes.channel import Channel
 from server.processes.child import enter_child
-from server.storage.blobs import BlobStore
+from server.storage.blob_opening import open_blobs
+from server.storage.blob_source import open_source
+from server.storage.blobs import BlobStore, StoreAway
 from server.worker.messages import (
     Checkpoint,
     ChildReady,
@@ -30,18 +30,14 @@ from server.worker.task import TASKS, load
 
 log = logging.getLogger("server.worker.child")
 
-NICENESS: Final = 10
-"""Pages and live takes, for which people wait by the second, have the processor first."""
-
 
 def main() -> None:
     """Answer orders until the worker closes the socket."""
     line, settings = enter_child()
-    os.nice(NICENESS)
     load(settings.task_modules)
     for task in TASKS.values():
         task.warm()
-    store = BlobStore(settings.blobs)
+    store = open_blobs(settings)
     line.send(encode(ChildReady()))
     while True:
         try:
@@ -54,7 +50,7 @@ def main() -> None:
 def compute(order: Order, store: BlobStore, line: Channel) -> Result | Failure:
     """Carry out one order; whatever goes wrong is an answer, never the end of the process."""
     try:
-        files = [open_source(store, order.space, file) for file in order.files]
+        files = [_open(store, order.space, file) for file in order.files]
         left = None
         if order.space is not None and order.checkpoint is not None:
             left = store.read(order.space, order.checkpoint)
@@ -66,6 +62,8 @@ def compute(order: Order, store: BlobStore, line: Channel) -> Result | Failure:
             checkpoint=left,
         )
         return Result(TASKS[order.kind].run(files, order.params, attempt))
+    except StoreAway as error:
+        return Failure(error.code, error.message, passing=True)
     except SagittalError as error:
         return Failure(error.code, error.message)
     except MemoryError:
@@ -83,16 +81,10 @@ def compute(order: Order, store: BlobStore, line: Channel) -> Result | Failure:
         )
 
 
-def open_source(store: BlobStore, space: str | None, file: Input) -> SourceFile:
-    """A blob as a source, read and verified when somebody needs it."""
+def _open(store: BlobStore, space: str | None, file: Input) -> SourceFile:
     if space is None:
         raise ValueError("An order with files names the space they lie in.")
-    return SourceFile(
-        file.name,
-        file.size,
-        lambda: store.read(space, file.sha256),
-        lambda: store.open(space, file.sha256),
-    )
+    return open_source(store, space, file.name, file.size, file.sha256)
 
 
 if __name__ == "__main__":

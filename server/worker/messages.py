@@ -53,10 +53,11 @@ class Result(msgspec.Struct, frozen=True, tag=True):
 
 
 class Failure(msgspec.Struct, frozen=True, tag=True):
-    """Child to worker: nothing came out, and why."""
+    """Child to worker: nothing came out, and why; `passing` = of no fault of the job, to be tried again."""
 
     code: str
     message: str
+    passing: bool = False
 
 
 Reply = ChildReady | Stage | Checkpoint | Result | Failure

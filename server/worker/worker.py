@@ -12,7 +12,11 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import wait as wait_for
+from functools import partial
+from typing import ParamSpec, TypeVar
 
 from sqlalchemy import Connection
 from sqlalchemy.exc import SQLAlchemyError
@@ -25,15 +29,20 @@ from server.processes.lifeline import call_when_parent_ends
 from server.services import custody, erasure
 from server.services.sweep import sweep
 from server.settings import Settings, load_settings
-from server.storage.blobs import Blob, BlobStore
+from server.storage import fs
+from server.storage.blob_opening import open_blobs, require_use
+from server.storage.blobs import Blob, BlobStore, StoreAway
 from server.storage.db import Database
 from server.storage.migrate import require_current
+from server.storage.refusal import is_busy
 from server.storage.tables import new_id
 from server.worker.messages import Checkpoint, ChildReady, Failure, Input, Order, Result, Stage
 from server.worker.runner import Child, ChildDiedError
 from server.worker.task import TASKS, Task, load
 
 log = logging.getLogger("server.worker.worker")
+P = ParamSpec("P")
+T = TypeVar("T")
 
 IDLE_S = 0.2
 """Longest wait for a word of the child, and first pause after an error."""
@@ -43,6 +52,8 @@ CHECKPOINT_S = 5.0
 """Least pause between two checkpoints that are stored."""
 SWEEP_S = 3600.0
 """Pause between two sweeps for files that nothing refers to."""
+LONGEST_PAUSE_S = 5.0
+"""Between two tries of a write while somebody else holds the database."""
 WARM_LIMIT_S = 300.0
 """A child that is not ready by then will not be."""
 
@@ -78,22 +89,32 @@ class Worker:
             try:
                 if time.monotonic() >= next_sweep:
                     next_sweep = time.monotonic() + SWEEP_S
-                    sweep(self._db, self._blobs, self._settings)
+                    with self._db.do_alone("sweep") as is_mine:
+                        if is_mine:
+                            sweep(self._db, self._blobs, self._settings)
                 worked = self._turn()
                 pause_s = IDLE_S
                 if not worked:
                     wait(self._stop)
+            except StoreAway as error:
+                log.warning("worker %s: the stored files cannot be reached (%s)", self._name, error.detail)
+                pause_s = self._rest(pause_s)
             except (ChildDiedError, SQLAlchemyError, OSError):
                 log.exception("worker %s: will try again", self._name)
                 self._drop_child()
-                pause_s = min(2 * pause_s, 30.0)
-                self._stop.wait(pause_s)
+                pause_s = self._rest(pause_s)
+
+    def _rest(self, pause_s: float) -> float:
+        """Wait twice as long as the last time."""
+        longer_s = min(2 * pause_s, 30.0)
+        self._stop.wait(longer_s)
+        return longer_s
 
     def _turn(self) -> bool:
         child = self._warm_child()
         if child is None:
             return True
-        claim = self._queue.claim(self._name, tuple(TASKS))
+        claim = self._persist(self._queue.claim, self._name, tuple(TASKS))
         if claim is None:
             return False
         self._attend(claim, child)
@@ -122,22 +143,28 @@ class Worker:
         except ChildDiedError as error:
             log.warning("job %s: %s", claim.job_id, error)
             self._child = None
-            self._queue.note_death(claim)
+            self._persist(self._queue.note_death, claim)
             return
+        except BaseException:
+            # it computes on, and what it says next would be taken for the next job's
+            self._drop_child()
+            raise
         match end:
             case Result(files):
                 self._publish(claim, files)
+            case Failure(passing=True):
+                self._wait_for_store(claim)
             case Failure(code, message):
                 self._fail(claim, code, message)
             case LeaseState.CANCEL:
                 self._drop_child()
-                self._queue.stop(claim)
+                self._persist(self._queue.stop, claim)
             case LeaseState.LOST:
                 log.warning("job %s: the lease is lost, its result is not used", claim.job_id)
                 self._drop_child()
             case LeaseState.OURS | LeaseState.YIELD:
                 self._drop_child()
-                self._queue.release(claim)
+                self._persist(self._queue.release, claim)
 
     def _listen(self, claim: Claim, child: Child) -> Result | Failure | LeaseState:
         """Keep the lease, pass on progress until the child is done or must end (OURS: we are stopped).
@@ -174,36 +201,69 @@ class Worker:
                 )
             if time_now >= next_look or time_now >= next_beat:
                 due = time_now >= next_beat
-                hold = self._queue.heartbeat(claim) if due else self._queue.look(claim)
+                hold = self._persist(self._queue.heartbeat if due else self._queue.look, claim)
                 if hold is not LeaseState.OURS:
                     return hold
                 if due:
                     next_beat = time_now + beat_s
-                if stage is not None and not self._queue.progress(
-                    claim, stage.name, stage.fraction, stage.message
+                if stage is not None and not self._persist(
+                    self._queue.progress, claim, stage.name, stage.fraction, stage.message
                 ):
                     return LeaseState.LOST
                 stage, next_look = None, time_now + LOOK_S
         return LeaseState.OURS
 
+    def _persist(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Ask the queue; while another program holds the database or it is away, say so and try again.
+
+        Meanwhile the child computes on. Was the job given to somebody else, the fence tells afterwards.
+
+        Raises
+        ------
+        SQLAlchemyError
+            another error, or we are stopped while we wait.
+        """
+        began, pause_s = time.monotonic(), IDLE_S
+        while True:
+            try:
+                return ask(*args, **kwargs)
+            except SQLAlchemyError as error:
+                if not is_busy(error) or self._stop.is_set():
+                    raise
+                log.warning(
+                    "worker %s: the database has been busy or away for %.0f s; trying again (%s)",
+                    self._name, time.monotonic() - began, " ".join(str(error.args[0]).split()),
+                )  # fmt: skip
+            self._stop.wait(pause_s)
+            pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
     def _keep(self, claim: Claim, content: bytes) -> None:
         """Store a checkpoint, then remove the one before it; the job goes on without where that fails."""
         space = str(claim.params["space"])
         try:
-            blob = self._blobs.put(space, content)
-            idle = self._queue.keep(claim, blob.sha256, lambda _: self._blobs.require(space, blob.sha256))
+            blob = self._holding(claim, lambda: self._blobs.put(space, content))
+            idle = self._persist(
+                self._queue.keep, claim, blob.sha256, lambda _: self._blobs.require(space, blob.sha256)
+            )
         except (OSError, SagittalError):
             log.exception("job %s: a checkpoint could not be stored", claim.job_id)
             return
-        if idle is not None:
+        if idle is None:
+            return
+        try:
             erasure.discard(self._db, self._blobs, space, [idle])
+        except (OSError, SagittalError, SQLAlchemyError):
+            log.exception("job %s: a former checkpoint stays for the sweep", claim.job_id)
 
     def _publish(self, claim: Claim, files: Mapping[str, bytes]) -> None:
         """Files first, then one transaction under the fence."""
         task = TASKS[claim.kind]
         try:
             blobs = self._store(task, claim, files)
-            done = self._queue.finish(claim, lambda c: self._write(c, task, claim, files, blobs))
+            publish = partial(self._write, task=task, claim=claim, files=files, blobs=blobs)
+            done = self._persist(self._queue.finish, claim, publish)
+        except StoreAway:
+            self._wait_for_store(claim)
         except SagittalError as error:
             self._fail(claim, error.code, error.message)
         except OSError as error:
@@ -217,10 +277,18 @@ class Worker:
             if not done:
                 self._put_away(claim, blobs)
 
+    def _wait_for_store(self, claim: Claim) -> None:
+        """Give a job back that could not read or store its files; it costs no attempt, and a pause."""
+        if self._persist(self._queue.look, claim) is LeaseState.CANCEL:
+            self._persist(self._queue.stop, claim)
+        else:
+            self._persist(self._queue.release, claim)
+        raise StoreAway(f"job {claim.job_id} waits", refuses=False)
+
     def _put_away(self, claim: Claim, blobs: Mapping[str, Blob]) -> None:
         """Deal with a result that nobody wants any more."""
-        if self._queue.look(claim) is LeaseState.CANCEL:
-            self._queue.stop(claim)
+        if self._persist(self._queue.look, claim) is LeaseState.CANCEL:
+            self._persist(self._queue.stop, claim)
         elif blobs and self._queue.get(claim.job_id) is None:
             # erased while it was computed: nothing of it may wait in the trash
             names = [blob.sha256 for blob in blobs.values()]
@@ -229,9 +297,19 @@ class Worker:
     def _store(self, task: Task, claim: Claim, files: Mapping[str, bytes]) -> dict[str, Blob]:
         if not task.keeps_files:
             return {}
-        self._queue.heartbeat(claim)
+        self._persist(self._queue.heartbeat, claim)
         space = str(claim.params["space"])
-        return {name: self._blobs.put(space, content) for name, content in files.items()}
+        return self._holding(
+            claim, lambda: {name: self._blobs.put(space, content) for name, content in files.items()}
+        )
+
+    def _holding(self, claim: Claim, work: Callable[[], T]) -> T:
+        """Do what may take long, and keep the lease meanwhile."""
+        with ThreadPoolExecutor(1) as pool:
+            doing = pool.submit(work)
+            while not wait_for([doing], self._settings.lease_s / 3).done:
+                self._persist(self._queue.heartbeat, claim)
+            return doing.result()
 
     def _write(
         self,
@@ -246,10 +324,10 @@ class Worker:
         task.publish(c, claim, files, blobs)
 
     def _fail(self, claim: Claim, code: str, message: str) -> None:
-        if self._queue.look(claim) is LeaseState.CANCEL:
-            self._queue.stop(claim)
+        if self._persist(self._queue.look, claim) is LeaseState.CANCEL:
+            self._persist(self._queue.stop, claim)
         else:
-            self._queue.fail(claim, code, message)
+            self._persist(self._queue.fail, claim, code, message)
 
     def _drop_child(self) -> None:
         if self._child is not None:
@@ -275,8 +353,15 @@ def run_worker(settings: Settings, *, with_starter: bool = False) -> None:
     db = Database(settings.database_source)
     try:
         custody.refuse_foreign_folder(db, settings, stop)
-        queue = open_queue(db, settings.lease_s)
-        Worker(settings, db, BlobStore(settings.blobs), queue, stop).run()
+        fs.make_folder(settings.data_dir)
+        holder = f"worker process {os.getpid()} on {socket.gethostname()}"
+        with fs.Lock(settings.workers_lock, holder, shared=True):
+            # until now files and database could be moved elsewhere
+            require_current(settings.database_source)
+            blobs = open_blobs(settings)
+            require_use(blobs)
+            queue = open_queue(db, settings.lease_s)
+            Worker(settings, db, blobs, queue, stop).run()
     finally:
         db.close()
 

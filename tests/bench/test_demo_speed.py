@@ -10,6 +10,8 @@ import sys
 import time
 from collections.abc import Sequence
 
+import pytest
+
 import sagittal
 from server.demo.clinic import VISITS, DemoVisit, record
 from server.processes.compiling import compile_filters
@@ -49,6 +51,7 @@ def analyse(visits: Sequence[DemoVisit]) -> float:
     return time.perf_counter() - began
 
 
+@pytest.mark.pace
 def test_the_second_start_of_the_demo_shows_all_visits_soon() -> None:
     compile_filters()
     analyse(VISITS[:1])

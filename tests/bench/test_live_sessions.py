@@ -281,6 +281,7 @@ def clean() -> Iterator[None]:
 
 
 @pytest.mark.bench
+@pytest.mark.pace
 @pytest.mark.timeout(SECONDS + 300)
 @pytest.mark.usefixtures("clean")
 def test_twenty_sessions_are_acknowledged_estimated_and_coached_in_time(tmp_path: Path) -> None:

@@ -50,8 +50,8 @@ STRIDE_MS: Final = 2.0
 CALIBRATION_S: Final = 1.5
 """The one push that calibrates: other sessions of the process wait for it."""
 
-RATIO: Final = 8.0
-"""All of a push against its filter alone, at most; in pushes of five."""
+RATIO: Final = 12.0
+"""All of a push against its filter alone, at most: 4 to 8 by machine."""
 
 BUSY: Final = 3.0
 """A shared machine may take so much longer than the floor says."""

@@ -21,7 +21,7 @@ from tests.browser.conftest import CHROMIUM, DESK, FLAT, SOLID
 from tests.marks import WRITES
 from tests.service import new_session, served, upload, wait_for
 
-pytestmark = pytest.mark.bench
+pytestmark = [pytest.mark.bench, pytest.mark.pace]
 
 LESS = 3
 """Times that fewer bytes go over the network than the page has; measured: 5."""

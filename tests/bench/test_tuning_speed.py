@@ -42,6 +42,7 @@ def test_one_evaluation_takes_at_most_so_many_of_vqf(trial: ReferenceTrial, name
     assert ratio <= LIMIT
 
 
+@pytest.mark.pace
 def test_all_cores_work(trial: ReferenceTrial) -> None:
     if (os.cpu_count() or 1) < 2:
         pytest.skip("one core")

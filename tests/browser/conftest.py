@@ -31,6 +31,7 @@ from server.auth import accounts
 from server.auth.passwords import hash_password
 from server.auth.roles import Role
 from server.storage.db import Database
+from server.storage.field_cipher import make_keys
 from server.storage.migrate import upgrade
 from server.storage.tables import device_check, job
 from tests.browser import filling
@@ -133,6 +134,7 @@ def serve(folder: Path, *, records_only: bool = False) -> Iterator[RunningServer
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
     """One server for all tests, with one administrator."""
     folder = tmp_path_factory.mktemp("clinic")
+    make_keys(folder / "identity.key")  # this clinic keeps names
     upgrade(folder / "sagittal.db")
     db = Database(folder / "sagittal.db")
     with db.write() as c:

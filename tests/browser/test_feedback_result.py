@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 from core.feedback import FeedbackEngine
 from server.services import analyses, edit_log, prescriptions
 from server.services.reviewed import ReviewedAnalyses
-from server.storage.blobs import BlobStore
+from server.storage.blob_folder import FolderBlobs
 from server.storage.db import Database
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
@@ -36,7 +36,7 @@ def trained(running: RunningServer) -> str:
         filling.upload(client, session, files)
         assert filling.analyse(client, session, sensors)["state"] == "done"
         filling.add(client, f"/patients/{patient}/prescriptions", **GIVEN)
-    blobs = BlobStore(running.folder / "blobs")
+    blobs = FolderBlobs(running.folder / "blobs")
     reviewed = ReviewedAnalyses(blobs)
     with closing(Database(running.folder / "sagittal.db")) as db:
         with db.read() as c:

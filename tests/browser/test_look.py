@@ -24,6 +24,7 @@ PAGES: dict[str, Address] = {
     "capture": lambda f: "/capture",
     "patients": lambda f: "/patients",
     "patient": lambda f: f"/patients/{f.patient}",
+    "identity": lambda f: f"/patients/{f.patient}/identity",
     "trends": lambda f: f"/patients/{f.patient}/trends",
     "compare": lambda f: f"/sessions/{f.done}/compare/{f.earlier}",
     "prescription": lambda f: f"/patients/{f.patient}/prescription",

@@ -66,6 +66,21 @@ def test_eleven_files_become_a_session_page(solid: Browser, running: RunningServ
     context.close()
 
 
+def test_a_table_without_a_time_asks_for_it_in_words(opened: Opener, running: RunningServer) -> None:
+    table = data_folder("gaitmap_foot", "imu_sample.csv")
+    data = table.read_bytes().replace(b"_sensor", b"_shoe")  # no table of these columns was described before
+    with running.client() as client:
+        patient = add(client, "/patients", code="NO-TIME")["id"]
+        session = add_session(client, patient, "Walk, no time")
+        client.put(f"/api/v1/sessions/{session}/files/{table.name}", content=data).raise_for_status()
+    page = opened(f"/sessions/{session}/upload")
+    said = page.locator("[data-check=bad]")
+    expect(said).to_have_text("Enter the samples per second, or say which column is the time.")
+    page.locator("[data-rate]").fill("204.8")
+    expect(said).to_have_count(0)
+    expect(page.locator("[data-check]")).to_have_count(2)
+
+
 def test_a_table_with_its_manifest_is_analysed_as_from_the_command_line(
     opened: Opener, running: RunningServer, tmp_path: Path
 ) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,12 +15,13 @@ from server.jobs.opening import open_queue
 from server.jobs.queue import JobView
 from server.services import analyses, patients, recordings, sessions
 from server.settings import Settings
-from server.storage.blobs import BlobStore
+from server.storage.blob_opening import open_blobs
 from server.storage.db import Database
 from server.storage.high_water import set_mark
 from server.storage.tables import job
 from tests.databases import write_database
 from tests.engines import choose_url
+from tests.postgres import make_lasting_database
 
 PATIENCE_S = 60.0
 """Longest wait for what must happen: far beyond what it takes, so that a loaded machine is no failure."""
@@ -38,18 +40,30 @@ def until(look: Callable[[], T | None], patience_s: float = PATIENCE_S) -> T:
     raise AssertionError(f"waited {patience_s:g} s in vain for {look}")
 
 
-def alive(pid: int) -> bool:
+def state_of(pid: int) -> str:
+    """The letter the kernel has for a process: T = stopped, Z and X = dead, as it is when there is none."""
     try:
-        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
     except (FileNotFoundError, ProcessLookupError):
-        return False
-    return state not in {"Z", "X"}
+        return "X"
+
+
+def alive(pid: int) -> bool:
+    return state_of(pid) not in {"Z", "X"}
+
+
+def find_room(clinic: Clinic, name: str) -> Settings:
+    """Settings for a restore: an empty folder beside the clinic's, on PostgreSQL an empty database too."""
+    url = make_lasting_database(migrated=False) if clinic.settings.database_url else ""
+    return replace(clinic.settings, data_dir=clinic.folder.parent / name, database_url=url)
 
 
 class Clinic:
     """One data folder with a patient, a session and a recording."""
 
-    def __init__(self, folder: Path, lease_s: float, database_url: str | None = None) -> None:
+    def __init__(
+        self, folder: Path, lease_s: float, database_url: str | None = None, bucket: str = ""
+    ) -> None:
         database_url = choose_url(folder) if database_url is None else database_url
         self.settings = Settings(
             data_dir=folder,
@@ -59,11 +73,12 @@ class Clinic:
             child_memory_bytes=4_000_000_000,
             task_modules=("tests.faults.tiny_tasks",),
             database_url=database_url,
+            bucket=bucket,
         )
         if not database_url:
             write_database(self.settings.database)
         self.db = Database(self.settings.database_source)
-        self.blobs = BlobStore(self.settings.blobs)
+        self.blobs: Any = open_blobs(self.settings)
         self.queue = open_queue(self.db, lease_s)
         self.folder = folder
         with self.db.write() as c:

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from server.processes.supervisor import Workers
-from tests.engines import postgres, source  # noqa: F401 - fixtures
+from tests.engines import engine, postgres, source  # noqa: F401 - fixtures
 from tests.faults.clinic import Clinic, alive
+from tests.faults.forking import Forker
 
 
 @pytest.fixture
@@ -30,6 +31,14 @@ def workers(clinic: Clinic, monkeypatch: pytest.MonkeyPatch) -> Iterator[Workers
     pids = started.pids
     started.stop()
     assert not any(alive(pid) for pid in pids)
+
+
+@pytest.fixture(scope="module")
+def forker() -> Iterator[Forker]:
+    """Where servers come from that are started again and again."""
+    started = Forker()
+    yield started
+    started.end()
 
 
 @pytest.fixture(scope="session", autouse=True)

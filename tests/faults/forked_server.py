@@ -1,41 +1,57 @@
 """`sagittal serve` again and again without the seconds of its imports.
 
-Run as a process: it wires the application once and forks for every line on its standard input. Each fork is a
-whole server, whose sockets, lock, database and threads are made after the fork; it says on standard output
-"at <address>", and this process "pid <number>" of it.
+Run as a process: it wires the application once and forks for every line on its standard input, which holds a
+server's settings as variables of the environment (JSON). Each fork is a whole server, whose sockets, lock,
+database and threads are made after the fork; it says on standard output "at <address>", and this process
+"pid <number>" of it.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import sys
 import tempfile
 from pathlib import Path
 
+import psycopg_pool  # noqa: F401
 import uvicorn.lifespan.on
 import uvicorn.protocols.http.auto
 import uvicorn.protocols.websockets.auto  # noqa: F401 - what a server loads when it starts
+from fastapi import FastAPI
 
 import server.app
 from server.commands.serve import run, say
-from server.settings import load_settings
+from server.processes.lifeline import die_with
+from server.settings import Settings, load_settings
 from server.storage.migrate import upgrade
 
 
 def main() -> None:
-    settings = load_settings()
-    wired = server.app.create_app(settings)
-    server.app.create_app = lambda settings: wired
     with tempfile.TemporaryDirectory() as folder:
+        wired = server.app.create_app(Settings(data_dir=Path(folder)))
         upgrade(Path(folder) / "sagittal.db")  # loads what migrations need
-    for _ in sys.stdin:
+    forker = os.getpid()
+    for line in sys.stdin:
         child = os.fork()
         if child == 0:
-            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-            say(f"ended {run(settings, lambda address: say(f'at {address}'))}")
-            os._exit(0)
+            serve(wired, json.loads(line), forker)
         say(f"pid {child}")
+
+
+def serve(wired: FastAPI, environment: dict[str, str], forker: int) -> None:
+    """Be a server until it ends."""
+    die_with(forker)
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    os.environ.update(environment)
+    wired.state.settings = settings = load_settings()
+    server.app.create_app = lambda settings: wired
+    try:
+        if code := run(settings, lambda address: say(f"at {address}")):
+            say(f"ended {code}")
+    finally:
+        os._exit(0)
 
 
 if __name__ == "__main__":

@@ -9,9 +9,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -20,24 +19,32 @@ from sqlalchemy import insert
 from server.services import checks, recordings
 from server.services.backups import BackupError, list_backups, make_backup
 from server.services.custody import StrangersError, refuse_strangers
-from server.services.restoring import RestoreError, restore, try_restore
+from server.services.restore_room import RestoreError
+from server.services.restoring import restore, try_restore
 from server.settings import Settings
 from server.storage import fs
 from server.storage.archive import make_key, read_key
-from server.storage.blobs import Blob, BlobStore
+from server.storage.blob_folder import FolderBlobs
+from server.storage.blobs import Blob
 from server.storage.db import Database
+from server.storage.migrate import exists
 from server.storage.tables import now, recording_file
 from tests.data import ROOT
-from tests.faults.clinic import Clinic
+from tests.engines import on_both_engines
+from tests.faults.clinic import Clinic, find_room
 from tests.faults.failing import Dying, FailingSystem, PowerError
 
 BESIDE = {"erased.json"}
+STEP = {"sqlite": 1, "postgresql": 7}
+"""It dies at every so many of the calls: a copy of a server's database is migrated, in a second."""
 
 
 @pytest.fixture
-def clinic(tmp_path: Path) -> Clinic:
+def clinic(tmp_path: Path) -> Iterator[Clinic]:
     (tmp_path / "disk").mkdir()
-    return Clinic(tmp_path / "home", lease_s=1.5)
+    made = Clinic(tmp_path / "home", lease_s=1.5)
+    yield made
+    made.db.close()
 
 
 def refer(clinic: Clinic, blob: Blob) -> None:
@@ -52,15 +59,16 @@ def refer(clinic: Clinic, blob: Blob) -> None:
 
 
 def is_whole(home: Settings) -> bool:
-    with closing(Database(home.database)) as db:
-        return not checks.check(db, BlobStore(home.blobs), home)
+    with closing(Database(home.database_source)) as db:
+        return not checks.check(db, FolderBlobs(home.blobs), home)
 
 
+@on_both_engines
 def test_a_backup_that_dies_anywhere_leaves_no_file_that_looks_like_one(
-    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+    clinic: Clinic, engine: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     disk = clinic.folder.parent / "disk"
-    for deaths in range(200):
+    for deaths in range(0, 200, STEP[engine]):
         target = disk / f"{deaths}.tar"
         monkeypatch.setattr(fs, "system", Dying(deaths))
         died = False
@@ -83,12 +91,15 @@ def test_a_backup_that_dies_anywhere_leaves_no_file_that_looks_like_one(
     assert not list(disk.glob("*.tmp"))
 
 
-def test_a_restore_that_dies_anywhere_is_made_again(clinic: Clinic, monkeypatch: pytest.MonkeyPatch) -> None:
+@on_both_engines
+def test_a_restore_that_dies_anywhere_is_made_again(
+    clinic: Clinic, engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     clinic.settings.live.mkdir()
     (clinic.settings.live / f"{'a' * 32}.log").write_bytes(b"SAGLIVE1\n")
     made = make_backup(clinic.db, clinic.settings, clinic.folder.parent / "disk", None)
-    for deaths in range(400):
-        home = replace(clinic.settings, data_dir=clinic.folder.parent / f"again{deaths}")
+    for deaths in range(0, 400, STEP[engine]):
+        home = find_room(clinic, f"again{deaths}")
         monkeypatch.setattr(fs, "system", Dying(deaths))
         died = False
         try:
@@ -98,15 +109,15 @@ def test_a_restore_that_dies_anywhere_is_made_again(clinic: Clinic, monkeypatch:
         monkeypatch.setattr(fs, "system", fs.System())
         if not died:
             break
-        if not home.database.exists():
+        if not exists(home.database_source):
             if home.restoring.exists():
                 with pytest.raises(StrangersError, match="was interrupted"):
                     refuse_strangers(home)
             restore(made.path, home, None)
-        assert home.database.exists()
+        assert exists(home.database_source)
         refuse_strangers(home)
         if deaths % 10 == 0:
-            assert [f.path.read_bytes() for f in BlobStore(home.blobs).files()] == [b"signals"]
+            assert [p.read_bytes() for p in home.blobs.glob("*/*")] == [b"signals"]
     assert deaths > 40
 
 
@@ -124,7 +135,7 @@ def test_a_disk_that_refuses_is_told_and_nothing_is_left(
             monkeypatch.setattr(fs, "system", fs.System())
             assert {p.name for p in disk.iterdir()} <= BESIDE
     made = make_backup(clinic.db, clinic.settings, disk, None)
-    home = replace(clinic.settings, data_dir=clinic.folder.parent / "again")
+    home = find_room(clinic, "again")
     for fail_at in range(5, 40, 5):
         monkeypatch.setattr(fs, "system", FailingSystem(fail_at, number))
         with pytest.raises(RestoreError, match="nothing was put in place"):
@@ -133,12 +144,14 @@ def test_a_disk_that_refuses_is_told_and_nothing_is_left(
         assert {p.name for p in home.data_dir.iterdir()} <= {"server.lock"}
 
 
-def run(*words: str) -> subprocess.Popen[bytes]:
+def run(*words: str, url: str = "") -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [sys.executable, "-m", "server.main", *words], cwd=ROOT, stdout=subprocess.DEVNULL
-    )
+        [sys.executable, "-m", "server.main", *words], cwd=ROOT, stdout=subprocess.DEVNULL,
+        env=os.environ | {"SAGITTAL_DATABASE_URL": url},
+    )  # fmt: skip
 
 
+@on_both_engines
 def test_killed_in_the_midst(clinic: Clinic) -> None:
     disk, seed = clinic.folder.parent / "disk", random.Random(19)  # noqa: S311
     space = clinic.patient.id
@@ -147,7 +160,7 @@ def test_killed_in_the_midst(clinic: Clinic) -> None:
             receiver.write(seed.randbytes(1 << 20))
         big = receiver.keep()
     refer(clinic, big)
-    data = ["--data", str(clinic.folder)]
+    data, url = ["--data", str(clinic.folder)], clinic.settings.database_url
 
     def kill(process: subprocess.Popen[bytes], reached: Callable[[], bool]) -> None:
         while not reached() and process.poll() is None:
@@ -157,21 +170,24 @@ def test_killed_in_the_midst(clinic: Clinic) -> None:
         process.wait()
 
     for _ in range(3):
-        kill(run("backup", str(disk), *data), lambda: any(p.stat().st_size > 0 for p in disk.glob("*.tmp")))
+        backup = run("backup", str(disk), *data, url=url)
+        kill(backup, lambda: any(p.stat().st_size > 0 for p in disk.glob("*.tmp")))
         for one in list_backups(disk):
             assert try_restore(one.path, clinic.settings, None).patients == 1
             one.path.unlink()
     made = make_backup(clinic.db, clinic.settings, disk, None)
-    home = replace(clinic.settings, data_dir=clinic.folder.parent / "again")
+    home = find_room(clinic, "again")
+    data = ["--data", str(home.data_dir)]
     for _ in range(3):
         kill(
-            run("restore", str(made.path), "--data", str(home.data_dir)),
-            lambda: any(home.restoring.rglob("*.tmp")),
+            run("restore", str(made.path), *data, url=home.database_url),
+            lambda at=home.restoring: any(at.rglob("*.tmp")),  # type: ignore[misc]
         )
-        assert not home.database.exists() or is_whole(home)
-        if home.database.exists():
+        if exists(home.database_source):
+            assert is_whole(home)
             fs.remove_tree(home.data_dir)
-    assert run("restore", str(made.path), "--data", str(home.data_dir)).wait() == 0
+            home = find_room(clinic, "again")
+    assert run("restore", str(made.path), *data, url=home.database_url).wait() == 0
     assert is_whole(home)
 
 
@@ -179,18 +195,18 @@ def test_memory_does_not_grow_with_what_is_backed_up(clinic: Clinic) -> None:
     make_key(clinic.folder.parent / "key")
     key = ["--key", str(clinic.folder.parent / "key")]
 
-    def peak(*words: str) -> int:
-        process = run(*words)
+    def peak(settings: Settings, *words: str) -> int:
+        process = run(*words, "--data", str(settings.data_dir), *key, url=settings.database_url)
         _, status, used = os.wait4(process.pid, 0)
         process.returncode = status
         assert status == 0
         return used.ru_maxrss
 
     def both(name: str) -> list[int]:
-        target = clinic.folder.parent / "disk" / name
+        target = str(clinic.folder.parent / "disk" / name)
         return [
-            peak("backup", str(target), "--data", str(clinic.folder), *key),
-            peak("restore", str(target), "--data", str(clinic.folder.parent / f"{name}-again"), *key),
+            peak(clinic.settings, "backup", target),
+            peak(find_room(clinic, f"{name}-again"), "restore", target),
         ]
 
     small = both("small.tar.age")

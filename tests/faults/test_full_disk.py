@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime as dt
 import errno
 import itertools
@@ -20,8 +21,11 @@ from server.storage.db import Database
 from server.storage.migrate import MigrationError, upgrade
 from server.storage.readiness import Readiness
 from server.storage.tables import now
+from tests.engines import on_both_engines
 from tests.faults.failing import FailingSystem
-from tests.faults.small_disk import full, mounted, run
+from tests.faults.small_disk import full, mounted, on_small_disk, run
+from tests.marks import about_the_file
+from tests.postgres import run_sql
 from tests.server import analysed, walk
 from tests.server.clinic import PASSWORD, Clinic, open_clinic
 
@@ -88,6 +92,7 @@ def changes(v: Visit) -> list[tuple[str, str, dict[str, Any]]]:
     ]
 
 
+@about_the_file
 async def test_a_full_disk_answers_every_change_with_507_and_a_sentence(visit: Visit, disk: Path) -> None:
     async with visit.clinic.client("admin", raises=False) as client:
         before = visit.rows()
@@ -105,6 +110,7 @@ async def test_a_full_disk_answers_every_change_with_507_and_a_sentence(visit: V
             assert answer.status_code < 300, f"{method} {path}: {answer.text}"
 
 
+@about_the_file
 async def test_a_page_on_a_full_disk_says_so_in_a_page(visit: Visit, disk: Path) -> None:
     form = {"Accept": "text/html", "Content-Type": "application/x-www-form-urlencoded"}
     async with visit.clinic.client("clinician", headers=form, raises=False) as client:
@@ -130,6 +136,7 @@ def readings(v: Visit) -> list[str]:
     ]
 
 
+@about_the_file
 async def test_on_a_full_disk_people_sign_in_read_results_and_sign_out(visit: Visit, disk: Path) -> None:
     clinic = visit.clinic
     person = {"name": "viewer", "password": PASSWORD}
@@ -175,6 +182,7 @@ async def test_a_sign_in_from_before_the_disk_was_full_goes_on_and_can_be_ended(
             assert (await client.get(f"{API}/account", headers=cookie)).status_code == 401
 
 
+@about_the_file
 async def test_a_disk_that_became_read_only_is_said_and_can_be_read(disk: Path, tmp_path: Path) -> None:
     frozen = tmp_path / "frozen"
     frozen.mkdir()
@@ -213,6 +221,7 @@ async def _use_read_only(v: Visit) -> None:
         assert "cannot be written" in checks["files"]
 
 
+@about_the_file
 async def test_ready_really_writes_and_says_when_it_cannot(visit: Visit, disk: Path) -> None:
     clinic = visit.clinic
     time_s = 0.0
@@ -281,24 +290,48 @@ async def test_an_upload_refused_at_any_call_answers_507_and_can_be_sent_again(
             assert failures >= 5
 
 
-@pytest.mark.parametrize(
-    ("pragma", "code"), [("max_page_count=1", "disk_full"), ("query_only=ON", "disk_not_writable")]
-)
+@contextlib.contextmanager
+def refusing(clinic: Clinic, code: str) -> Iterator[None]:
+    """While the block runs the database takes nothing more, by the engine's own refusal."""
+    url = clinic.settings.database_url
+    if not url:
+        pragma = "max_page_count=1" if code == "disk_full" else "query_only=ON"
+        with clinic.db.write() as c:
+            c.exec_driver_sql(f"PRAGMA {pragma}")
+        yield
+        clinic.db.close()  # the next connection may write
+        return
+    name = url.rpartition("/")[2]
+    with contextlib.ExitStack() as until:
+        if code == "disk_full":
+            until.enter_context(full(until.enter_context(on_small_disk(name, 48))))
+        else:
+            run_sql(f"ALTER DATABASE {name} SET default_transaction_read_only = on")
+            until.callback(run_sql, f"ALTER DATABASE {name} RESET default_transaction_read_only")
+        clinic.db.close()  # the setting is for new connections
+        yield
+        clinic.db.close()
+
+
+@on_both_engines
+@pytest.mark.parametrize("code", ["disk_full", "disk_not_writable"])
 async def test_a_database_that_takes_nothing_refuses_changes_and_lets_people_read(
-    tmp_path: Path, pragma: str, code: str
+    tmp_path: Path, code: str
 ) -> None:
     async with open_clinic(tmp_path, min_free_bytes=0) as clinic:
         v = Visit(clinic)
         async with clinic.client("clinician", raises=False) as client:
-            with clinic.db.write() as c:  # SQLite's own refusal, where no small disk can be made
-                c.exec_driver_sql(f"PRAGMA {pragma}")
-            for i in range(300):  # a full one has some room in its last pages
-                answer = await client.post(f"{API}/patients", json={"code": f"N-{i}", "note": "x" * 2000})
-                if answer.status_code != 201:
-                    break
-            assert (answer.status_code, answer.json()["code"]) == (507, code)
-            for path in readings(v):
-                assert (await client.get(path)).status_code == 200
+            with refusing(clinic, code):
+                for i in range(300):  # a full one has some room in its last pages
+                    answer = await client.post(f"{API}/patients", json={"code": f"N-{i}", "note": "x" * 2000})
+                    if answer.status_code != 201:
+                        break
+                assert (answer.status_code, answer.json()["code"]) == (507, code)
+                for path in readings(v):
+                    assert (await client.get(path)).status_code == 200
+            assert (await client.post(f"{API}/patients", json={"code": "last"})).status_code == 201
+        with clinic.db.read() as c:
+            assert audit.find_problems(c) == []
 
 
 def test_a_server_that_finds_a_full_disk_says_so_and_sends_nobody_to_the_backups(
@@ -322,15 +355,13 @@ async def test_nothing_is_shown_when_too_many_rows_wait_and_all_are_written_at_t
         v = Visit(clinic)
         path = f"{API}/patients/{v.patient}"
         async with clinic.client("viewer", raises=False) as client:
-            with clinic.db.write() as c:
-                c.exec_driver_sql("PRAGMA query_only=ON")
-            before = v.rows()[0].seq
-            shown = [(await client.get(path)).status_code for _ in range(7)]
-            assert shown == [200] * 5 + [507] * 2
-            wrong = await client.post(f"{API}/sign-in", json={"name": "viewer", "password": "wrong"})
-            assert wrong.status_code == 401
-            assert v.rows()[0].seq == before
-            clinic.db.close()  # the next connection may write
+            with refusing(clinic, "disk_not_writable"):
+                before = v.rows()[0].seq
+                shown = [(await client.get(path)).status_code for _ in range(7)]
+                assert shown == [200] * 5 + [507] * 2
+                wrong = await client.post(f"{API}/sign-in", json={"name": "viewer", "password": "wrong"})
+                assert wrong.status_code == 401
+                assert v.rows()[0].seq == before
     async with open_clinic(tmp_path, min_free_bytes=0) as clinic:
         v.clinic = clinic
         new = [(r.action, r.user_name) for r in v.rows() if r.seq > before]

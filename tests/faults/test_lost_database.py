@@ -21,20 +21,24 @@ from server.services.reviewed import ReviewedAnalyses
 from server.services.sweep import sweep
 from server.settings import Settings
 from server.storage import fs
-from server.storage.blobs import BlobFile
 from server.storage.db import Database
 from server.storage.high_water import raise_mark
-from server.storage.migrate import copy_database, upgrade
-from server.storage.trash import KEPT, Trash
+from server.storage.migrate import copy_database, exists, upgrade
+from server.storage.trash import KEPT, FolderTrash
 from server.worker.task import load
 from server.worker.worker import Worker
 from tests.data import ROOT
+from tests.engines import choose_url, on_both_engines, tell_commands
 from tests.faults.clinic import Clinic
 from tests.faults.failing import Dying, PowerError
 from tests.faults.model_disk import ModelDisk
+from tests.marks import about_the_file
+from tests.postgres import make_lasting_database
 from tests.service import line_with
 
 CONTENTS = {b"signals", b"walk two", b"walk three"}
+STEP = {"sqlite": 1, "postgresql": 4}
+"""Once its rows are gone an erasure dies at every so many of its calls; before that at every one."""
 
 
 def upload(clinic: Clinic, name: str, content: bytes) -> None:
@@ -51,11 +55,12 @@ def at_once(clinic: Clinic) -> Settings:
 
 
 def stored(clinic: Clinic) -> set[bytes]:
-    return {f.path.read_bytes() for f in clinic.blobs.files()}
+    return {clinic.blobs.find_path(f).read_bytes() for f in clinic.blobs.files()}
 
 
 def discarded(clinic: Clinic) -> list[bytes]:
-    return sorted(one.path.read_bytes() for one in Trash(clinic.settings.trash).files())
+    trash = FolderTrash(clinic.settings.trash, clinic.settings.blobs)
+    return sorted(trash.path(one).read_bytes() for one in trash.files())
 
 
 def backup(clinic: Clinic) -> Path:
@@ -65,15 +70,29 @@ def backup(clinic: Clinic) -> Path:
     return target
 
 
+def lose(clinic: Clinic) -> None:
+    """Stop, and lose the database: the file is gone, PostgreSQL has another one without tables."""
+    clinic.db.close()
+    if clinic.settings.database_url:
+        url = make_lasting_database(migrated=False)
+        clinic.settings = replace(clinic.settings, database_url=url)
+    for path in clinic.folder.glob("sagittal.db*"):
+        path.unlink()
+
+
 def put(clinic: Clinic, database: Path | None) -> None:
     """Stop, and start with this database in the place of the one that was there; None = a new one."""
-    clinic.db.close()
-    for suffix in ("", "-wal", "-shm"):
-        clinic.settings.database.with_name(f"sagittal.db{suffix}").unlink(missing_ok=True)
+    lose(clinic)
     if database is not None:
-        shutil.copy(database, clinic.settings.database)
-    upgrade(clinic.settings.database)
-    clinic.db = Database(clinic.settings.database)
+        copy_database(database, clinic.settings.database_source)
+    upgrade(clinic.settings.database_source)
+    clinic.db = Database(clinic.settings.database_source)
+
+
+def command(clinic: Clinic, *words: str) -> int:
+    with pytest.MonkeyPatch.context() as environment:
+        tell_commands(environment, clinic.settings)
+        return main([*words, "--data", str(clinic.folder)])
 
 
 def findings(clinic: Clinic) -> list[str]:
@@ -90,33 +109,32 @@ def full(clinic: Clinic) -> Clinic:
     return clinic
 
 
-def serve(folder: Path) -> subprocess.Popen[str]:
+def serve(settings: Settings) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "server.main", "serve", "--data", str(folder), "--port", "0"],
+        [sys.executable, "-m", "server.main", "serve", "--data", str(settings.data_dir), "--port", "0"],
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        env={**os.environ, "SAGITTAL_SWEEP_GRACE_S": "0", "SAGITTAL_WORKERS": "0"},
+        env={**os.environ, "SAGITTAL_SWEEP_GRACE_S": "0", "SAGITTAL_WORKERS": "0",
+             "SAGITTAL_DATABASE_URL": settings.database_url},
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("database", ["missing", "empty file", "emptied"])
+@pytest.mark.parametrize("database", ["missing", pytest.param("empty file", marks=about_the_file), "emptied"])
 def test_a_start_is_refused_when_files_are_there_and_the_database_knows_no_patient(
     full: Clinic, database: str
 ) -> None:
-    full.db.close()
-    for path in full.folder.glob("sagittal.db*"):
-        path.unlink()
+    lose(full)
     if database == "empty file":
         full.settings.database.touch()
     elif database == "emptied":
-        upgrade(full.settings.database)
-    process = serve(full.folder)
+        upgrade(full.settings.database_source)
+    process = serve(full.settings)
     _, said = process.communicate(timeout=120)
     assert process.returncode == 1
     assert "knows no patient" in said
     assert "3 stored files and 0 live logs" in said
     assert "sagittal accept" in said
     assert "Traceback" not in said
-    assert full.settings.database.exists() is (database != "missing")
+    assert exists(full.settings.database_source) is (database != "missing")
     assert stored(full) == CONTENTS
 
 
@@ -131,7 +149,7 @@ def test_a_start_is_refused_for_a_live_log_alone_and_not_for_an_empty_folder(tmp
 
 
 def test_the_first_start_on_an_empty_folder_works(tmp_path: Path) -> None:
-    process = serve(tmp_path / "new")
+    process = serve(Settings(data_dir=tmp_path / "new", database_url=choose_url(tmp_path / "new")))
     try:
         assert line_with(process, r"http://\S+/set-up/\S+")
     finally:
@@ -155,6 +173,7 @@ def test_nothing_is_swept_with_an_emptied_database(full: Clinic) -> None:
     assert stored(full) == CONTENTS
 
 
+@on_both_engines
 def test_nothing_is_swept_after_the_database_went_back_in_time(
     full: Clinic, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -173,24 +192,23 @@ def test_nothing_is_swept_after_the_database_went_back_in_time(
 def test_the_way_back_after_the_wrong_backup_was_accepted(
     full: Clinic, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    data = ["--data", str(full.folder)]
     newest = full.folder / "newest.db"
     copy_database(full.db.source, newest)
     put(full, full.folder / "backup.db")
-    assert main(["accept", *data]) == 0
+    assert command(full, "accept") == 0
     assert "had reached row" in capsys.readouterr().out
     assert sweep(full.db, full.blobs, at_once(full)) == 2
     assert stored(full) == {b"signals"}
     assert discarded(full) == [b"walk three", b"walk two"]
-    assert main(["trash", *data]) == 0
+    assert command(full, "trash") == 0
     assert "2 files in" in capsys.readouterr().out
     put(full, newest)
     assert sweep(full.db, full.blobs, at_once(full)) == 0  # another database than the accepted one
     found = findings(full)
     assert len([text for text in found if "sagittal trash --restore" in text]) == 2
     assert any("another database" in text and "sagittal accept" in text for text in found)
-    assert main(["accept", *data]) == 0
-    assert main(["trash", "--restore", *data]) == 0
+    assert command(full, "accept") == 0
+    assert command(full, "trash", "--restore") == 0
     assert "2 files that the database refers to are back" in capsys.readouterr().out
     assert stored(full) == CONTENTS
     assert discarded(full) == []
@@ -201,12 +219,10 @@ def test_the_way_back_after_the_wrong_backup_was_accepted(
 def test_an_accepted_new_beginning_starts_and_keeps_the_old_files_for_thirty_days(
     full: Clinic, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    full.db.close()
-    for path in full.folder.glob("sagittal.db*"):
-        path.unlink()
-    assert main(["accept", "--data", str(full.folder)]) == 0
-    full.db = Database(full.settings.database)
-    process = serve(full.folder)
+    lose(full)
+    assert command(full, "accept") == 0
+    full.db = Database(full.settings.database_source)
+    process = serve(full.settings)
     try:
         assert line_with(process, r"http://\S+/set-up/\S+")
     finally:
@@ -214,9 +230,9 @@ def test_an_accepted_new_beginning_starts_and_keeps_the_old_files_for_thirty_day
         process.communicate()
     assert sweep(full.db, full.blobs, at_once(full)) == 3
     assert set(discarded(full)) == CONTENTS
-    trash = Trash(full.settings.trash)
+    trash = FolderTrash(full.settings.trash, full.settings.blobs)
     text = (full.settings.trash / "list.txt").read_text()
-    assert all(str(one.path.relative_to(trash.root)) in text for one in trash.files())
+    assert all(one.way in text for one in trash.files())
     assert text.count("\n") == 4
     since = next(trash.files()).since
     assert trash.expire(since + KEPT - dt.timedelta(seconds=1)) == 0
@@ -226,12 +242,12 @@ def test_an_accepted_new_beginning_starts_and_keeps_the_old_files_for_thirty_day
 
 
 def test_the_mark_of_one_folder_does_not_trust_the_database_of_another(full: Clinic, tmp_path: Path) -> None:
-    other = tmp_path / "other"
-    shutil.copytree(full.folder, other, ignore=shutil.ignore_patterns("*other*"))
-    with closing(Database(other / "sagittal.db")) as db, db.write() as c:
+    other = tmp_path / "other.db"
+    copy_database(full.db.source, other)
+    with closing(Database(other)) as db, db.write() as c:
         sessions.create(c, None, full.patient.id)
     assert sweep(full.db, full.blobs, at_once(full)) == 0
-    put(full, other / "sagittal.db")  # a continuation of ours: trusted
+    put(full, other)  # a continuation of ours: trusted
     with full.db.read() as c:
         assert custody.find_doubt(c, full.settings) is None
     raise_mark(full.db, full.settings.mark)
@@ -244,7 +260,7 @@ def test_a_damaged_mark_stops_the_sweep_and_accept_writes_it_anew(full: Clinic) 
     full.blobs.put(full.patient.id, b"of nobody")
     full.settings.mark.write_bytes(b"\x00" * 40)
     assert sweep(full.db, full.blobs, at_once(full)) == 0
-    assert main(["accept", "--data", str(full.folder)]) == 0
+    assert command(full, "accept") == 0
     assert sweep(full.db, full.blobs, at_once(full)) == 1
     assert discarded(full) == [b"of nobody"]
 
@@ -284,16 +300,15 @@ def test_a_power_cut_in_a_move_to_the_trash_leaves_the_whole_file_here_or_there(
 ) -> None:
     space, name, at = "a" * 32, "b" * 64, dt.datetime(2026, 3, 14, tzinfo=dt.UTC)
     source = tmp_path / "blobs" / space / name
-    trash = Trash(tmp_path / "trash")
+    trash = FolderTrash(tmp_path / "trash", tmp_path / "blobs")
     target = trash.root / "20260314T000000Z" / space / name
     disk = ModelDisk()
     disk.put(source, b"walk")
     fs.make_folder(target.parent)
-    one = BlobFile(space, name, source, 9e9)
     monkeypatch.setattr(fs, "system", disk)
-    trash.take([one], at)
+    trash.take([(space, name)], at)
     monkeypatch.setattr(trash, "write_list", lambda: None)
-    trash.settle([one], at)
+    trash.settle([(space, name)], at)
     for states in disk.history:
         for state in states:
             assert [state.get(source), state.get(target)].count(b"walk") == 1
@@ -320,7 +335,8 @@ def test_a_file_in_the_trash_that_changed_is_found_by_the_check(full: Clinic) ->
     full.blobs.put(full.patient.id, b"of nobody")
     sweep(full.db, full.blobs, at_once(full))
     assert findings(full) == []
-    next(Trash(full.settings.trash).files()).path.write_bytes(b"of somebodi")
+    trash = FolderTrash(full.settings.trash, full.settings.blobs)
+    trash.path(next(trash.files())).write_bytes(b"of somebodi")
     [found] = findings(full)
     assert found.startswith("trash: ")
     assert "has changed on the disk" in found
@@ -356,6 +372,7 @@ def erase(clinic: Clinic, what: str) -> None:
         )
 
 
+@on_both_engines
 @pytest.mark.parametrize("what", ["patient", "session"])
 def test_an_erasure_takes_what_lies_in_the_trash_with_it(full: Clinic, what: str) -> None:
     take_out(full, "b.txt")
@@ -367,9 +384,10 @@ def test_an_erasure_takes_what_lies_in_the_trash_with_it(full: Clinic, what: str
     assert discarded(full) == []
 
 
+@on_both_engines
 @pytest.mark.parametrize("what", ["patient", "session"])
 def test_an_interrupted_erasure_is_finished_by_the_next_start(
-    tmp_path: Path, what: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, what: str, engine: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     deaths, over = 0, False
     while not over:
@@ -394,10 +412,11 @@ def test_an_interrupted_erasure_is_finished_by_the_next_start(
         assert findings(clinic) == []
         assert committed or (stored(clinic) == {b"signals", b"walk three"})
         clinic.db.close()
-        deaths += 1
+        deaths += STEP[engine] if committed else 1
     assert deaths >= 8
 
 
+@on_both_engines
 def test_a_result_that_comes_after_its_session_was_erased_is_gone_at_once(clinic: Clinic) -> None:
     load(clinic.settings.task_modules)
     clinic.submit()
@@ -409,6 +428,7 @@ def test_a_result_that_comes_after_its_session_was_erased_is_gone_at_once(clinic
     assert stored(clinic) == set()
 
 
+@on_both_engines
 def test_a_late_file_of_an_erased_patient_does_not_wait_in_the_trash(full: Clinic) -> None:
     erase(full, "patient")
     full.blobs.put(full.patient.id, b"walk four")

@@ -12,6 +12,7 @@ import sys
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import httpx
@@ -25,7 +26,11 @@ from server.auth.sessions import Logins
 from server.processes.environment import make_environment
 from server.services import recordings
 from tests.data import ROOT
+from tests.engines import on_both_engines
 from tests.faults.clinic import Clinic, alive, until
+from tests.faults.forking import ForkedServer, Forker
+
+pytestmark = on_both_engines
 
 COMMAND = [
     sys.executable,
@@ -63,24 +68,23 @@ def answers(address: str) -> bool:
         return bool(answer.status == 200)
 
 
-def test_a_job_survives_the_kill_of_the_server(clinic: Clinic) -> None:
+def test_a_job_survives_the_kill_of_the_server(clinic: Clinic, forker: Forker) -> None:
     view, reached, gate = clinic.hold("second")
-    with serving(clinic) as (server, address):
-        assert answers(address)
+    with forker.start(clinic.settings).running() as server:
+        assert answers(server.address)
         until(reached.exists)
         child = int(reached.read_text())
-        os.kill(server.pid, signal.SIGKILL)
-        server.wait()
+        server.kill()
         until(lambda: not alive(child))
     gate.touch()
-    with serving(clinic):
+    with forker.start(clinic.settings).running():
         done = clinic.ended(view)
     assert (done.state, done.attempt) == ("done", 2)
     assert len(clinic.results()) == 1
 
 
-def test_a_second_server_on_the_same_folder_refuses(clinic: Clinic) -> None:
-    with serving(clinic) as (server, address):
+def test_a_second_server_on_the_same_folder_refuses(clinic: Clinic, forker: Forker) -> None:
+    with forker.start(replace(clinic.settings, workers=0)).running() as server:
         second = subprocess.run(
             COMMAND,
             env=make_environment(clinic.settings),
@@ -92,33 +96,35 @@ def test_a_second_server_on_the_same_folder_refuses(clinic: Clinic) -> None:
         )
         assert second.returncode == 1
         assert f"process {server.pid}" in second.stderr
-        assert answers(address)
+        assert answers(server.address)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_stopped_server_gives_its_job_back_within_ten_seconds(clinic: Clinic, number: int) -> None:
+def test_a_stopped_server_gives_its_job_back_within_ten_seconds(
+    clinic: Clinic, forker: Forker, number: int
+) -> None:
     view, reached, _ = clinic.hold("second")
-    with serving(clinic) as (server, _):
+    with forker.start(clinic.settings).running() as server:
         until(reached.exists)
-        server.send_signal(number)
-        server.wait(timeout=10)
+        os.kill(server.pid, number)
+        server.wait(patience_s=10)
     row = clinic.row(view)
     assert (row.state, row.deaths) == ("queued", 0)
     assert not alive(int(reached.read_text()))
 
 
-def test_an_upload_in_parts_goes_on_after_kills_with_the_same_bytes(clinic: Clinic) -> None:
+def test_an_upload_in_parts_goes_on_after_kills_with_the_same_bytes(clinic: Clinic, forker: Forker) -> None:
     content = np.random.default_rng(19).bytes(12_000_000)
     with clinic.db.write() as c:
         user = accounts.create(c, "grace", None, Role.CLINICIAN, hash_password("a few unrelated words")).id
         hour = dt.timedelta(hours=1)
         token = Logins(clinic.db, hour, hour).start(c, user, None)
     path = f"/api/v1/sessions/{clinic.session.id}/uploads"
-    reached = 0
+    reached, without_workers = 0, replace(clinic.settings, workers=0)
     for kill_at in (2_000_000, 7_000_000, None):
         with (
-            serving(clinic) as (server, address),
-            httpx.Client(base_url=address, cookies={"sid": token}, timeout=60) as client,
+            forker.start(without_workers).running() as server,
+            httpx.Client(base_url=server.address, cookies={"sid": token}, timeout=60) as client,
         ):
             announced = {"name": "large.csv", "size": len(content)}
             upload = client.post(path, json=announced).raise_for_status().json()
@@ -140,12 +146,11 @@ def test_an_upload_in_parts_goes_on_after_kills_with_the_same_bytes(clinic: Clin
 
 
 def _dying(
-    server: subprocess.Popen[str], content: bytes, start: int, kill_at: int | None, part: Path
+    server: ForkedServer, content: bytes, start: int, kill_at: int | None, part: Path
 ) -> Iterator[bytes]:
     """The bytes from a place on; the server is killed in the midst once what came before is there."""
     for at in range(start, len(content), 250_000):
         if kill_at and at >= kill_at:
             until(lambda: part.exists() and part.stat().st_size >= kill_at - 1_000_000)
             server.kill()
-            server.wait()
         yield content[at : at + 250_000]

@@ -21,10 +21,14 @@ from server.services.references import list_referenced
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.tables import job
 from tests.core.fusion.algorithms.motion import trial_bytes
+from tests.engines import on_both_engines
 from tests.faults.clinic import Clinic, until
+from tests.kept import keep
 
 ORDER = tunings.TuningOrder("mahony_2008", ("judge",), particles=10, iterations=70, rounds=2, random_rounds=1)
 """Some seven seconds of work: longer than a worker takes to be killed, replaced and heard of."""
+TRIALS = {"fit": 60.0, "judge": 30.0}
+"""Name of a trial → how long it is, s."""
 
 
 @pytest.fixture
@@ -33,7 +37,7 @@ def tuning_clinic(tmp_path: Path) -> Iterator[Clinic]:
     made.settings = dataclasses.replace(
         made.settings, task_modules=("server.worker.tasks", "tests.faults.tiny_tasks"), job_timeout_s=60.0
     )
-    for name, seconds in (("fit", 60.0), ("judge", 30.0)):
+    for name, seconds in TRIALS.items():
         with recordings.receive(
             made.db, made.blobs, made.settings, None, made.session.id, f"{name}.npz"
         ) as upload:
@@ -63,11 +67,20 @@ def result(clinic: Clinic) -> dict[str, Any]:
     return dict(found.result)
 
 
+@keep
+def undisturbed() -> dict[str, Any]:
+    """What the order gives in one go."""
+    files = [SourceFile.of_bytes(f"{name}.npz", trial_bytes(seconds)) for name, seconds in TRIALS.items()]
+    found = tunings.prepare(files, ORDER).run(lambda *_: None).to_json()
+    return dict(json.loads(json.dumps(found)))
+
+
 def kept(clinic: Clinic, view: JobView) -> str | None:
     sha256: str | None = clinic.row(view).checkpoint
     return sha256
 
 
+@on_both_engines
 def test_a_killed_worker_costs_a_tuning_seconds_and_not_its_bits(
     tuning_clinic: Clinic, tuning_workers: Workers
 ) -> None:
@@ -85,12 +98,7 @@ def test_a_killed_worker_costs_a_tuning_seconds_and_not_its_bits(
     assert not tuning_clinic.blobs.path(tuning_clinic.patient.id, first).exists()
     assert tuning_clinic.ended(view, 300.0).state == "done"
     assert kept(tuning_clinic, view) is None
-    files = [
-        SourceFile.of_bytes(f"{name}.npz", trial_bytes(seconds))
-        for name, seconds in (("fit", 60.0), ("judge", 30.0))
-    ]
-    undisturbed = tunings.prepare(files, ORDER).run(lambda *_: None)
-    assert result(tuning_clinic) == json.loads(json.dumps(undisturbed.to_json()))
+    assert result(tuning_clinic) == undisturbed()
 
 
 def test_a_tuning_makes_way_for_what_is_urgent_and_goes_on(
@@ -108,6 +116,7 @@ def test_a_tuning_makes_way_for_what_is_urgent_and_goes_on(
     assert tuning_clinic.ended(view, 5.0).state == "cancelled"
 
 
+@on_both_engines
 def test_erasing_a_session_takes_the_checkpoint_along(tuning_clinic: Clinic, tuning_workers: Workers) -> None:
     view = submit(tuning_clinic, seed=2)
     until(lambda: kept(tuning_clinic, view), 300.0)

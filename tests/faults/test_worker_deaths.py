@@ -11,11 +11,13 @@ import threading
 from pathlib import Path
 
 import pytest
+from sqlalchemy.exc import OperationalError
 
 from server.processes.environment import make_environment
 from server.processes.supervisor import Workers
 from server.settings import Settings
-from tests.faults.clinic import Clinic, alive, until
+from tests.engines import on_both_engines, on_both_engines_first
+from tests.faults.clinic import Clinic, alive, state_of, until
 from tests.faults.tiny_tasks import STAGES
 
 
@@ -24,15 +26,15 @@ def children_of(pid: int) -> list[int]:
     return [int(word) for word in text.split()]
 
 
-def test_a_job_is_done_with_its_result_stored(clinic: Clinic, workers: Workers) -> None:
+def test_a_job_is_done_with_its_result_stored_and_the_warm_child_kept_for_the_next(
+    clinic: Clinic, workers: Workers
+) -> None:
     view = clinic.ended(clinic.submit())
     assert (view.state, view.attempt, view.stage, view.fraction) == ("done", 1, view.stage, 1.0)
     [result] = clinic.results()
     assert result.job_id == view.id
     assert clinic.blobs.read(clinic.patient.id, result.files["result.txt"].sha256) == b"signals"
 
-
-def test_the_warm_child_is_kept_from_job_to_job(clinic: Clinic, workers: Workers) -> None:
     def child_at(stage: str) -> str:
         view, reached, gate = clinic.hold(stage)
         pid = until(lambda: reached.exists() and reached.read_text())
@@ -43,19 +45,22 @@ def test_the_warm_child_is_kept_from_job_to_job(clinic: Clinic, workers: Workers
     assert child_at("first") == child_at("second")
 
 
-@pytest.mark.parametrize("stage", [*STAGES, "publish"])
-def test_a_killed_worker_is_replaced_and_the_job_has_one_result(
-    clinic: Clinic, workers: Workers, stage: str
+@on_both_engines
+def test_a_worker_killed_at_any_stage_is_replaced_and_the_job_has_one_result(
+    clinic: Clinic, workers: Workers
 ) -> None:
-    view, reached, gate = clinic.hold(stage)
-    until(reached.exists)
-    [worker] = workers.pids
-    os.kill(worker, signal.SIGKILL)
-    gate.touch()
-    done = clinic.ended(view)
-    assert (done.state, done.attempt) == ("done", 2)
-    assert [r.job_id for r in clinic.results()] == [view.id]
-    assert workers.pids != [worker]
+    done = []
+    for stage in (*STAGES, "publish"):
+        view, reached, gate = clinic.hold(stage)
+        until(reached.exists)
+        [worker] = workers.pids
+        os.kill(worker, signal.SIGKILL)
+        gate.touch()
+        ended = clinic.ended(view)
+        assert (ended.state, ended.attempt) == ("done", 2), stage
+        assert workers.pids != [worker]
+        done.append(view.id)
+        assert sorted(r.job_id for r in clinic.results()) == sorted(done), stage
 
 
 @pytest.mark.parametrize("clinic", [Settings().lease_s], indirect=True)
@@ -73,6 +78,7 @@ def test_a_child_does_not_outlive_its_worker(clinic: Clinic, workers: Workers, b
     until(lambda: not alive(child))
 
 
+@on_both_engines_first
 @pytest.mark.first
 def test_a_killed_child_is_replaced_by_the_same_worker(clinic: Clinic, workers: Workers) -> None:
     view, reached, gate = clinic.hold("second")
@@ -86,6 +92,7 @@ def test_a_killed_child_is_replaced_by_the_same_worker(clinic: Clinic, workers: 
     assert len(clinic.results()) == 1
 
 
+@on_both_engines
 def test_a_job_that_kills_three_workers_is_given_up(clinic: Clinic, workers: Workers) -> None:
     view = clinic.ended(clinic.submit(die_at="second"))
     assert (view.state, view.error_code, view.attempt) == ("failed", "worker_died", 3)
@@ -95,13 +102,30 @@ def test_a_job_that_kills_three_workers_is_given_up(clinic: Clinic, workers: Wor
     assert clinic.ended(clinic.submit()).state == "done"
 
 
+def freeze_outside_a_transaction(clinic: Clinic, pid: int) -> None:
+    """Stop a process where it holds no lock of the database: others can write."""
+
+    def freeze() -> bool:
+        os.kill(pid, signal.SIGSTOP)
+        until(lambda: state_of(pid) == "T")
+        try:
+            clinic.db.probe()
+        except OperationalError:
+            os.kill(pid, signal.SIGCONT)
+            return False
+        return True
+
+    until(freeze)
+
+
+@on_both_engines
 def test_a_frozen_worker_is_fenced_when_it_wakes(clinic: Clinic, workers: Workers) -> None:
     view, reached, gate = clinic.hold("third")
     until(reached.exists)
     [frozen] = workers.pids
     other = Workers(clinic.settings)
-    os.kill(frozen, signal.SIGSTOP)
     try:
+        freeze_outside_a_transaction(clinic, frozen)
         reached.unlink()
         other.start()
         until(reached.exists)  # the second attempt is at the gate: the first one's lease has run out
@@ -117,19 +141,50 @@ def test_a_frozen_worker_is_fenced_when_it_wakes(clinic: Clinic, workers: Worker
     assert [r.job_id for r in clinic.results()].count(view.id) == 1
 
 
-@pytest.mark.parametrize("clinic", [Settings().lease_s], indirect=True)
-@pytest.mark.parametrize("stage", STAGES)
-def test_cancel_stops_the_child_within_two_seconds(clinic: Clinic, workers: Workers, stage: str) -> None:
-    view, reached, _ = clinic.hold(stage)
+@on_both_engines
+def test_a_worker_frozen_while_it_writes_stops_the_others_only_until_it_wakes(
+    clinic: Clinic, workers: Workers, capfd: pytest.CaptureFixture[str]
+) -> None:
+    view, reached, gate = clinic.hold("publish")  # in the transaction that writes the result
+    waiting = clinic.submit()
     until(reached.exists)
-    child = int(reached.read_text())
-    with clinic.db.write() as c:
-        asked = clinic.queue.cancel(c, view.id)
-    assert asked is not None
-    assert (asked.state, asked.cancel_requested) == ("running", True)
-    assert clinic.ended(view, patience_s=2.0).state == "cancelled"
-    assert not alive(child)
-    assert clinic.results() == []
+    [frozen] = workers.pids
+    other = Workers(clinic.settings)
+    said: list[str] = []
+
+    def has_said(words: str) -> bool:
+        said.append(capfd.readouterr().err)
+        return words in "".join(said)
+
+    os.kill(frozen, signal.SIGSTOP)
+    try:
+        other.start()
+        [patient] = other.pids
+        until(lambda: has_said("the database has been busy"))
+        child = children_of(patient)
+        gate.touch()
+    finally:
+        os.kill(frozen, signal.SIGCONT)
+    assert [clinic.ended(one).state for one in (view, waiting)] == ["done", "done"]
+    assert (workers.pids, other.pids, children_of(patient)) == ([frozen], [patient], child)
+    other.stop()
+    assert sorted(r.job_id for r in clinic.results()) == sorted([view.id, waiting.id])
+    assert "Traceback" not in "".join(said)
+
+
+@on_both_engines
+@pytest.mark.parametrize("clinic", [Settings().lease_s], indirect=True)
+def test_cancel_stops_the_child_at_any_stage_within_two_seconds(clinic: Clinic, workers: Workers) -> None:
+    for stage in STAGES:
+        view, reached, _ = clinic.hold(stage)
+        child = int(until(lambda at=reached: at.exists() and at.read_text()))  # type: ignore[misc]
+        with clinic.db.write() as c:
+            asked = clinic.queue.cancel(c, view.id)
+        assert asked is not None
+        assert (asked.state, asked.cancel_requested) == ("running", True)
+        assert clinic.ended(view, patience_s=2.0).state == "cancelled", stage
+        assert not alive(child)
+        assert clinic.results() == []
 
 
 @pytest.mark.parametrize("clinic", [Settings().lease_s], indirect=True)
@@ -141,16 +196,15 @@ def test_cancel_stops_a_child_that_never_speaks(clinic: Clinic, workers: Workers
     assert clinic.ended(view, patience_s=2.0).state == "cancelled"
 
 
-@pytest.mark.parametrize(
-    ("error", "code"), [("known", "no_walking"), ("bug", "internal_error"), ("memory", "out_of_memory")]
-)
-def test_a_failure_keeps_its_reason_and_the_worker(
-    clinic: Clinic, workers: Workers, error: str, code: str
-) -> None:
-    view = clinic.ended(clinic.submit(error=error))
-    assert (view.state, view.error_code, view.attempt) == ("failed", code, 1)
-    assert view.error_message
-    assert clinic.ended(clinic.submit()).state == "done"
+@on_both_engines
+def test_a_failure_keeps_its_reason_and_the_worker(clinic: Clinic, workers: Workers) -> None:
+    began = workers.pids
+    for error, code in (("known", "no_walking"), ("bug", "internal_error"), ("memory", "out_of_memory")):
+        view = clinic.ended(clinic.submit(error=error))
+        assert (view.state, view.error_code, view.attempt) == ("failed", code, 1)
+        assert view.error_message
+        assert clinic.ended(clinic.submit()).state == "done"
+    assert workers.pids == began
 
 
 def test_a_job_beyond_its_time_is_stopped(clinic: Clinic, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -164,6 +218,7 @@ def test_a_job_beyond_its_time_is_stopped(clinic: Clinic, monkeypatch: pytest.Mo
     assert (view.state, view.error_code) == ("failed", "job_timeout")
 
 
+@on_both_engines
 def test_stopping_gives_the_job_back_unharmed(clinic: Clinic, workers: Workers) -> None:
     view, reached, _ = clinic.hold("second")
     until(reached.exists)
@@ -177,6 +232,7 @@ def test_stopping_gives_the_job_back_unharmed(clinic: Clinic, workers: Workers) 
     assert (row.state, row.deaths, row.worker) == ("queued", 0, None)
 
 
+@on_both_engines
 def test_a_killed_server_takes_worker_and_child_along_and_the_next_one_goes_on(clinic: Clinic) -> None:
     script = textwrap.dedent("""
         import sys, time

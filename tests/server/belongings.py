@@ -10,7 +10,9 @@ from typing import Any, Final
 from sqlalchemy import insert
 
 from server.auth.tokens import token_hash
-from server.services import prescriptions, programmes
+from server.services import identities, prescriptions, programmes
+from server.storage.care_tables import emergency_access
+from server.storage.field_cipher import make_keys
 from server.storage.live_tables import live_take
 from server.storage.person_tables import consent
 from server.storage.report_tables import report_link, signed_report
@@ -49,16 +51,20 @@ OF_NOBODY: Final = {
 def add_belongings(clinic: Clinic, code: str) -> dict[str, str]:
     """Add a patient to whom one of everything belongs; returns values by the names in addresses."""
     ((other, sid),) = crowd.fill(clinic, 1, 2, analysed.files())
+    locum = clinic.user("clinician", "locum")
     at, later = now(), now() + dt.timedelta(days=1)
     ids = {name: new_id() for name in (
         "note_id", "consent_id", "upload_id", "tuning_id",
-        "run_id", "report_id", "link_id", "take_id",
+        "access_id", "run_id", "report_id", "link_id", "take_id",
     )}  # fmt: skip
     with clinic.db.write() as c:
         pid = c.execute(session.select().where(session.c.id == sid)).one().patient_id
         took = c.execute(recording.select().where(recording.c.session_id == sid)).one().id
         done = c.execute(analysis.select().where(analysis.c.recording_id == took)).one()
         of_visit, of_patient = {"session_id": sid}, {"patient_id": pid}
+        if not clinic.settings.identity_key_file.exists():
+            make_keys(clinic.settings.identity_key_file)
+        identities.change(c, clinic.settings.identity_key_file, None, pid, {"name": f"Person {code}"})
         written = prescriptions.write(c, clinic.app.state.reviewed, None, pid, TRAINING)
         course = programmes.start(c, None, pid, starts_on=at.date())
         once = {"job_id": done.job_id, "created_at": at, "code_version": "1"}
@@ -66,6 +72,9 @@ def add_belongings(clinic: Clinic, code: str) -> dict[str, str]:
         c.execute(patient.update().where(patient.c.id == pid).values(code=code, note=f"note of {code}"))
         c.execute(session.update().where(session.c.patient_id == pid).values(title=f"visit of {code}"))
         for table, row in (
+            (emergency_access, {"id": ids["access_id"], **of_patient, "user_id": locum,
+                                "reason": f"{code} fell", "opened_at": at - dt.timedelta(hours=5),
+                                "ends_at": at - dt.timedelta(hours=1)}),
             (patient_note, {"id": ids["note_id"], **of_patient, "written_on": at.date(), "created_at": at,
                             "content": f"{code} limps"}),
             (consent, {"id": ids["consent_id"], **of_patient, "purpose": "sharing", "given_on": at.date(),

@@ -7,7 +7,7 @@ from pwdlib import PasswordHash
 from pwdlib.hashers.argon2 import Argon2Hasher
 
 from server.auth import passwords
-from tests.engines import bare_source, postgres, source  # noqa: F401 - fixtures
+from tests.engines import bare_source, engine, postgres, source  # noqa: F401 - fixtures
 
 CHEAP = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
 NOBODY = CHEAP.hash("no account has this password")

@@ -107,7 +107,7 @@ def _visit(rows: Rows, person: str, day: int, stored: Mapping[str, Blob]) -> str
 
 @contextlib.contextmanager
 def statements() -> Iterator[list[str]]:
-    """Every statement that what is asked meanwhile sends, BEGIN left out; not those of other threads."""
+    """Every statement that is sent for what is asked meanwhile, but for what begins a transaction."""
     sent: list[str] = []
 
     def note(c: object, cursor: object, statement: str, *rest: object) -> None:

@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Final
 
 import pytest
+from jinja2 import meta
 
+from server.http.templates import load_templates
 from tests.data import ROOT
 
 TEMPLATES: Final = sorted((ROOT / "web" / "templates").glob("*.html"))
@@ -16,6 +18,16 @@ MOST_LINES: Final = 250
 
 INLINE: Final = "a|abbr|b|br|code|em|i|kbd|output|small|span|strong|svg|use|path"
 """Elements that may share a line: words and what stands among them."""
+
+IMPORT: Final = re.compile(r'{%-? from "([^"]+)" import [^%]*?(with context)? ?-?%}')
+ALONE: Final = (
+    "_daily.html", "_devices.html", "_macros.html", "_params.html", "_programme.html", "_runs.html",
+    "_squat_rows.html", "_steps.html", "_ten_rows.html", "_trends.html",
+)  # fmt: skip
+"""Files of macros that use their arguments only."""
+SET_WITHIN: Final = {"_params.html": {"mean", "sd"}}
+"""Names that a macro sets itself, several at a time, which Jinja does not see."""
+
 BLOCK: Final = re.compile(rf"<(?!(?:{INLINE})\b)[a-z][\w-]*")
 
 
@@ -32,3 +44,20 @@ def test_every_part_is_used() -> None:
     text = "\n".join(path.read_text() for path in TEMPLATES)
     unused = [p.name for p in TEMPLATES if p.name.startswith("_") and f'"{p.name}"' not in text]
     assert unused == []
+
+
+def test_macros_that_use_nothing_of_a_page_are_made_once() -> None:
+    """Imported with the context of a page, all macros of a file are made anew for every template of it."""
+    env = load_templates("en").env
+    anew = {
+        (path.name, name)
+        for path in TEMPLATES
+        for name, with_context in IMPORT.findall(path.read_text())
+        if with_context and name in ALONE
+    }
+    assert anew == set()
+    for name in ALONE:
+        source = (ROOT / "web" / "templates" / name).read_text()
+        used = meta.find_undeclared_variables(env.parse(source)) - env.globals.keys()
+        assert used <= SET_WITHIN.get(name, set()), f"{name} uses what its page has"
+        assert not any(with_context for _, with_context in IMPORT.findall(source))

@@ -18,7 +18,7 @@ import numpy as np
 
 from core.body.erkf.filter import ErkfInputs, links_of, memory_of, new_output, new_record, noise_of
 from core.body.erkf.gaps import HOLD_S
-from core.body.erkf.kernel import CONTACT, INVALID, NONE_KEPT, STILL, ErkfSamples, filter_segments
+from core.body.erkf.kernel import CONTACT, INVALID, NONE_KEPT, STILL, filter_segments
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.start import start_state
 from core.body.live_still import ROLLING_MPS
@@ -101,14 +101,15 @@ class LiveErkf:
         self._dt, self._first = 1.0 / rate_hz, True
         self._foot = np.zeros(n, np.bool_)
         self._foot[list(tree.feet)] = True
-        self._links, self._noise = links_of(tree, params), noise_of(params, rate_hz)
-        self._record = new_record(tree, params, 1)
+        self._noise = noise_of(params, rate_hz)
         none = np.zeros((T, n), np.bool_)
         step = np.full(T, self._dt)
         state = start_state(
             tree, ErkfInputs(step, standing.acc, standing.gyr, standing.valid, none, none), params, (0, T), q
         )
         self._memory = memory_of(state)
+        record = new_record(tree, params, 1)
+        self._given = tuple(self._memory), tuple(links_of(tree, params)), tuple(self._noise), tuple(record)
         self._heading, self._rolling = np.empty((0, n)), np.empty((0, n))
         self._gone, self._adrift = np.zeros(n, np.int64), np.zeros(n, np.bool_)
         linked = {i for j in tree.joints for i in (j.proximal, j.distal)}
@@ -134,20 +135,19 @@ class LiveErkf:
         _flag(signals.valid, signals.still, self._foot, flags)
         adrift = np.zeros((T, n), np.bool_)
         begins = list(self._settles(signals, adrift))
+        memory, links, noise, record = self._given
         for first, past in pairwise(sorted({0, T, *(k for k, _ in begins)})):
             for _, i in (x for x in begins if x[0] == first):
                 self._settle(i, signals.acc[first, i], signals.gyr[first, i])
             k = slice(first, past)
-            samples = ErkfSamples(
-                step[k], signals.acc[k], signals.gyr[k], flags[k], self._heading, self._rolling
-            )
-            part = output.part(first, past)
-            given = map(tuple, (self._memory, samples, self._links, self._noise, self._record, part))
-            broke = filter_segments(*given, NONE_KEPT, 0, False)
+            samples = (step[k], signals.acc[k], signals.gyr[k], flags[k], self._heading, self._rolling)
+            part = tuple(output.part(first, past))
+            broke = filter_segments(memory, samples, links, noise, record, part, NONE_KEPT, 0, False)
             if broke >= 0:
                 states[first + broke :], residual[first + broke :], self.broken = np.nan, np.nan, True
                 break
-        states[adrift] = np.nan
+        if adrift.any():
+            states[adrift] = np.nan
         return states, residual
 
     def _settles(self, signals: SignalBlock, adrift: Bools) -> Iterator[tuple[int, int]]:

@@ -34,6 +34,31 @@ def _level(p, feet, still, valid, ankle, share, floor):  # type: ignore[no-untyp
             p[k, i, 2] -= floor[0]
 
 
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _tell(q, p, valid, still, feet, shown, known, whole, foot_q, foot_p, stands, there):  # type: ignore[no-untyped-def]
+    """Write which of segments q (T, n, 4), p (T, n, 3) mean something, and the paths of the feet.
+
+    Parameters
+    ----------
+    valid, still : (T, n), (T, n, 2) of the sensors. feet, shown : columns of the feet, of the figure.
+    known : (T, n) written. whole : (T,) written, all of the figure are known.
+    foot_q, foot_p, stands, there : (T, F, ·) written, as `FootBlock`.
+    """
+    for k in range(q.shape[0]):
+        for i in range(q.shape[1]):
+            known[k, i] = valid[k, i] and np.isfinite(q[k, i, 0])
+        whole[k] = True
+        for i in shown:
+            whole[k] = whole[k] and known[k, i]
+        for f in range(feet.shape[0]):
+            i = feet[f]
+            stands[k, f], there[k, f] = still[k, i, 0], known[k, i]
+            for c in range(4):
+                foot_q[k, f, c] = q[k, i, c]
+            for c in range(3):
+                foot_p[k, f, c] = p[k, i, c]
+
+
 class LinkedBody:
     """Pelvis and legs that hang together."""
 
@@ -66,14 +91,18 @@ class LinkedBody:
         tracked = self._filtered.push(raw)
         signals, q, p = tracked.signals, tracked.q, tracked.p
         self._notices += self._watch.push(tracked.residual, signals.valid, signals.still)
-        known = signals.valid & np.isfinite(q[:, :, 0])
-        still = np.ascontiguousarray(signals.still[:, self._feet, 0])
-        feet = self._feet
+        T, n = signals.valid.shape
+        known, whole = np.empty((T, n), np.bool_), np.empty(T, np.bool_)
+        F = len(self._feet)
         paths = FootBlock(
-            p.take(feet, axis=1), q.take(feet, axis=1), still, np.asarray(known).take(feet, axis=1)
+            np.empty((T, F, 3)), np.empty((T, F, 4)), np.empty((T, F), np.bool_), np.empty((T, F), np.bool_)
         )
-        _level(p, self._feet, still, paths.valid, self._ankle, self._share, self._floor)
-        return BodyBlock(q, p, known, np.asarray(known[:, self._shown].all(axis=1)), paths)
+        _tell(
+            q, p, signals.valid, signals.still, self._feet, self._shown, known, whole, paths.q, paths.p,
+            paths.still, paths.valid,
+        )  # fmt: skip
+        _level(p, self._feet, paths.still, paths.valid, self._ankle, self._share, self._floor)
+        return BodyBlock(q, p, known, whole, paths)
 
     def drain_notices(self) -> list[Notice]:
         """Joints whose ends are too far apart."""

@@ -17,6 +17,7 @@ from core.body.tree import person_tree
 from core.calibration.result import SegmentCalibration
 from core.frames import GRAVITY, R_NEUTRAL, Floats, Segment
 from core.rotation import from_matrix, multiply
+from core.timeline.columns import find_columns, take_columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ class FilteredSensors:
     ) -> None:
         mounts = {s: mounted[s].R_segment_sensor for s in segments}
         self.tree = person_tree(body, mounts, segments)
-        self._columns = np.array([column[s] for s in segments], np.int64)
+        self._columns = find_columns(segments, sorted(column, key=lambda s: column[s]))
         excess = [(mounted[s].rest_norm - GRAVITY) * mounts[s][1] for s in segments]
         bias = [mounted[s].gyro_bias for s in segments]
         self._bridge = GapBridge(self.tree, np.array(excess), np.array(bias), rate_hz)
@@ -65,9 +66,8 @@ class FilteredSensors:
 
     def push(self, raw: MeasuredBlock) -> FilteredBlock:
         """The next samples."""
-        # `take` lays its result out in order; an index would not, and another layout is another kernel
-        k, valid = self._columns, raw.valid.take(self._columns, axis=1)
-        acc, gyr = self._bridge.push(raw.acc.take(k, axis=1), raw.gyr.take(k, axis=1), valid)
+        measured_acc, measured_gyr, valid = take_columns(raw.acc, raw.gyr, raw.valid, self._columns)
+        acc, gyr = self._bridge.push(measured_acc, measured_gyr, valid)
         signals = SignalBlock(acc, gyr, valid, self._still.push(acc, gyr, valid))
         if self._filter is None:
             self._filter = LiveErkf(self.tree, self._params, self._rate_hz, signals, self._start)

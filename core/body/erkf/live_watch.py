@@ -19,7 +19,13 @@ people, neura_walk), exchanged or late sensors 26 to 130."""
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _watch(residual, valid, still, ends, window, total, count, worst):  # type: ignore[no-untyped-def]
-    """Add up squares (J,) of moving samples; `worst` (J,) gets the largest mean of a full window."""
+    """Add up squares (J,) of moving samples; `worst` (J,) gets the largest mean of a full window.
+
+    Returns
+    -------
+    whether a window was full.
+    """
+    full = False
     for k in range(residual.shape[0]):
         rest = True
         for i in range(valid.shape[1]):
@@ -34,6 +40,8 @@ def _watch(residual, valid, still, ends, window, total, count, worst):  # type: 
             if count[j] == window:
                 worst[j] = max(worst[j], total[j] / window)
                 total[j], count[j] = 0.0, 0
+                full = True
+    return full
 
 
 class JointWatch:
@@ -49,7 +57,9 @@ class JointWatch:
 
     def push(self, residual: Floats, valid: Bools, still: Bools) -> list[Notice]:
         """Distances (T, J) in m, valid (T, n), still (T, n, 2)."""
-        _watch(residual, valid, still, self._ends, self._window, self._total, self._count, self._worst)
+        given = residual, valid, still, self._ends, self._window, self._total, self._count, self._worst
+        if not _watch(*given):
+            return []
         far = (1e3 * np.sqrt(self._worst) > RESIDUAL_MM[0]) & ~self._told
         if not far.any():
             return []

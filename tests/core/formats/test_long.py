@@ -98,6 +98,17 @@ def test_a_sensor_that_is_too_long_is_not_left_out_beside_a_short_one(recording:
     assert error.value.code == "recording_too_long"
 
 
+def test_two_files_of_one_sensor_each_are_as_long_as_one_file_of_two(recording: Recording) -> None:
+    feet = ("left_foot", "right_foot")
+    specs = [{**SPEC, "file": f"{foot}.csv", "columns": {foot: {"acc": ["x", "y", "z"]}}} for foot in feet]
+    day = csv_text(recording)
+    files = [SourceFile.of_bytes(f"{foot}.csv", day) for foot in feet]
+    found = read_recording(files, manifest_of({"sources": specs}))
+    assert (set(found.streams), found.long) == ({"left_foot", "right_foot"}, {})
+    alone = read_recording(files[:1], manifest_of({"sources": specs[:1]}))
+    assert (set(alone.long), alone.streams) == ({"left_foot"}, {})
+
+
 def test_a_counter_cannot_time_a_long_table(recording: Recording) -> None:
     spec = {**SPEC, "counter": {"column": "t", "rate_hz": 50}}
     del spec["time_column"], spec["time_unit"]

@@ -15,10 +15,11 @@ from server.commands.export import export
 from server.jobs.queue import EXPORT
 from server.main import main
 from server.services import analyses, exports
+from tests.engines import on_both_engines
 from tests.server import analysed
 from tests.server.clinic import Clinic
 
-pytestmark = pytest.mark.anyio
+pytestmark = [pytest.mark.anyio, on_both_engines]
 
 API = "/api/v1"
 

@@ -11,10 +11,11 @@ from urllib.parse import quote
 import httpx
 import pytest
 
+from tests.engines import on_both_engines
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
-pytestmark = pytest.mark.anyio
+pytestmark = [pytest.mark.anyio, on_both_engines]
 
 API = "/api/v1"
 

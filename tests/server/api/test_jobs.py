@@ -6,10 +6,11 @@ import httpx
 import pytest
 
 from server.jobs.queue import Claim
+from tests.engines import on_both_engines_first
 from tests.server.clinic import Clinic
 from tests.server.serving import serve
 
-pytestmark = pytest.mark.anyio
+pytestmark = [pytest.mark.anyio, on_both_engines_first]
 
 API = "/api/v1"
 

@@ -224,7 +224,7 @@ async def test_commands_are_checked_kept_and_shown(clinic: Clinic, port: int) ->
 async def test_ending_the_sign_in_ends_the_feed(
     clinic: Clinic, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.api.live_feed.CHECK_EVERY_S", 0.05)
+    monkeypatch.setattr("server.auth.access.CHECK_EVERY_S", 0.05)
     async with visit(clinic, port) as v:
         token = clinic.token("clinician")
         url = f"ws://127.0.0.1:{port}/sessions/{v.session}/live/feed"
@@ -233,7 +233,23 @@ async def test_ending_the_sign_in_ends_the_feed(
             async with clinic.client() as http:
                 http.cookies.set("sid", token)
                 (await http.post("/api/v1/sign-out")).raise_for_status()
-            assert (await closed(ws))[0] == 1008
+            assert await closed(ws) == (1008, "not_signed_in")
+
+
+async def test_leaving_the_care_team_ends_the_feed_and_says_so(
+    clinic: Clinic, port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.auth.access.CHECK_EVERY_S", 0.05)
+    async with visit(clinic, port) as v, clinic.client("admin") as admin:
+        url = f"ws://127.0.0.1:{port}/sessions/{v.session}/live/feed"
+        cookie = {"Cookie": f"sid={clinic.token('clinician')}"}
+        try:
+            async with websockets.connect(url, additional_headers=cookie) as ws:
+                await heard(ws, "state")
+                (await admin.put("/api/v1/care-teams", json={"on": True})).raise_for_status()
+                assert await closed(ws) == (1008, "not_found")
+        finally:
+            (await admin.put("/api/v1/care-teams", json={"on": False})).raise_for_status()
 
 
 async def test_an_erased_patient_leaves_no_take_event_prescription_or_sample(

@@ -6,9 +6,10 @@ import pytest
 
 from server import audit
 from server.api.documents import openapi
+from tests.engines import on_both_engines
 from tests.server.clinic import Clinic
 
-pytestmark = pytest.mark.anyio
+pytestmark = [pytest.mark.anyio, on_both_engines]
 
 API = "/api/v1"
 

@@ -14,10 +14,11 @@ from server.report.exports import analysis_files
 from server.report.tracks import NAME, tracks_parquet
 from server.services import patients, sessions
 from server.storage.tables import new_id
+from tests.engines import on_both_engines
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic
 
-pytestmark = pytest.mark.anyio
+pytestmark = [pytest.mark.anyio, on_both_engines]
 
 API = "/api/v1"
 CONTACT = walk.events().times("left", "ic")[3]

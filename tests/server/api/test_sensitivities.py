@@ -17,7 +17,7 @@ from core.simulate.mems import MEMS
 from core.simulate.squat_chain import place_as_agreed
 from server.jobs.queue import SENSITIVITY
 from server.report.exports import analysis_files, angles_parquet
-from server.services import sensitivities
+from server.services import sensitivities, sessions
 from tests.core.body.chain.squats import HEIGHT_M
 from tests.server import analysed
 from tests.server.clinic import Clinic
@@ -50,7 +50,7 @@ def work(clinic: Clinic, session: str, made: SquatSimulation, *others: SourceFil
     files = [SourceFile.of_bytes("recording.parquet", write_recording(made.recording)), *others]
     results = sensitivities.run(files, claim.params, lambda stage, share: told.append(stage))
     with clinic.db.read() as c:
-        patient = c.exec_driver_sql("SELECT patient_id FROM session WHERE id = ?", (session,)).scalar_one()
+        patient = sessions.get(c, session).patient_id
     stored = {name: state.blobs.put(patient, content) for name, content in results.items()}
     assert state.queue.finish(claim, lambda c: sensitivities.publish(c, claim, stored))
     return told

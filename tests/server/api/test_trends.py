@@ -12,10 +12,11 @@ import pytest
 from core.frames import Protocol
 from server.services import patients, sessions
 from server.storage.tables import new_id
+from tests.engines import on_both_engines
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic
 
-pytestmark = pytest.mark.anyio
+pytestmark = [pytest.mark.anyio, on_both_engines]
 
 API = "/api/v1"
 

@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 from server.services import erasure, sweep, uploads
+from tests.engines import on_both_engines
 from tests.server.api.test_files import API, blobs, new_session, stored_names
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
-pytestmark = pytest.mark.anyio
+pytestmark = [pytest.mark.anyio, on_both_engines]
 
 
 async def begin(client: httpx.AsyncClient, session: str, size: int, name: str = "walk.csv") -> str:

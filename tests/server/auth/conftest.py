@@ -8,6 +8,8 @@ from tests.server.clinic import Clinic, open_clinic
 
 
 @pytest.fixture(scope="module")
-async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
+async def clinic(
+    tmp_path_factory: pytest.TempPathFactory, anyio_backend: str, engine: str
+) -> AsyncIterator[Clinic]:
     async with open_clinic(tmp_path_factory.mktemp("clinic")) as running:
         yield running

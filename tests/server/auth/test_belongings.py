@@ -10,10 +10,11 @@ from typing import Any
 import httpx
 import pytest
 from sqlalchemy import insert, update
+from sqlalchemy.exc import OperationalError
 from starlette.requests import HTTPConnection
 
 from server.auth import api_tokens
-from server.auth.access import still_opens
+from server.auth.access import find_end, wait_for_end
 from server.auth.api_tokens import SCOPES, Scope
 from server.auth.roles import POLICY, PUBLIC, Action, Role
 from server.auth.routes import list_declared_actions
@@ -22,11 +23,12 @@ from server.auth.tokens import new_token, token_hash
 from server.storage.care_tables import emergency_access
 from server.storage.person_tables import api_token, second_factor, security_key
 from server.storage.tables import login_session, metadata, new_id, user
+from tests.engines import on_both_engines
 from tests.server.belongings import OF_NOBODY, add_belongings, fill_address
 from tests.server.clinic import ORIGIN, PASSWORD, Clinic, open_clinic
 from tests.server.sockets import ask_websocket
 
-pytestmark = pytest.mark.anyio
+pytestmark = [pytest.mark.anyio, on_both_engines]
 
 OF_WHO_ASKS = {"audit", "login_session"}
 """Tables that a refused request may write into."""
@@ -62,7 +64,9 @@ class Ward:
 
 
 @pytest.fixture(scope="module")
-async def ward(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Ward]:
+async def ward(
+    tmp_path_factory: pytest.TempPathFactory, anyio_backend: str, engine: str
+) -> AsyncIterator[Ward]:
     async with open_clinic(tmp_path_factory.mktemp("belongings")) as clinic:
         owner = clinic.user("clinician", "owner")
         with clinic.db.write() as c:
@@ -395,10 +399,24 @@ async def test_an_open_line_ends_with_the_access(guarded: Ward) -> None:
         "path_params": {"sid": guarded.one["sid"]},
         "headers": [(b"cookie", f"sid={guarded.clinic.token('clinician')}".encode())],
     }  # fmt: skip
-    assert still_opens(HTTPConnection(scope))
+    assert find_end(HTTPConnection(scope)) is None
     await join(guarded, guarded.one)
-    assert not still_opens(HTTPConnection(scope))
-    assert still_opens(HTTPConnection(scope), sid=guarded.two["sid"])
+    assert find_end(HTTPConnection(scope)) == "not_found"
+    assert find_end(HTTPConnection(scope), sid=guarded.two["sid"]) is None
+
+
+async def test_an_open_line_outlasts_a_database_that_is_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.auth.access.CHECK_EVERY_S", 0.0)
+    answers: list[Exception | str | None] = [OperationalError("", {}, Exception()), None, "not_found"]
+
+    def find() -> str | None:
+        answer = answers.pop(0)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    assert await wait_for_end(find) == "not_found"
+    assert not answers
 
 
 async def test_guessing_codes_ends(guarded: Ward) -> None:

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import datetime as dt
+from typing import Any
 
 import httpx
 import pytest
-from sqlalchemy import update
+from sqlalchemy import select, update
 
 from server import audit
 from server.auth.identity import Identity
 from server.auth.roles import Role
 from server.auth.throttle import MAX_PER_ADDRESS, MAX_PER_PAIR, Throttle
+from server.services import report_links, signed_reports
+from server.services.care_teams import EMERGENCY, end_all_emergencies
+from server.services.signed_reports import DOCUMENT, PSEUDONYMISED
 from server.storage.care_tables import emergency_access
+from server.storage.tables import new_id, now, user
+from server.storage.tables import patient as patient_table
 from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
 
 API = "/api/v1"
+LONG_AGO = dt.datetime(2024, 1, 1, tzinfo=dt.UTC)
 
 
 async def switch(clinic: Clinic, *, on: bool, **more: bool) -> None:
@@ -73,6 +80,22 @@ async def test_care_teams_begin_with_whoever_has_worked_with_the_patient(clinic:
     assert await enter(clinic, "viewer", patient) == 200
 
 
+async def test_trying_a_patient_of_another_team_is_a_row_and_no_way_into_it(clinic: Clinic) -> None:
+    hidden = await add(clinic, "Larch")
+    await switch(clinic, on=True)
+    for _ in range(2):  # each time with a sign-in of its own
+        assert await enter(clinic, "viewer", hidden) == await enter(clinic, "viewer", "0" * 32) == 404
+    async with clinic.client("admin") as client:
+        rows = (await client.get(f"{API}/audit")).json()
+        assert "tried to open the patient, from outside the care team" in (await client.get("/audit")).text
+    tried = [(r["user_name"], r["resource_id"]) for r in rows if r["action"] == "patient.hidden"]
+    assert tried == [("viewer", hidden)]
+    await switch(clinic, on=False)
+    await switch(clinic, on=True, begin_with_past=True)
+    assert await team(clinic, hidden) == set()
+    await switch(clinic, on=False)
+
+
 async def test_switching_care_teams_off_and_on_puts_nobody_back_or_in(clinic: Clinic) -> None:
     """A team that was set stays; whoever came in an emergency is in no team for that."""
     of_one, of_nobody, new = [await add(clinic, code) for code in ("Elm", "Fir", "Hazel")]
@@ -97,6 +120,130 @@ async def test_switching_care_teams_off_and_on_puts_nobody_back_or_in(clinic: Cl
     assert await team(clinic, of_nobody) == set()
     assert await team(clinic, new) == {"viewer"}
     assert await enter(clinic, "clinician", new) == 404
+    await switch(clinic, on=False)
+
+
+async def open_in_emergency(clinic: Clinic, name: str, code: str) -> str:
+    """Id of the access of a clinician."""
+    assert await ask_in_emergency(clinic, code, name) == 201
+    with clinic.db.read() as c:
+        found = select(emergency_access.c.id).join(user).join(patient_table)
+        found = found.where(user.c.name == name, patient_table.c.code == code)
+        return str(c.execute(found.order_by(emergency_access.c.opened_at.desc())).scalars().first())
+
+
+async def sign(clinic: Clinic, patient: str) -> str:
+    """Id of a signed report of a visit of the patient."""
+    async with clinic.client("admin") as client:
+        visit = (await client.post(f"{API}/patients/{patient}/sessions", json={"title": "Walk"})).json()["id"]
+    report, blobs = new_id(), clinic.app.state.blobs
+    stored = {name: blobs.put(patient, b"<p>Signed</p>") for name in (DOCUMENT, PSEUDONYMISED)}
+    with clinic.db.write() as c:
+        signature = signed_reports.prepare_signature(c, visit, report, "Anna")
+        signed_reports.keep_signed(c, None, signature, visit, new_id(), "en", stored)
+    return report
+
+
+async def share(clinic: Clinic, name: str, report: str) -> dict[str, Any]:
+    async with clinic.client(name) as client:
+        made = await client.post(f"{API}/signed-reports/{report}/links", json={"days": 90})
+        assert made.status_code == 201, made.text
+        return dict(made.json())
+
+
+def leads(clinic: Clinic, made: dict[str, Any]) -> bool:
+    with clinic.db.read() as c:
+        try:
+            return report_links.find_by_token(c, made["url"].rsplit("/", 1)[1]).is_open
+        except report_links.LinkNotFound:
+            return False
+
+
+@pytest.mark.parametrize("by", ["locum", "admin"])
+async def test_an_emergency_ends_now_with_its_links(clinic: Clinic, by: str) -> None:
+    clinic.app.state.throttle = Throttle()
+    code = f"Maple-{by}"
+    patient = await add(clinic, code)
+    report = await sign(clinic, patient)
+    await switch(clinic, on=True)
+    clinic.user("clinician", "member")
+    async with clinic.client("admin") as client:
+        users = {"users": [clinic.user("member")]}
+        await client.put(f"{API}/patients/{patient}/care-team", json=users)
+    access = await open_in_emergency(clinic, "locum", code)
+    ends = f"{API}/emergency-accesses/{access}/end"
+    of_locum, of_member = await share(clinic, "locum", report), await share(clinic, "member", report)
+    with clinic.db.read() as c:
+        mine = emergency_access.c.id == access
+        ends_at = c.execute(select(emergency_access.c.ends_at).where(mine)).scalar()
+    assert dt.datetime.fromisoformat(of_locum["link"]["expires_at"]) == ends_at
+    assert (of_locum["link"]["emergency_id"], of_member["link"]["emergency_id"]) == (access, None)
+    assert leads(clinic, of_locum)
+    clinic.user("clinician", "stranger")
+    for name, status in (("viewer", 403), ("stranger", 404), ("member", 403)):
+        async with clinic.client(name) as client:
+            assert (await client.post(ends)).status_code == status, name
+    assert await enter(clinic, "locum", patient) == 200
+    for name, shown in (("locum", True), ("admin", True), ("member", False)):
+        async with clinic.client(name) as client:
+            page = (await client.get(f"/patients/{patient}")).text
+            assert "opened this patient in an emergency" in page
+            # of whoever is in another zone: four hours on the clock of the wall would not be four
+            assert " ".join(page.split()).count(" UTC") >= 3, "since, until, and until above"
+            assert ("End now" in page) == shown, name
+    async with clinic.client(by) as client:
+        ended = await client.post(ends)
+        assert ended.status_code == 200, ended.text
+        assert dt.datetime.fromisoformat(ended.json()["ended_at"]) <= now()
+        assert not ended.json()["is_open"]
+    assert await enter(clinic, "locum", patient) == 404
+    assert not leads(clinic, of_locum)
+    assert leads(clinic, of_member)
+    async with clinic.client("admin") as client:
+        assert (await client.post(ends)).json() == ended.json()  # it stays as it is
+        rows = [r for r in (await client.get(f"{API}/audit")).json() if r["detail"].get("access") == access]
+        assert "End now" not in (await client.get(f"/patients/{patient}")).text
+    assert [r["action"] for r in rows] == ["emergency.ended", "report_link.made", "emergency.opened"]
+    assert await ask_in_emergency(clinic, code, "locum") == 201  # and again, with a reason
+    await switch(clinic, on=False)
+    await switch(clinic, on=True, begin_with_past=True)
+    assert await team(clinic, patient) == {"member"}
+    await switch(clinic, on=False)
+
+
+async def test_an_access_that_ended_meanwhile_does_not_come_back_with_a_backup(clinic: Clinic) -> None:
+    clinic.app.state.throttle = Throttle()
+    patient = await add(clinic, "Willow")
+    await switch(clinic, on=True)
+    access = await open_in_emergency(clinic, "locum", "Willow")
+    for hours in (-5, 0, 1):  # the clock went on, or back
+        opened_at = now() + dt.timedelta(hours=hours)
+        times = {"opened_at": opened_at, "ends_at": opened_at + EMERGENCY, "ended_at": None}
+        with clinic.db.write() as c:
+            mine = emergency_access.c.id == access
+            c.execute(update(emergency_access).where(mine).values(**times))
+            end_all_emergencies(c)
+            ended_at = c.execute(select(emergency_access.c.ended_at).where(mine)).scalar_one()
+        assert ended_at == times["ends_at"] if hours == -5 else now() - ended_at < dt.timedelta(minutes=1)
+        assert await enter(clinic, "locum", patient) == 404
+    await switch(clinic, on=False)
+
+
+async def test_end_now_ends_it_though_the_clock_went_back(clinic: Clinic) -> None:
+    clinic.app.state.throttle = Throttle()
+    patient = await add(clinic, "Sallow")
+    await switch(clinic, on=True)
+    access = await open_in_emergency(clinic, "locum", "Sallow")
+    later = now() + dt.timedelta(hours=1)
+    with clinic.db.write() as c:
+        mine = emergency_access.c.id == access
+        c.execute(update(emergency_access).where(mine).values(opened_at=later, ends_at=later + EMERGENCY))
+    assert await enter(clinic, "locum", patient) == 200
+    async with clinic.client("locum") as client:
+        assert (await client.post(f"{API}/emergency-accesses/{access}/end")).status_code == 200
+    assert await enter(clinic, "locum", patient) == 404
+    async with clinic.client("admin") as client:
+        assert "End now" not in (await client.get(f"/patients/{patient}")).text
     await switch(clinic, on=False)
 
 

@@ -1,13 +1,29 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
 
 import pytest
+from sqlalchemy import Connection, Engine, event
 
 from server.auth import passwords
 from server.auth.passwords import MAX_LENGTH, hash_password, verify_password
-from server.auth.throttle import MAX_PER_ACCOUNT, MAX_PER_ADDRESS, MAX_PER_PAIR, WINDOW_S, Throttle
+from server.auth.throttle import (
+    MAX_PER_ACCOUNT,
+    MAX_PER_ADDRESS,
+    MAX_PER_PAIR,
+    WINDOW_S,
+    FailuresInMemory,
+    FailureStore,
+    SharedFailures,
+    Throttle,
+)
 from server.http.problems import Problem
+from server.storage.db import Database
+from tests.databases import write_database
 from tests.server.clinic import PASSWORD
 
 
@@ -48,9 +64,44 @@ class Clock:
         return self.now
 
 
-def test_a_person_is_stopped_after_ten_failures_and_may_try_again_later() -> None:
+@pytest.fixture(params=("memory", "database"))
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[FailureStore]:
+    """Failures of one web server, and of several."""
+    if request.param == "memory":
+        yield FailuresInMemory()
+        return
+    write_database(tmp_path / "sagittal.db")
+    with closing(Database(tmp_path / "sagittal.db")) as db:
+        yield SharedFailures(db)
+
+
+def test_what_is_counted_together_is_found_by_an_index(tmp_path: Path) -> None:
+    """All web servers wait for who counts: it must not read what others have failed at."""
+    write_database(tmp_path / "sagittal.db")
+    plans: list[str] = []
+    with closing(Database(tmp_path / "sagittal.db")) as db:
+        throttle = Throttle(Clock(), SharedFailures(db))
+
+        def explain(c: Connection, cursor: object, statement: str, values: Any, *_: object) -> None:
+            if "failed_attempt" in statement and not statement.startswith(("EXPLAIN", "INSERT")):
+                plan = c.connection.cursor().execute(f"EXPLAIN QUERY PLAN {statement}", values)
+                plans.extend(step[3] for step in plan)
+
+        event.listen(Engine, "before_cursor_execute", explain)
+        try:
+            at = throttle.begin("anna", "10.0.0.1")
+            throttle.withdraw("anna", "10.0.0.1", at)
+            throttle.succeed("anna", "10.0.0.1")
+            throttle.forgive("anna")
+        finally:
+            event.remove(Engine, "before_cursor_execute", explain)
+    assert len(plans) > 10
+    assert not [step for step in plans if step.startswith("SCAN")]
+
+
+def test_a_person_is_stopped_after_ten_failures_and_may_try_again_later(store: FailureStore) -> None:
     clock = Clock()
-    throttle = Throttle(clock)
+    throttle = Throttle(clock, store)
     for _ in range(MAX_PER_PAIR):
         throttle.check("anna", "10.0.0.1")
         throttle.fail("anna", "10.0.0.1")
@@ -65,8 +116,8 @@ def test_a_person_is_stopped_after_ten_failures_and_may_try_again_later() -> Non
     throttle.check("anna", "10.0.0.1")
 
 
-def test_a_new_password_from_an_administrator_opens_an_account_at_once() -> None:
-    throttle = Throttle(Clock())
+def test_a_new_password_from_an_administrator_opens_an_account_at_once(store: FailureStore) -> None:
+    throttle = Throttle(Clock(), store)
     for i in range(MAX_PER_ACCOUNT):
         throttle.fail("anna", f"10.0.0.{i % 3}")
     throttle.fail("berta", "10.0.0.9")
@@ -75,8 +126,8 @@ def test_a_new_password_from_an_administrator_opens_an_account_at_once() -> None
         throttle.check("anna", f"10.0.0.{i + 3}")
 
 
-def test_an_account_is_closed_after_failures_from_many_addresses() -> None:
-    throttle = Throttle(Clock())
+def test_an_account_is_closed_after_failures_from_many_addresses(store: FailureStore) -> None:
+    throttle = Throttle(Clock(), store)
     for i in range(MAX_PER_ACCOUNT):
         throttle.check("anna", f"10.0.0.{i}")
         throttle.fail("anna", f"10.0.0.{i}")
@@ -85,8 +136,8 @@ def test_an_account_is_closed_after_failures_from_many_addresses() -> None:
     throttle.check("berta", "10.0.0.99")
 
 
-def test_an_address_is_closed_after_failures_on_many_accounts() -> None:
-    throttle = Throttle(Clock())
+def test_an_address_is_closed_after_failures_on_many_accounts(store: FailureStore) -> None:
+    throttle = Throttle(Clock(), store)
     for i in range(MAX_PER_ADDRESS):
         throttle.check(f"user{i}", "10.0.0.1")
         throttle.fail(f"user{i}", "10.0.0.1")
@@ -95,13 +146,27 @@ def test_an_address_is_closed_after_failures_on_many_accounts() -> None:
     throttle.check("somebody", "10.0.0.2")
 
 
-def test_success_forgets_a_few_mistypes() -> None:
-    throttle = Throttle(Clock())
+def test_success_forgets_a_few_mistypes(store: FailureStore) -> None:
+    throttle = Throttle(Clock(), store)
     for _ in range(MAX_PER_PAIR - 1):
         throttle.fail("anna", "10.0.0.1")
     throttle.succeed("anna", "10.0.0.1")
     throttle.fail("anna", "10.0.0.1")
     throttle.check("anna", "10.0.0.1")
+
+
+def test_what_was_counted_beforehand_can_be_taken_back_and_old_failures_go(store: FailureStore) -> None:
+    clock = Clock()
+    throttle = Throttle(clock, store)
+    for _ in range(2 * MAX_PER_PAIR):
+        throttle.withdraw("anna", "10.0.0.1", throttle.begin("anna", "10.0.0.1"))
+    for _ in range(MAX_PER_PAIR):
+        throttle.begin("anna", "10.0.0.1")
+    with pytest.raises(Problem):
+        throttle.begin("anna", "10.0.0.1")
+    clock.now = WINDOW_S + 1
+    throttle.begin("anna", "10.0.0.1")
+    assert store.work(lambda times: len(times.list_times(("anna", "10.0.0.1")))) in (1, MAX_PER_PAIR + 1)
 
 
 def test_a_burst_of_sign_ins_neither_takes_the_memory_nor_waits_for_ever(

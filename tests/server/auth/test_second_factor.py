@@ -12,7 +12,9 @@ from sqlalchemy import select
 from server.auth import second_factor
 from server.auth.throttle import Throttle
 from server.commands import user as user_command
+from server.storage.archive import make_key
 from server.storage.person_tables import second_factor as table
+from tests.engines import tell_commands
 from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
@@ -85,6 +87,8 @@ async def test_signing_in_needs_a_code_that_works_once(clinic: Clinic, clock: At
     actions = [row["action"] for row in rows]
     assert "user.recovery_code_used" in actions
     assert "sign_in.failed" in actions
+    factors = [row["detail"].get("factor") for row in rows if row["action"] == "sign_in"]
+    assert factors[:3] == ["recovery_code", "code", "code"]  # the newest first
     # guessing: ten wrong ones, then not even the right one for a while
     for _ in range(10):
         last = await sign_in(clinic, "clinician", "123456")
@@ -116,5 +120,45 @@ async def test_it_is_removed_by_oneself_an_administrator_or_the_console(
         await enrol(clinic, client, clock)
     assert (await sign_in(clinic, "assistant")).status_code == 401
     monkeypatch.setattr("sys.stdin", io.StringIO(f"{PASSWORD}\n"))
+    tell_commands(monkeypatch, clinic.settings)
     assert user_command.user(clinic.settings.data_dir, "assistant", "assistant") == 0
     assert (await sign_in(clinic, "assistant")).status_code == 200
+
+
+async def test_a_missing_key_beside_secrets_is_an_error_and_never_a_new_key(
+    clinic: Clinic, clock: At, caplog: pytest.LogCaptureFixture
+) -> None:
+    clinic.app.state.throttle = Throttle()
+    begin = f"{API}/account/second-factor"
+    with clinic.db.write() as c:
+        c.execute(table.delete())
+    async with clinic.client("viewer") as client, clinic.client("assistant") as other:
+        totp, codes = await enrol(clinic, client, clock)
+        key = clinic.settings.second_factor_key
+        kept = key.read_bytes()
+        key.unlink()
+        clock.s += 30
+        for answer in (
+            await sign_in(clinic, "viewer", totp.at(clock.s)),
+            await other.post(begin, json={"password": PASSWORD}),
+        ):
+            assert (answer.status_code, answer.json()["code"]) == (503, "second_factor_key_unusable")
+            assert str(key) not in answer.text
+        assert not key.exists()
+        assert str(key) in caplog.text
+        assert (await sign_in(clinic, "viewer", codes[0])).status_code == 200  # a recovery code needs no key
+        make_key(key)  # of another clinic
+        assert (await sign_in(clinic, "viewer", totp.at(clock.s))).status_code == 503
+        with clinic.db.read() as c:
+            assert len(second_factor.find_problems(c, key)) == 1
+        key.write_bytes(kept)
+        with clinic.db.read() as c:
+            assert second_factor.find_problems(c, key) == []
+        assert (await sign_in(clinic, "viewer", totp.at(clock.s))).status_code == 200
+        key.unlink()
+        with clinic.db.write() as c:
+            second_factor.remove(c, clinic.user("viewer"))
+        assert (
+            await other.post(begin, json={"password": PASSWORD})
+        ).status_code == 200  # nobody needs the old one
+        assert key.exists()

@@ -91,7 +91,10 @@ async def test_a_key_takes_the_place_of_the_code(
     assert (await client.post(path, json=proofs)).status_code == 204
     assert (await challenge(clinic)).status_code == 404
     async with clinic.client("admin") as admin:
-        actions = [row["action"] for row in (await admin.get(f"{API}/audit")).json()]
+        rows = (await admin.get(f"{API}/audit")).json()
+        assert "signed in by the password and a security key" in (await admin.get("/audit")).text
+    assert next(row["detail"] for row in rows if row["action"] == "sign_in") == {"factor": "security_key"}
+    actions = [row["action"] for row in rows]
     assert {"user.security_key_added", "user.security_key_removed", "sign_in.failed"} <= set(actions)
 
 
@@ -226,6 +229,28 @@ async def test_keys_alone_when_asked_for_and_a_way_back(
     assert (await client.post(path, json=proofs | {"code": "123456"})).json()["code"] == "wrong_code"
     assert (await client.post(path, json=proofs)).status_code == 204
     assert (await sign_in(clinic, code="123456")).status_code == 200  # without a key figures count again
+
+
+async def test_keys_of_another_port_do_not_make_keys_alone(
+    clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
+) -> None:
+    client, codes = person
+    choose, keys, there = (
+        f"{API}/account/second-factor/keys-only", f"{API}/account/security-keys", "http://localhost:8443"
+    )  # fmt: skip
+    client.base_url = httpx.URL(there)
+    await set_up(client, codes, there)
+    client.base_url = httpx.URL(HERE)
+    on: dict[str, Any] = {"on": True, "password": PASSWORD}
+    refused = await client.put(choose, json=on | {"code": codes[-1]})
+    assert (refused.status_code, refused.json()["code"]) == (409, "no_key")
+    await set_up(client, codes)
+    assert (await client.put(choose, json=on | {"code": codes.pop()})).status_code == 204
+    mine = next(k["id"] for k in (await client.get(keys)).json() if k["host"] == "localhost")
+    proofs = {"password": PASSWORD, "code": codes.pop()}
+    assert (await client.post(f"{keys}/{mine}/remove", json=proofs)).status_code == 204
+    with clinic.db.read() as c:
+        assert not second_factor.takes_keys_only(c, clinic.user("clinician"))
 
 
 async def test_the_password_alone_changes_no_key(

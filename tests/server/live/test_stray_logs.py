@@ -16,8 +16,9 @@ from server.main import main
 from server.services import checks, jobs, live, live_logs, live_recordings, recordings, sessions
 from server.services.errors import Conflict
 from server.settings import Settings
-from server.storage.blobs import BlobStore
+from server.storage.blob_folder import FolderBlobs
 from server.storage.db import Database
+from tests.engines import tell_commands
 from tests.live_clinic import PATIENCE_S, heard, new_session, visit
 from tests.live_takes import HELLO, frame, stored
 from tests.server.clinic import Clinic, open_clinic
@@ -39,7 +40,7 @@ def put_stray(folder: Path, content: bytes = WHOLE) -> Path:
 
 def findings(settings: Settings) -> list[str]:
     with closing(Database(settings.database_source)) as db:
-        found = checks.check(db, BlobStore(settings.blobs), settings)
+        found = checks.check(db, FolderBlobs(settings.blobs), settings)
     return [f"{f.area}: {f.message}" for f in found]
 
 
@@ -70,10 +71,14 @@ async def interrupted(folder: Path) -> tuple[Clinic, str, str]:
 
 
 async def test_a_log_that_the_database_does_not_know_is_kept_listed_and_adopted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     async with open_clinic(tmp_path, live_workers=0) as clinic:
         session = new_session(clinic)
+        tell_commands(monkeypatch, clinic.settings)
     path = put_stray(tmp_path)
     async with open_clinic(tmp_path, live_workers=0) as clinic:
         assert path.read_bytes() == WHOLE
@@ -105,10 +110,11 @@ async def test_a_log_that_the_database_does_not_know_is_kept_listed_and_adopted(
 
 
 async def test_what_cannot_be_adopted_is_refused_with_a_sentence_and_left(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     async with open_clinic(tmp_path, live_workers=0) as clinic:
         session = new_session(clinic)
+        tell_commands(monkeypatch, clinic.settings)
         data = ["adopt", "--data", str(tmp_path)]
         empty = put_stray(tmp_path, b"no log at all")
         for words, why in (

@@ -15,7 +15,9 @@ from sqlalchemy import select, update
 from websockets.asyncio.client import ClientConnection
 
 from core.formats.live_log import StreamInfo
+from server.live import hub
 from server.live.protocol import CloseCode
+from server.live.recorder import Recorder, open_recorder
 from server.services import recordings
 from server.services.live_recordings import log_path
 from server.storage.live_tables import live_take
@@ -243,6 +245,21 @@ async def test_erasing_the_session_ends_its_take(clinic: Clinic, port: int) -> N
         assert await closed(ws) == (CloseCode.ENDED, "take_ended")
         async with v.tablet() as again:
             assert (await closed(again))[0] == CloseCode.UNAUTHORISED
+    assert not log_path(clinic.settings.live, v.take).exists()
+
+
+async def test_a_session_erased_just_before_its_log_is_there_leaves_no_log(
+    clinic: Clinic, port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with visit(clinic, port) as v:
+
+        async def open_late(*args: Any) -> Recorder:
+            (await v.http.delete(f"/api/v1/sessions/{v.session}")).raise_for_status()
+            return await open_recorder(*args)
+
+        monkeypatch.setattr(hub, "open_recorder", open_late)
+        async with v.tablet() as ws:
+            assert (await closed(ws))[0] == CloseCode.UNAUTHORISED
     assert not log_path(clinic.settings.live, v.take).exists()
 
 

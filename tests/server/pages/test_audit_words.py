@@ -6,7 +6,8 @@ import re
 
 import pytest
 
-from server.pages.audit_words import DEEDS, describe_deed
+from server.auth.accounts import Factor
+from server.pages.audit_words import DEEDS, SIGNED_IN_BY, describe_deed
 from server.services.reviews import ACTIONS
 from tests.data import ROOT
 from tests.server.clinic import Clinic
@@ -43,3 +44,9 @@ async def test_rows_name_the_patient_and_the_visit_while_they_exist(clinic: Clin
         html = (await client.get("/audit")).text
     assert "AU-1" not in html
     assert "deleted the patient with all recordings" in html
+
+
+def test_a_sign_in_says_by_which_factor() -> None:
+    assert set(SIGNED_IN_BY) == set(Factor)
+    assert describe_deed("sign_in", {"factor": "code"}) == "signed in by the password and a code"
+    assert describe_deed("sign_in", {}) == "signed in"  # a row from before

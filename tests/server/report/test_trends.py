@@ -19,6 +19,7 @@ from server.report.change_words import change_words
 from server.report.numbers import Numbers, read_numbers
 from server.report.tables import trends_csv
 from server.report.trend_chart import PlannedAssessment, trend_svg, value_range
+from server.report.trend_strip import trend_strip
 from server.report.trends import AnalysedVisit, Trend, VisitKind, follow_figures, names_in
 
 DAY = dt.date(2026, 3, 2)
@@ -240,3 +241,20 @@ def test_one_visit_of_one_value_is_drawn_without_a_range_to_divide_by() -> None:
     visits = [visit(0, flat)]
     trend = one(*visits, name="harmonic_ratio_v")
     assert "nan" not in trend_svg(trend, trend.lines[0], visits)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "feedback", "why"),
+    [
+        (("training", "training", "training"), False, "not compared: trainings only, no assessment"),
+        (("training", "training", "assessment"), False, "first value to compare with"),
+        (("assessment", "training", "training"), True, "not compared: walked with feedback"),
+        (("assessment", "training", "assessment"), False, ""),
+    ],
+)
+def test_paper_says_why_it_says_no_change(kinds: tuple[VisitKind, ...], feedback: bool, why: str) -> None:
+    visits = [visit(7 * i, speed(0.6 + i / 10), kind=kind) for i, kind in enumerate(kinds)]
+    visits[-1] = replace(visits[-1], condition=replace(USUAL, feedback=feedback))
+    strip = trend_strip(visits)
+    assert strip is not None
+    assert [(line.why_none, line.change is None) for line in strip.lines] == [(why, bool(why))]

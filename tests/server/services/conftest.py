@@ -7,13 +7,17 @@ from pathlib import Path
 
 import pytest
 
+from server.settings import Settings
 from server.storage.db import Database
 from tests.databases import write_database
+from tests.engines import choose_url
 
 
 @pytest.fixture
 def db(tmp_path: Path) -> Iterator[Database]:
-    write_database(tmp_path / "sagittal.db")
-    opened = Database(tmp_path / "sagittal.db")
+    settings = Settings(data_dir=tmp_path, database_url=choose_url(tmp_path))
+    if not settings.database_url:
+        write_database(settings.database)
+    opened = Database(settings.database_source)
     yield opened
     opened.close()

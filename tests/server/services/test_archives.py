@@ -21,7 +21,7 @@ from server.services.analyses import AnalysisRecord
 from server.services.edit_log import EditHistory
 from server.services.recordings import RecordedFile, StoredRecording
 from server.services.signed_reports import SignedDocuments, SignedReport
-from server.storage.blobs import BlobStore
+from server.storage.blob_folder import FolderBlobs
 from tests.core.formats.making import zipped
 
 SPACE = "0" * 32
@@ -29,7 +29,7 @@ CONFIG = {"poses": {"least_valid": 0.7}}
 
 
 def visit(
-    store: BlobStore,
+    store: FolderBlobs,
     files: Mapping[str, bytes],
     manifest: dict[str, Any],
     results: Mapping[str, bytes],
@@ -49,7 +49,7 @@ def visit(
     return out.getvalue()
 
 
-def signed(store: BlobStore) -> SignedDocuments:
+def signed(store: FolderBlobs) -> SignedDocuments:
     """A signed report of that analysis with its PDF."""
     at = dt.datetime(2026, 1, 3, tzinfo=dt.UTC)
     html, pdf = (store.put(SPACE, text) for text in (b"<p>Signed</p>", b"%PDF-1.7"))
@@ -67,7 +67,7 @@ def test_an_archive_is_analysed_to_the_same_bits(tmp_path: Path) -> None:
     upload = {"walk.zip": zipped(files | {"manifest.json": json.dumps({"sensors": worn}).encode()})}
     sources = [SourceFile.of_bytes(name, data) for name, data in upload.items()]
     results = analysing.run(sources, json.dumps(manifest).encode(), CONFIG, lambda stage, share: None)
-    archive = visit(BlobStore(tmp_path / "blobs"), upload, manifest, results)
+    archive = visit(FolderBlobs(tmp_path / "blobs"), upload, manifest, results)
 
     with zipfile.ZipFile(io.BytesIO(archive)) as opened:
         names = set(opened.namelist())
@@ -93,7 +93,7 @@ def test_results_in_an_archive_are_not_read_as_recordings(tmp_path: Path) -> Non
              "columns": {"pelvis": {"acc": ["acc_x", "acc_y", "acc_z"]}}},
         ],
     }  # fmt: skip
-    store = BlobStore(tmp_path / "blobs")
+    store = FolderBlobs(tmp_path / "blobs")
     archive = visit(store, {"a.csv": table}, manifest, {"angles.parquet": b"PAR1", "strides.csv": table})
     recording = read_recording([SourceFile.of_bytes("visit.zip", archive)])
     assert dict(recording.segments) == {"pelvis": "pelvis"}
@@ -112,7 +112,7 @@ def test_an_archive_of_an_archive_has_its_settings_and_the_newest_manifest(tmp_p
     table = b"acc_x,acc_y,acc_z\n" + b"0,0,9.81\n" * 10
     columns = {"a": {"acc": ["acc_x", "acc_y", "acc_z"]}}
     source = {"file": "a.csv", "rate_hz": 100, "acc_unit": "m/s2", "columns": columns}
-    store = BlobStore(tmp_path / "blobs")
+    store = FolderBlobs(tmp_path / "blobs")
     first = {"sources": [source], "sensors": {"a": "pelvis"}, "subject": {"height_m": 1.7}}
     archive = visit(store, {"a.csv": table}, first, {})
     # somebody puts right who wears what, and it is handed on twice

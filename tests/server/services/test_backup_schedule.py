@@ -87,6 +87,7 @@ def test_the_newest_backup_is_restored_every_week_and_the_result_is_kept(
     fourth = backup_schedule.run(settings).test
     assert fourth is not None
     assert (fourth.ok, fourth.said) == (None, backup_schedule.NOT_TESTED)
+    clinic.db.close()
 
 
 def test_who_is_erased_is_on_the_list_beside_the_backups_at_once(tmp_path: Path) -> None:
@@ -95,7 +96,7 @@ def test_who_is_erased_is_on_the_list_beside_the_backups_at_once(tmp_path: Path)
     settings = replace(clinic.settings, backup_dir=str(tmp_path / "disk"))
     good = Outcome(dt.datetime.now(dt.UTC), True, "x.tar", "", 9)
     note(settings, backup=good, good=good)
-    keeper, db = BackupKeeper(settings), Database(settings.database)
+    keeper, db = BackupKeeper(settings), Database(settings.database_source)
     keeper._look(db)
     listed = tmp_path / "disk" / "erased.json"
     assert json.loads(listed.read_text()) == {"patients": [], "sessions": []}
@@ -104,3 +105,4 @@ def test_who_is_erased_is_on_the_list_beside_the_backups_at_once(tmp_path: Path)
     keeper._look(db)
     assert json.loads(listed.read_text())["patients"] == [patient]
     db.close()
+    clinic.db.close()

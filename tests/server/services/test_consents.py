@@ -43,3 +43,4 @@ def test_consent_is_given_withdrawn_given_anew_and_erased_with_the_patient(tmp_p
     )
     with clinic.db.read() as c:
         assert consents.of_patient(c, pid) == []
+    clinic.db.close()

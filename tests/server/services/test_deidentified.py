@@ -17,6 +17,7 @@ from server.commands.research import research
 from server.report.columns import read_table
 from server.services import consents, patients, reviews, sessions
 from server.services.deidentified import MOST_SHIFT_DAYS, open_key
+from tests.engines import tell_commands
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic, open_clinic
 
@@ -27,8 +28,9 @@ DAYS = (dt.date(2025, 3, 3), dt.date(2025, 3, 24))
 
 
 @pytest.fixture
-async def clinic(tmp_path: Path) -> AsyncIterator[Clinic]:
+async def clinic(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Clinic]:
     async with open_clinic(tmp_path / "data") as made:
+        tell_commands(monkeypatch, made.settings)
         yield made
 
 

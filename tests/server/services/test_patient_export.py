@@ -42,8 +42,8 @@ def test_everything_of_one_patient_and_nothing_else(tmp_path: Path) -> None:
         sessions.create(c, None, other.id, title="of the other")
     with clinic.db.read() as c:
         used = {sha256 for space, sha256 in list_referenced(c) if space == clinic.patient.id}
-    lost = next(f for f in clinic.blobs.files() if f.path.read_bytes() == b"signals")
-    lost.path.write_bytes(b"damaged")
+    lost = next(f for f in clinic.blobs.files() if clinic.blobs.find_path(f).read_bytes() == b"signals")
+    clinic.blobs.find_path(lost).write_bytes(b"damaged")
     pieces = list(export_patient(clinic.db, clinic.blobs, clinic.patient.id))
     assert max(map(len, pieces)) < 2 * PIECE
     with zipfile.ZipFile(io.BytesIO(b"".join(pieces))) as archive:
@@ -69,3 +69,4 @@ def test_everything_of_one_patient_and_nothing_else(tmp_path: Path) -> None:
     assert "d" * 64 not in text
     with pytest.raises(NotFound):
         export_patient(clinic.db, clinic.blobs, "0" * 32)
+    clinic.db.close()

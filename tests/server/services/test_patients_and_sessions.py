@@ -29,7 +29,7 @@ from server.services.reviewed import ReviewedAnalyses
 from server.services.sweep import sweep
 from server.settings import Settings
 from server.storage import tables
-from server.storage.blobs import BlobStore
+from server.storage.blob_folder import FolderBlobs
 from server.storage.db import Database, Source
 
 NO_TRIGGERS = {
@@ -53,7 +53,7 @@ class Clinic:
             data_dir=folder, database_url=url, min_free_bytes=0, max_file_bytes=1000, max_files=3
         )
         self.db = Database(source)
-        self.blobs = BlobStore(self.settings.blobs)
+        self.blobs = FolderBlobs(self.settings.blobs)
         self.queue = TableQueue(self.db, 15.0)
         self.who = Person()
 
@@ -427,7 +427,7 @@ def test_erasing_a_session_keeps_the_files_another_one_shares(clinic: Clinic) ->
     clinic.upload(one, "b", b"own")
     clinic.upload(two, "a", b"shared")
     erasure.erase_session(clinic.db, ReviewedAnalyses(clinic.blobs), clinic.settings, clinic.who, one)
-    assert [f.path.read_bytes() for f in clinic.blobs.files()] == [b"shared"]
+    assert [clinic.blobs.find_path(f).read_bytes() for f in clinic.blobs.files()] == [b"shared"]
     assert checks.check(clinic.db, clinic.blobs, clinic.settings) == []
 
 
@@ -474,7 +474,7 @@ def test_the_sweep_takes_only_old_files_that_nothing_refers_to(clinic: Clinic) -
     orphan = clinic.blobs.put("f" * 32, b"of a lost claim")
     assert sweep(clinic.db, clinic.blobs, clinic.settings) == 0
     assert sweep(clinic.db, clinic.blobs, replace(clinic.settings, sweep_grace_s=0.0)) == 1
-    assert [f.path.read_bytes() for f in clinic.blobs.files()] == [b"kept"]
+    assert [clinic.blobs.find_path(f).read_bytes() for f in clinic.blobs.files()] == [b"kept"]
     with pytest.raises(SagittalError):
         clinic.blobs.require("f" * 32, orphan.sha256)
 
@@ -485,8 +485,8 @@ def test_the_check_finds_what_is_wrong(clinic: Clinic) -> None:
     clinic.upload(session_id, "b", b"two")
     assert checks.check(clinic.db, clinic.blobs, clinic.settings) == []
     files = list(clinic.blobs.files())
-    files[0].path.write_bytes(b"onf")
-    files[1].path.unlink()
+    clinic.blobs.find_path(files[0]).write_bytes(b"onf")
+    clinic.blobs.find_path(files[1]).unlink()
     with clinic.db.write() as c:
         for statement in NO_TRIGGERS[c.dialect.name]:
             c.exec_driver_sql(statement)

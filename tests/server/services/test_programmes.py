@@ -13,7 +13,7 @@ from server.services.course import SIX_WEEKS
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
-from server.storage.blobs import BlobStore
+from server.storage.blob_folder import FolderBlobs
 from server.storage.db import Database
 from server.storage.tables import audit, now, planned_visit
 
@@ -128,7 +128,7 @@ def test_erasing_a_session_opens_its_visit_again_and_erasing_the_patient_leaves_
     db: Database, tmp_path: Path
 ) -> None:
     settings = Settings(data_dir=tmp_path)
-    blobs = BlobStore(settings.blobs)
+    blobs = FolderBlobs(settings.blobs)
     patient = _patient(db)
     session = _session(db, patient)
     with db.write() as c:

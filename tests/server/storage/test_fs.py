@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from server.storage import fs
-from server.storage.blobs import BlobStore, IntegrityError
+from server.storage.blob_folder import FolderBlobs
+from server.storage.blobs import IntegrityError
 from tests.data import ROOT
 from tests.faults.failing import FailingSystem
 
@@ -24,7 +25,7 @@ def test_an_error_at_any_call_leaves_no_half_file_and_a_retry_works(
     while True:
         fail_at += 1
         root = tmp_path / str(fail_at)
-        store = BlobStore(root)
+        store = FolderBlobs(root)
         system = FailingSystem(fail_at, number)
         monkeypatch.setattr(fs, "system", system)
         try:
@@ -38,14 +39,14 @@ def test_an_error_at_any_call_leaves_no_half_file_and_a_retry_works(
             monkeypatch.setattr(fs, "system", fs.System())
         for stored in store.files():
             assert stored.space == SPACE  # no temporary file is left
-            assert stored.path.read_bytes() == CONTENT
+            assert store.find_path(stored).read_bytes() == CONTENT
         blob = store.put(SPACE, CONTENT)
         assert store.read(SPACE, blob.sha256) == CONTENT
     assert fail_at > 6
 
 
 def test_every_flipped_bit_is_seen(tmp_path: Path) -> None:
-    store = BlobStore(tmp_path)
+    store = FolderBlobs(tmp_path)
     blob = store.put(SPACE, CONTENT)
     path = store.path(SPACE, blob.sha256)
     for bit in range(8 * len(CONTENT)):
@@ -64,7 +65,7 @@ def test_every_flipped_bit_is_seen(tmp_path: Path) -> None:
 
 
 def test_a_limit_is_kept_while_receiving_and_nothing_is_left(tmp_path: Path) -> None:
-    store = BlobStore(tmp_path)
+    store = FolderBlobs(tmp_path)
     with store.receive(SPACE, limit=10) as receiver:
         receiver.write(b"12345")
         with pytest.raises(fs.SizeLimitError):
@@ -73,7 +74,7 @@ def test_a_limit_is_kept_while_receiving_and_nothing_is_left(tmp_path: Path) -> 
 
 
 def test_equal_bytes_of_two_spaces_are_two_files(tmp_path: Path) -> None:
-    store = BlobStore(tmp_path)
+    store = FolderBlobs(tmp_path)
     other = "b" * 32
     assert store.put(SPACE, CONTENT) == store.put(other, CONTENT)
     store.erase(SPACE)
@@ -81,14 +82,14 @@ def test_equal_bytes_of_two_spaces_are_two_files(tmp_path: Path) -> None:
 
 
 def test_an_address_cannot_leave_the_store(tmp_path: Path) -> None:
-    store = BlobStore(tmp_path)
+    store = FolderBlobs(tmp_path)
     for space, name in (("..", "0" * 64), (SPACE, "../../etc/passwd"), (SPACE.upper(), "0" * 64)):
         with pytest.raises(ValueError, match="not the address"):
             store.path(space, name)
 
 
 def test_files_are_for_their_owner_only(tmp_path: Path) -> None:
-    store = BlobStore(tmp_path / "blobs")
+    store = FolderBlobs(tmp_path / "blobs")
     blob = store.put(SPACE, CONTENT)
     path = store.path(SPACE, blob.sha256)
     assert path.stat().st_mode & 0o777 == 0o600

@@ -3,6 +3,7 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import textwrap
@@ -16,6 +17,8 @@ from alembic import command
 from alembic.script import ScriptDirectory
 from sqlalchemy.exc import IntegrityError
 
+from server.commands import serve
+from server.settings import Settings
 from server.storage import migrate
 from server.storage.db import Database, Source
 from server.storage.tables import metadata
@@ -253,6 +256,27 @@ def test_a_file_that_is_no_database_is_named(tmp_path: Path) -> None:
         migrate.upgrade(path)
 
 
+def test_a_server_whose_port_is_in_use_migrates_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("os.umask", lambda _: 0)
+    migrate.upgrade(tmp_path / "sagittal.db", target="0020")
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        settings = Settings(data_dir=tmp_path, port=other.getsockname()[1])
+        assert serve.run(settings, pytest.fail) == 1
+    assert "choose another with --port" in capsys.readouterr().err
+    assert migrate.read_revision(tmp_path / "sagittal.db") == "0020"
+    assert not (tmp_path / "backups").exists()
+
+
 def test_a_worker_refuses_a_database_that_is_behind(tmp_path: Path) -> None:
+    behind = tmp_path / "behind.db"
+    behind.touch()
     with pytest.raises(migrate.MigrationError, match="sagittal migrate"):
-        migrate.require_current(tmp_path / "none.db")
+        migrate.require_current(behind)
+
+
+def test_a_worker_makes_no_database(bare_source: Source) -> None:
+    with pytest.raises(migrate.MigrationError, match=r"There is no database|has no clinic"):
+        migrate.require_current(bare_source)
+    assert not migrate.exists(bare_source)

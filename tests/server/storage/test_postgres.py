@@ -12,10 +12,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from alembic import command
 from sqlalchemy import insert, select
 from sqlalchemy.exc import IntegrityError, OperationalError
 
 from server import audit
+from server.jobs.opening import open_queue
 from server.main import main
 from server.services import patients
 from server.services.custody import StrangersError, refuse_foreign_folder
@@ -24,12 +26,14 @@ from server.storage import migrate
 from server.storage.db import Database, highest_number
 from server.storage.high_water import set_mark
 from server.storage.person_tables import api_token
+from server.storage.postgres import PostgresServer
 from server.storage.refusal import is_busy
 from server.storage.tables import metadata, new_id, now, patient, user
 from tests.databases import write_database
 from tests.engines import require_postgres
 from tests.postgres import PASSWORD, run_sql
 from tests.server.clinic import ORIGIN, open_clinic
+from tests.server.nodes.pair import describe, find_ports, start_process
 
 pytestmark = [pytest.mark.postgres, pytest.mark.anyio]
 
@@ -86,6 +90,75 @@ def test_two_programs_that_migrate_at_once_do_it_once() -> None:
         assert failed == []
         migrate.require_current(url)
         assert migrate.upgrade(url) is None
+
+
+def test_nothing_is_migrated_under_web_servers_that_run(tmp_path: Path) -> None:
+    with require_postgres(migrated=False) as url:
+        migrate.upgrade(url, target="0020")
+        with closing(Database(url)) as older, older.serve("a") as serves:
+            assert serves
+            with pytest.raises(migrate.MigrationError, match="Stop all of them"):
+                migrate.upgrade(url, backups=tmp_path)
+            assert migrate.read_revision(url) == "0020"
+            assert list(tmp_path.iterdir()) == []
+        assert migrate.upgrade(url, backups=tmp_path) is not None
+        with closing(Database(url)) as current, current.serve("a"):
+            assert migrate.upgrade(url) is None
+            run_sql("COMMENT ON SCHEMA procrastinate IS '0.0'", url)  # another version delivers
+            with pytest.raises(migrate.MigrationError, match="Stop all of them"):
+                migrate.upgrade(url)
+
+
+def test_nothing_is_migrated_under_a_worker_that_waits_for_jobs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(migrate, "OTHERS_LEAVE_S", 0.2)
+    with require_postgres(migrated=False) as url, closing(Database(url)) as db:
+        migrate.upgrade(url, target="0020")
+        with open_queue(db, 1.5).listen():
+            until = time.monotonic() + 30
+            while not PostgresServer(url).list_others():
+                assert time.monotonic() < until
+                time.sleep(0.02)
+            with pytest.raises(migrate.MigrationError, match=r"workers perhaps \(at 127\.0\.0\.1\)"):
+                migrate.upgrade(url, backups=tmp_path)
+            assert migrate.read_revision(url) == "0020"
+            assert list(tmp_path.iterdir()) == []
+        assert migrate.upgrade(url, backups=tmp_path) is not None
+
+
+def test_who_had_to_wait_for_a_migration_goes_on_beside_whoever_did_it(tmp_path: Path) -> None:
+    with require_postgres(migrated=False) as url, closing(Database(url)) as first:
+        done: list[object] = []
+        with PostgresServer(url).take_turn_to_migrate() as turn:
+            assert turn
+            second = threading.Thread(target=lambda: done.append(migrate.upgrade(url)))
+            second.start()
+            until = time.monotonic() + 30
+            while run_sql("SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted") == [
+                (0,)
+            ]:
+                assert time.monotonic() < until
+                time.sleep(0.02)
+            command.upgrade(migrate.configuration(url), "head")
+            PostgresServer(url).prepare_delivery()
+            serving = first.serve("a")
+            assert serving.__enter__()
+        second.join()
+        assert done == [None]
+        serving.__exit__(None, None, None)
+
+
+def test_a_web_server_that_is_refused_migrates_nothing(tmp_path: Path) -> None:
+    with require_postgres(migrated=False) as url:
+        migrate.upgrade(url, target="0020")
+        # no clock agrees so well
+        node = replace(describe(tmp_path, url, "a", find_ports(1)[0]), lease_s=1e-9)
+        process = start_process(node)
+        said = process.communicate(timeout=60)[1]
+        assert process.returncode == 1
+        assert "Set both by NTP" in said
+        assert migrate.read_revision(url) == "0020"
 
 
 def test_a_clinic_moves_to_postgres_and_back_unchanged(
@@ -178,9 +251,19 @@ def test_a_frozen_writer_is_forgotten(postgres: str, monkeypatch: pytest.MonkeyP
 
 def test_only_one_web_server_is_on_a_database(postgres: str) -> None:
     with closing(Database(postgres)) as one, closing(Database(postgres)) as two:
-        with one.serve_alone() as first, two.serve_alone() as second:
-            assert (first, second) == (True, False)
-        with two.serve_alone() as again:
+        with one.serve("") as first, two.serve("") as second, two.serve("b") as named:
+            assert (first, second, named) == (True, False, False)
+        with two.serve("") as again:
+            assert again
+
+
+def test_web_servers_of_different_names_share_a_database_and_a_duty_is_done_by_one(postgres: str) -> None:
+    with closing(Database(postgres)) as one, closing(Database(postgres)) as two:
+        with one.serve("a") as a, two.serve("b") as b, two.serve("a") as same, two.serve("") as alone:
+            assert (a, b, same, alone) == (True, True, False, False)
+        with one.do_alone("mark") as first, two.do_alone("mark") as second, two.do_alone("sweep") as other:
+            assert (first, second, other) == (True, False, True)
+        with two.do_alone("mark") as again:
             assert again
 
 
@@ -216,7 +299,10 @@ def test_what_was_erased_is_in_no_table_of_the_disk_and_who_reads_only_delays_it
     def found() -> bool:
         run_sql("CHECKPOINT")
         [[folder]] = run_sql("SHOW data_directory")
-        return any(b"CANARY" in p.read_bytes() for p in (Path(folder) / "base").rglob("*") if p.is_file())
+        # other tests' databases stand beside it
+        [[own]] = run_sql("SELECT oid FROM pg_database WHERE datname = current_database()", postgres)
+        tables = Path(folder) / "base" / str(own)
+        return any(b"CANARY" in p.read_bytes() for p in tables.rglob("*") if p.is_file())
 
     with closing(Database(postgres)) as db:
         with db.write() as c:

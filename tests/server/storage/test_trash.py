@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from server.storage.trash import Trash
+from server.storage.trash import FolderTrash
 
 SPACE, NAME, OTHER = "a" * 32, "b" * 64, "c" * 64
 
@@ -39,7 +39,7 @@ def a_link_to_a_folder(stamp: Path) -> None:
 @pytest.mark.parametrize("put", [a_broken_link, a_file_in_place_of_a_folder, a_link_to_a_folder])
 def test_what_is_not_ours_is_passed_over(stamp: Path, put: Callable[[Path], None]) -> None:
     put(stamp)
-    trash = Trash(stamp.parent)
+    trash = FolderTrash(stamp.parent, stamp.parent.parent / "blobs")
     assert [one.name for one in trash.files()] == [NAME]
     trash.remove("d" * 32)
     trash.remove("d" * 32, [OTHER])
@@ -52,7 +52,7 @@ def test_what_is_not_ours_is_passed_over(stamp: Path, put: Callable[[Path], None
 
 def test_a_folder_that_is_removed_while_it_is_listed_is_passed_over(stamp: Path) -> None:
     (stamp / SPACE / OTHER).write_bytes(b"ours")
-    files = Trash(stamp.parent).files()
+    files = FolderTrash(stamp.parent, stamp.parent.parent / "blobs").files()
     assert next(files).name == NAME
     for path in (stamp / SPACE).iterdir():
         path.unlink()

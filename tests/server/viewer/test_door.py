@@ -82,10 +82,19 @@ def views_of(ward: Ward) -> FigureViews:
     return views
 
 
-async def test_no_port_of_this_machine_gives_a_view_away(ward: Ward, views_open: list[str]) -> None:
+@pytest.fixture
+def ports_before() -> set[int]:
+    """What other tests of this process serve."""
+    return listening_ports()
+
+
+async def test_no_port_of_this_machine_gives_a_view_away(
+    ports_before: set[int], ward: Ward, views_open: list[str]
+) -> None:
     ports = listening_ports()
     assert ward.port in ports
-    assert {port: gained for port in ports - {ward.port} if (gained := await gained_at(port))} == {}
+    opened = ports - ports_before - {ward.port}
+    assert {port: gained for port in opened if (gained := await gained_at(port))} == {}
 
 
 async def test_every_view_comes_through_the_door_with_a_cookie(

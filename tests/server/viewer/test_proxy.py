@@ -218,7 +218,7 @@ async def test_close_code_of_viser_reaches_the_browser(ward: Ward) -> None:
 
 
 async def test_sign_out_ends_the_view(ward: Ward, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pipe, "CHECK_EVERY_S", 0.05)
+    monkeypatch.setattr("server.auth.access.CHECK_EVERY_S", 0.05)
     headers = ward.cookie("viewer")
     async with replaying(ward, headers) as (cursor, opened), piped(ward, headers, opened["view"]) as ws:
         with ward.clinic.db.write() as c:

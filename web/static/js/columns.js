@@ -111,7 +111,9 @@ class Shape {
   }
 
   refuse(problem) {
-    this.checks.replaceChildren(h("li", { "data-check": "bad" }, icon("bad"), " ", translate(problem.detail || problem.title)));
+    // the server speaks of the manifest, whose words nobody sees here
+    const said = problem.code === "rate_missing" ? speak`Enter the samples per second, or say which column is the time.` : translate(problem.detail || problem.title);
+    this.checks.replaceChildren(h("li", { "data-check": "bad" }, icon("bad"), " ", said));
   }
 }
 

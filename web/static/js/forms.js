@@ -107,6 +107,8 @@ document.addEventListener("change", ({ target }) => {
   const given = field && [...form.querySelectorAll("[data-name]")].map((choice) => choice.dataset.name);
   if (given?.includes(field.value.trim())) field.value = dataset.name;
 });
+// A choice that the page is asked anew for.
+document.addEventListener("change", (e) => e.target.matches("[data-at-once]") && e.target.closest("form").requestSubmit());
 document.addEventListener("input", (e) => e.target.matches("[data-same]") && e.target.setCustomValidity(""));
 
 document.addEventListener("click", (e) => {

@@ -33,7 +33,7 @@ const setting = (button) => ({ [button.dataset.switch]: button.ariaPressed === "
 class GaitView extends HTMLElement {
   connectedCallback() {
     this.frame = this.querySelector("iframe");
-    this.first = this.querySelector("[data-first]");
+    this.first = this.querySelector("[data-first]") ?? this.makeCover();
     this.tries = 0;
     addEventListener("message", (e) => {
       if (e.source !== this.frame.contentWindow || e.origin !== location.origin) return;
@@ -87,6 +87,7 @@ class GaitView extends HTMLElement {
     this.socket.onclose = (e) => {
       this.dataset.state = "lost";
       this.waiting = false;
+      if (e.code === 1008 && e.reason === "not_found") this.say(speak`You may no longer open this patient.`);
       if (e.code === 1008 || this.refused) return; // signed out or nothing to show: trying again would not help
       this.say(speak`Connection lost, trying again…`);
       this.timer = setTimeout(() => this.connect(), RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)]);
@@ -141,7 +142,15 @@ class GaitView extends HTMLElement {
     setTimeout(() => this.uncover(), PATIENCE_MS);
   }
 
-  // The figure is there: the drawing in front of it goes.
+  // Where there is no drawing: an empty view must not shine white out of a dark page.
+  makeCover() {
+    const cover = document.createElement("div");
+    cover.dataset.first = "";
+    this.frame.after(cover);
+    return cover;
+  }
+
+  // The figure is there: what is in front of it goes.
   uncover() {
     const first = this.first;
     this.first = null;
@@ -162,9 +171,9 @@ class GaitView extends HTMLElement {
     if (el && el.textContent !== said) el.textContent = said;
   }
 
-  // The one that the figure is drawn on; viser has others.
+  // The one that the figure is drawn on, once it is; viser has others.
   canvas() {
-    return this.frame.contentDocument?.querySelector("canvas[data-engine]");
+    return this.first ? null : this.frame.contentDocument?.querySelector("canvas[data-engine]");
   }
 
   async savePicture() {

@@ -14,12 +14,13 @@ form?.addEventListener("submit", async (e) => {
   }
 });
 
-/** @param {{ link: { expires_at: string }, url: string, qr: string }} made */
+/** @param {{ link: { expires_at: string, emergency_id: string | null }, url: string, qr: string }} made */
 function show({ link, url, qr }) {
   form.closest("dialog").close();
+  const ends = new Date(link.expires_at), { lang } = document.documentElement;
   /** @type {HTMLImageElement} */ (slip.querySelector("[data-qr]")).src = qr;
   slip.querySelector("[data-url]").textContent = url;
-  slip.querySelector("[data-until]").textContent = new Date(link.expires_at).toLocaleDateString(document.documentElement.lang);
+  slip.querySelector("[data-until]").textContent = link.emergency_id ? ends.toLocaleString(lang) : ends.toLocaleDateString(lang); // that one ends within hours
   slip.querySelector("[data-copy]").addEventListener("click", () => navigator.clipboard.writeText(url));
   slip.hidden = false;
   slip.scrollIntoView();

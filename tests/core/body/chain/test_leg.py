@@ -48,6 +48,7 @@ def test_squats_from_a_recording_with_noise_and_biases(side: Side) -> None:
     assert np.isnan(angles.angles[f"knee_flexion_{side[0]}"][: leg.first]).all()
 
 
+@pytest.mark.slow
 def test_after_a_silence_uncertain_angles_are_withheld() -> None:
     _, calibrated = recorded("right")
     sensors = dict(calibrated.recording.sensors)

@@ -154,6 +154,7 @@ def test_what_cannot_be_tuned_is_refused_before_the_search() -> None:
         GainTuner("mahony_2008", TrialSplit((trial("one"),), (restless,)))
 
 
+@pytest.mark.slow
 def test_a_tuning_stopped_anywhere_and_resumed_ends_with_the_same_bits() -> None:
     halves = split()
     whole = tune(halves)

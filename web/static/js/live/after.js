@@ -11,15 +11,17 @@ export class After {
 
   // watched: the take ran while this page was open; else its session has been there for a while.
   async show(state, watched) {
-    const empty = !state.count;
+    const away = state.problem === "node_away" && !state.recording;
+    const empty = !state.count && !state.recording && !away;
     const part = state.state === "closed";
-    say(this.root.querySelector("[data-over-title]"), empty ? speak`Nothing was recorded` : speak`Recording is saved`);
-    say(this.root.querySelector("[data-over-words]"), empty ? speak`No data came before the end.`
+    say(this.root.querySelector("[data-over-title]"), away ? speak`The take is ended` : empty ? speak`Nothing was recorded` : speak`Recording is saved`);
+    say(this.root.querySelector("[data-over-words]"), away ? speak`The server of this take is away. What had arrived is stored and analysed when it is back.`
+      : empty ? speak`No data came before the end.`
       : part ? speak`It was ended here with what had arrived. Analysis is running; the session page opens when it is done.`
       : speak`Analysis is running; the session page opens when it is done.`);
-    this.root.querySelector("[data-do=again]").hidden = watched && !empty;
-    if (!watched && !empty) return say(this.root.querySelector("[data-over-words]"), speak`This session has its recording. Another one takes its place.`);
-    if (!empty && !this.following) await this.follow();
+    this.root.querySelector("[data-do=again]").hidden = watched && !empty && !away;
+    if (!watched && !empty && !away) return say(this.root.querySelector("[data-over-words]"), speak`This session has its recording. Another one takes its place.`);
+    if (!empty && !away && !this.following) await this.follow();
   }
 
   // The newest job of this session; when it is done already the session page has the result.

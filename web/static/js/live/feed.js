@@ -47,8 +47,8 @@ export class Feed extends EventTarget {
 
   #closed(e) {
     if (this.ended) return;
-    if (e.code === 1008) { // signed out: trying again would not help
-      this.#line("refused");
+    if (e.code === 1008) { // signed out, or outside the care team now: trying again would not help
+      this.#line(e.reason === "not_found" ? "hidden" : "refused");
       return;
     }
     this.#line("lost");

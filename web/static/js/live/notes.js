@@ -37,7 +37,9 @@ export class Notes {
   }
 
   tablet(state) {
-    if (state.state === "streaming" && state.tablet !== "connected")
+    if (state.problem === "node_away" && state.state !== "closed")
+      this.put("tablet", "bad", speak`The server of this take is away.`, speak`The tablet goes on recording; what is kept stays kept. This page goes on when that server is back.`, { do: "close", word: speak`End without the tablet` });
+    else if (state.state === "streaming" && state.tablet !== "connected")
       this.put("tablet", "warn", speak`The tablet is not connected.`, speak`It goes on recording and keeps everything; what is missing comes when it is back. Nothing is lost.`, { do: "close", word: speak`End without the tablet` });
     else this.take("tablet");
   }
@@ -60,6 +62,7 @@ export class Notes {
 
   line(line) {
     if (line === "lost") this.put("line", "bad", speak`No connection to the server.`, speak`The tablet goes on recording. This page comes back by itself.`);
+    else if (line === "hidden") this.put("line", "bad", speak`You may no longer open this patient.`, speak`The recording goes on.`);
     else if (line === "refused") this.put("line", "bad", speak`You are signed out.`, speak`Sign in again to see the walk; the recording goes on.`);
     else this.take("line");
   }

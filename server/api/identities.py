@@ -1,0 +1,47 @@
+"""Who a patient is, beside the pseudonym."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter
+
+from server.api import schemas
+from server.api.documents import refusals
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Config, Db, Id, OpenTrail
+from server.http.json_body import StrictJsonRoute
+from server.services import identities
+from server.services.identities import PatientIdentity
+
+router = APIRouter(route_class=StrictJsonRoute, tags=["patients"])
+
+
+@router.get("/patients/{patient_id}/identity", response_model=PatientIdentity, responses=refusals(409))
+def read_identity(
+    patient_id: Id,
+    db: Db,
+    settings: Config,
+    trail: OpenTrail,
+    who: Annotated[Identity, require(Action.READ_IDENTITY)],
+) -> PatientIdentity:
+    """Name, date of birth, numbers and contact of a patient; null = not written down. No token reads this."""
+    with db.read() as c:
+        found = identities.get(c, settings.identity_key_file, patient_id)
+    trail.record_opened(who, "identity.opened", "patient", patient_id)
+    return found
+
+
+@router.patch("/patients/{patient_id}/identity", response_model=PatientIdentity, responses=refusals(409))
+def change_identity(
+    patient_id: Id,
+    body: schemas.IdentityChange,
+    db: Db,
+    settings: Config,
+    who: Annotated[Identity, require(Action.WRITE_IDENTITY)],
+) -> PatientIdentity:
+    """Write down who a patient is; members left out stay as they are, null takes one away."""
+    with db.write() as c:
+        return identities.change(c, settings.identity_key_file, who, patient_id, body.values())

@@ -1,0 +1,49 @@
+"""`sagittal identity-key`: the key that encrypts names and addresses of patients."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import closing
+from pathlib import Path
+
+from server.settings import load_settings
+
+
+def identity_key(data_dir: Path | None, what: str, really: bool, without_key: bool) -> int:
+    """Make the key, change it, or list and remove what it does not open; 1 when that is not possible."""
+    from core.errors import SagittalError
+    from server.services import identities
+    from server.storage.db import Database
+    from server.storage.migrate import MigrationError, require_current
+
+    settings = load_settings({"data_dir": data_dir})
+    file = settings.identity_key_file
+    try:
+        require_current(settings.database_source)
+        with closing(Database(settings.database_source)) as db:
+            if what == "make":
+                said = _tell_made(file, identities.make_key(db, file))
+            elif what == "change":
+                name, count = identities.change_key(db, file)
+                said = (
+                    f"{count} patients' names are encrypted by key {name} now. Keep a copy of {file} on "
+                    "paper. The old copy is needed for unencrypted backups from before.\n"
+                )
+            else:
+                gone = identities.discard_unreadable(db, file, really=really, without_key=without_key)
+                said = "".join(f"patient {one}\n" for one in gone)
+                said += f"{len(gone)} patients' names cannot be read with {file}"
+                said += " and were removed.\n" if really else "; --really removes them for good.\n"
+    except (MigrationError, SagittalError) as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    sys.stdout.write(said)
+    sys.stdout.flush()
+    return 0
+
+
+def _tell_made(file: Path, name: str) -> str:
+    return (
+        f"{file} holds the key {name} of patients' names. Without it no name can be read: keep a copy on "
+        "paper. Encrypted backups hold it too, others do not.\n"
+    )

@@ -1,0 +1,70 @@
+"""Carries the messages of a websocket to another server and back."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from starlette.status import WS_1008_POLICY_VIOLATION
+from starlette.websockets import WebSocket, WebSocketDisconnect
+from websockets.asyncio.client import ClientConnection
+from websockets.exceptions import ConnectionClosed
+
+Message = str | bytes
+
+
+async def carry_messages(
+    ws: WebSocket,
+    up: ClientConnection,
+    *,
+    admits: Callable[[Message], bool] = lambda _: True,
+    until: Coroutine[Any, Any, str] | None = None,
+) -> None:
+    """Carry messages both ways until one side ends or the right to see does; the close code is passed on.
+
+    Parameters
+    ----------
+    admits : which messages of the client are passed on. until : returns, when it must end, why.
+    """
+    over = None if until is None else asyncio.create_task(until)
+    tasks = [asyncio.create_task(_down(ws, up)), asyncio.create_task(_upward(ws, up, admits))]
+    tasks += [] if over is None else [over]  # type: ignore[list-item]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        why = over.result() if over is not None and over.done() else None
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        code, reason = _close_code(up) if why is None else (WS_1008_POLICY_VIOLATION, why)
+        # the client may be gone already
+        with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+            await ws.close(code, reason)
+
+
+async def _down(ws: WebSocket, up: ClientConnection) -> None:
+    async for message in up:
+        if isinstance(message, bytes):
+            await ws.send_bytes(message)
+        else:
+            await ws.send_text(message)
+
+
+async def _upward(ws: WebSocket, up: ClientConnection, admits: Callable[[Message], bool]) -> None:
+    while True:
+        event = await ws.receive()
+        if event["type"] == "websocket.disconnect":
+            return
+        data = event.get("bytes")
+        message: Message = data if data is not None else event.get("text") or ""
+        if admits(message):
+            with contextlib.suppress(ConnectionClosed):
+                await up.send(message)
+
+
+def _close_code(up: ClientConnection) -> tuple[int, str]:
+    """Code and reason to give to the client; 1005 and 1006 mean "none given" and may not be sent."""
+    code = up.close_code
+    return (1000, "") if code is None or code in (1005, 1006) else (code, up.close_reason or "")

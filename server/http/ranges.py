@@ -1,0 +1,64 @@
+"""Answering a request for a part of something long, such as a player's for a video (RFC 9110 §14)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import Final
+
+from starlette.responses import Response, StreamingResponse
+
+PIECE: Final = 1 << 20
+"""Bytes that are read at once."""
+_RANGE: Final = re.compile(r"bytes=(\d{0,18})-(\d{0,18})")
+
+
+def answer_range(
+    headers: Mapping[str, str],
+    size: int,
+    version: str,
+    read: Callable[[int, int], bytes],
+    media_type: str,
+) -> Response:
+    """Answer with the one range that is asked for, or with all; several at once get all.
+
+    Parameters
+    ----------
+    headers : of the request, their names in small letters. size : bytes of the whole.
+    version : what changes with its content; a range of another version gets all.
+    read : gives the bytes from a place to before another.
+    """
+    tag = f'"{version}"'
+    ours = {"Accept-Ranges": "bytes", "ETag": tag}
+    asked = _RANGE.fullmatch(headers.get("range", "").replace(" ", ""))
+    if asked is None or asked.group(1, 2) == ("", "") or headers.get("if-range", tag) != tag:
+        return _stream(read, 0, size, media_type, 200, ours)
+    first, last = asked.groups()
+    start = max(size - int(last), 0) if not first else int(first)
+    stop = min(int(last) + 1, size) if first and last else size
+    if first and last and int(last) < int(first):
+        return _stream(read, 0, size, media_type, 200, ours)  # no range at all
+    if start >= size:
+        return Response(status_code=416, headers={**ours, "Content-Range": f"bytes */{size}"})
+    said = {**ours, "Content-Range": f"bytes {start}-{stop - 1}/{size}"}
+    return _stream(read, start, stop, media_type, 206, said)
+
+
+def _stream(
+    read: Callable[[int, int], bytes],
+    start: int,
+    stop: int,
+    media_type: str,
+    status: int,
+    headers: Mapping[str, str],
+) -> StreamingResponse:
+    # the first piece is read here: what is wrong with the file is an answer, not a cut connection
+    first = read(start, min(start + PIECE, stop)) if stop > start else b""
+
+    def rest() -> Iterator[bytes]:
+        yield first
+        for at in range(start + PIECE, stop, PIECE):
+            yield read(at, min(at + PIECE, stop))
+
+    length = {"Content-Length": str(stop - start)}
+    return StreamingResponse(rest(), status, {**headers, **length}, media_type)

@@ -1,0 +1,1 @@
+"""Several web servers on one PostgreSQL database: who they are, whose a request is, and the way to them."""

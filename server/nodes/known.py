@@ -1,0 +1,47 @@
+"""Whose word about a client is taken besides a proxy's: that of the other web servers of this clinic."""
+
+from __future__ import annotations
+
+import hmac
+import time
+
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from server.http.problems import Problem, send_problem
+from server.nodes.passage import ASKED_BY, HEADER, LIFE_S, sign
+from server.nodes.registry import Nodes
+
+
+class KnownNodes:
+    """ASGI middleware: what another web server passes on is its client's; the forged is refused."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve or refuse one connection."""
+        if scope["type"] in {"http", "websocket"}:
+            lines = [value for name, value in scope["headers"] if name == HEADER]
+            if lines:
+                told = _read(scope["app"].state.nodes, lines, scope)
+                if told is None:
+                    detail = "The request pretends to come from another server. Ask without its header."
+                    await send_problem(Problem(403, "not_a_node", detail), scope, receive, send)
+                    return
+                asks, client, scheme = told
+                headers = [one for one in scope["headers"] if one[0] != HEADER]
+                scope = {**scope, "headers": headers, "client": (client, 0), "scheme": scheme, ASKED_BY: asks}
+        await self.app(scope, receive, send)
+
+
+def _read(nodes: Nodes, lines: list[bytes], scope: Scope) -> tuple[str, str, str] | None:
+    """Who asks, and the client's address and scheme; None of a line that no server of ours wrote for this."""
+    line, _, mac = lines[0].decode("latin-1").rpartition(";")
+    parts = line.split(";")
+    right = sign(nodes.key, line, scope).encode()
+    if len(lines) != 1 or len(parts) != 5 or not hmac.compare_digest(right, mac.encode("latin-1")):
+        return None
+    asks, asked, at, client, scheme = parts
+    if asked != nodes.name or abs(time.time() - int(at)) > LIFE_S:
+        return None
+    return asks, client, scheme

@@ -1,0 +1,62 @@
+"""How one web server tells another for whom it asks, so that nobody else can: a line with an HMAC.
+
+The key is a file of the data folder that all of them share. The line has who asks, who is asked, when, and
+the client's address and scheme; the HMAC holds it to this one request.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import secrets
+import time
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+from server.storage import fs
+
+HEADER: Final = b"x-sagittal-node"
+ASKED_BY: Final = "sagittal.asked_by"
+"""Key of a scope: the name of the server that has passed the request on."""
+LIFE_S: Final = 60.0
+"""How old a line may be; the clocks of all servers agree better than that."""
+_BOUND: Final = frozenset({b"host", b"cookie", b"authorization", b"origin"})
+"""Headers that the HMAC covers."""
+
+Headers = Iterable[tuple[bytes, bytes]]
+
+
+def read_key(path: Path) -> bytes:
+    """The key, made by the first server that needs it."""
+    fs.make_folder(path.parent)
+    with fs.hold_lock(path.with_name("key.lock")):
+        with suppress(FileNotFoundError):
+            return bytes.fromhex(path.read_text("ascii"))
+        key = secrets.token_bytes(32)
+        fs.write_file(path, key.hex().encode())
+    return key
+
+
+def write_line(key: bytes, asks: str, asked: str, scope: Mapping[str, Any]) -> bytes:
+    """The header's value for a request that is passed on as it came."""
+    client = scope["client"][0] if scope.get("client") else ""
+    line = f"{asks};{asked};{int(time.time())};{client};{scope['scheme']}"
+    return f"{line};{sign(key, line, scope)}".encode("latin-1")
+
+
+def sign(key: bytes, line: str, scope: Mapping[str, Any]) -> str:
+    """The HMAC of a line and of what it speaks of, as hexadecimal digits."""
+    bound: Headers = sorted(one for one in scope["headers"] if one[0] in _BOUND)
+    asked = (
+        line.encode("latin-1"),
+        scope.get("method", "GET").encode(),
+        scope.get("raw_path") or scope["path"].encode(),
+        scope["query_string"],
+        *(part for one in bound for part in one),
+    )
+    digest = hmac.new(key, digestmod=hashlib.sha256)
+    for part in asked:
+        digest.update(len(part).to_bytes(4, "big") + part)
+    return digest.hexdigest()

@@ -1,0 +1,91 @@
+"""Whose a request is: live takes belong to the web server with their log, 3D views to the one they hash to.
+
+live take of a session   the server that has the session's newest take while it is open; else that one,
+                         while it lives, or the one that the session's id hashes to
+film of a take           the server that has the take
+3D view                  the server that its id hashes to; pages make ids up before they ask
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final
+from urllib.parse import parse_qs
+
+from sqlalchemy import select
+from starlette.types import Scope
+
+from server.nodes.registry import Nodes, WebNode
+from server.storage.db import Database
+from server.storage.live_tables import OPEN_TAKE_STATES, live_take
+
+_ID = "([0-9a-f]{32})"
+_SESSION: Final = re.compile(
+    rf"/sessions/{_ID}/live/(?:feed|figure)|/api/v1/sessions/{_ID}/live(?:/(?:code|commands|close))?"
+)
+_TAKE: Final = re.compile(rf"/api/v1/live/takes/{_ID}/film(?:/.*)?")
+_VIEW: Final = re.compile(rf"/views/{_ID}/?")
+_REPLAY: Final = re.compile(rf"/sessions/{_ID}/replay")
+
+
+@dataclass(frozen=True)
+class Pin:
+    """What a request is about. kind : session, take or view."""
+
+    kind: str
+    id: str
+
+
+@dataclass(frozen=True)
+class Owner:
+    """Another web server to which something belongs.
+
+    Parameters
+    ----------
+    node : None = it is away. must : nobody else can stand in for it.
+    """
+
+    name: str
+    node: WebNode | None
+    must: bool
+
+
+def find_pin(scope: Scope) -> Pin | None:
+    """What an address is about that one server must answer; None = any may."""
+    path = scope["path"]
+    if found := _SESSION.fullmatch(path):
+        return Pin("session", found[1] or found[2])
+    if found := _TAKE.fullmatch(path):
+        return Pin("take", found[1])
+    if found := _VIEW.fullmatch(path):
+        return Pin("view", found[1])
+    if _REPLAY.fullmatch(path):
+        names = parse_qs(scope["query_string"].decode("latin-1")).get("view", [""])
+        return Pin("view", names[-1]) if re.fullmatch(_ID, names[-1]) else None
+    return None
+
+
+def find_owner(db: Database, nodes: Nodes, pin: Pin) -> Owner | None:
+    """The other server to which it belongs, None = this one answers; blocks."""
+    if not nodes.is_one_of_several:
+        return None
+    if pin.kind == "view":
+        return _of_home(nodes, pin.id)
+    mine = live_take.c.session_id if pin.kind == "session" else live_take.c.id
+    query = select(live_take.c.node, live_take.c.state).where(mine == pin.id)
+    with db.read() as c:
+        row = c.execute(query.order_by(live_take.c.created_at.desc(), live_take.c.id).limit(1)).first()
+    if row is None or row.node is None:
+        return _of_home(nodes, pin.id) if pin.kind == "session" else None
+    if row.node == nodes.name:
+        return None
+    node = nodes.find(row.node)
+    if pin.kind == "take" or row.state in OPEN_TAKE_STATES:
+        return Owner(row.node, node, must=True)
+    return _of_home(nodes, pin.id) if node is None else Owner(row.node, node, must=False)
+
+
+def _of_home(nodes: Nodes, word: str) -> Owner | None:
+    home = nodes.find_home(word)
+    return None if home is None else Owner(home.name, home, must=False)

@@ -1,0 +1,158 @@
+"""Single values encrypted with AES-256-GCM, each bound to its row and field, under a key kept in a file.
+
+    make_keys(path)                                   # once, on purpose; reading never makes one
+    keys = read_keys(path)
+    sealed = keys.seal("Erika Muster", row_id, "name")
+    keys.open(sealed, row_id, "name")                 # of another row or field: ValueUnreadable
+
+A file holds one key; while keys change it holds two, the new one first. A sealed value says by which key it
+was sealed, and hides its text's length but for steps of 64 bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from cryptography.exceptions import InvalidTag
+from cryptography.hazmat.primitives.ciphers.aead import AESGCM
+
+from core.errors import SagittalError
+from server.storage import fs
+
+_LINE: Final = re.compile(r"SAGITTAL-FIELD-KEY-1 ([0-9a-f]{64})")
+_VERSION: Final = b"\x01"
+_NAME_BYTES, _NONCE_BYTES, _TAG_BYTES, _STEP = 8, 12, 16, 64
+_HEAD: Final = len(_VERSION) + _NAME_BYTES + _NONCE_BYTES
+
+
+class KeyUnusable(SagittalError):  # noqa: N818 - what is the matter with the key
+    """The key of encrypted values is not there, or is no key; the message says what to do."""
+
+    status = 503
+
+
+class ValueUnreadable(SagittalError):  # noqa: N818 - what is the matter with the value
+    """A value was sealed by another key, was changed, or belongs to another row or field."""
+
+    status = 503
+
+
+@dataclass(frozen=True)
+class FieldKeys:
+    """Keys by their names of 8 bytes; the first one seals, all of them open."""
+
+    keys: dict[bytes, bytes] = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        """Name of the key that seals, 16 hex digits."""
+        return next(iter(self.keys)).hex()
+
+    def has(self, name: str) -> bool:
+        """Whether a key is among them."""
+        return bytes.fromhex(name) in self.keys
+
+    def only(self, name: str) -> FieldKeys:
+        """One of the keys, alone."""
+        wanted = bytes.fromhex(name)
+        return FieldKeys({wanted: self.keys[wanted]})
+
+    def seal(self, text: str, row_id: str, name: str) -> bytes:
+        """Encrypt a text, which holds no NUL, for one field of one row."""
+        key_name, key = next(iter(self.keys.items()))
+        plain = text.encode()
+        plain += bytes(-len(plain) % _STEP)
+        nonce = os.urandom(_NONCE_BYTES)
+        return _VERSION + key_name + nonce + AESGCM(key).encrypt(nonce, plain, _bind(row_id, name))
+
+    def open(self, sealed: bytes, row_id: str, name: str) -> str:
+        """Decrypt what was sealed for this field of this row; raises ValueUnreadable."""
+        key_name, nonce = sealed[1 : 1 + _NAME_BYTES], sealed[1 + _NAME_BYTES : _HEAD]
+        if sealed[:1] != _VERSION or len(sealed) < _HEAD + _TAG_BYTES:
+            raise ValueUnreadable("identity_damaged", f"The {say_field(name)} is damaged. {_MEND}")
+        key = self.keys.get(key_name)
+        if key is None:
+            raise ValueUnreadable(
+                "identity_key_wrong",
+                f"The {say_field(name)} was encrypted by key {key_name.hex()}, which is not the one in its "
+                "place. The operator puts the right key file back.",
+            )
+        try:
+            return AESGCM(key).decrypt(nonce, sealed[_HEAD:], _bind(row_id, name)).rstrip(b"\0").decode()
+        except InvalidTag as error:
+            raise ValueUnreadable(
+                "identity_damaged",
+                f"The {say_field(name)} was changed, or belongs to another patient. {_MEND}",
+            ) from error
+
+
+def make_keys(path: Path) -> str:
+    """Write a file with a new key for its owner only and return its name; KeyUnusable over a file."""
+    if path.exists():
+        raise KeyUnusable("identity_key_exists", f"{path} exists; a key is never written over another one.")
+    key = os.urandom(32)
+    _write(path, [key])
+    return _name(key).hex()
+
+
+def add_key(path: Path) -> None:
+    """Put a new key before those of a file: it seals from now on. Raises KeyUnusable."""
+    # a link leads to where the file is kept
+    _write(path.resolve(), [os.urandom(32), *read_keys(path).keys.values()])
+
+
+def drop_other_keys(path: Path, name: str) -> None:
+    """Leave only one of the keys of a file; raises KeyUnusable."""
+    _write(path.resolve(), list(read_keys(path).only(name).keys.values()))
+
+
+def read_keys(path: Path) -> FieldKeys:
+    """Read the keys of a file; raises KeyUnusable where it is not there or is none of ours."""
+    try:
+        lines = [line.strip() for line in path.read_text("ascii").splitlines()]
+    except FileNotFoundError as error:
+        raise KeyUnusable(
+            "identity_key_missing",
+            "The key of patients' names is not in its place. The operator puts the file back.",
+        ) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise KeyUnusable(
+            "identity_key_missing", "The key of patients' names cannot be read. The operator puts it right."
+        ) from error
+    found = [_LINE.fullmatch(line) for line in lines if line and not line.startswith("#")]
+    keys = [bytes.fromhex(one[1]) for one in found if one is not None]
+    if not keys or len(keys) != len(found):
+        raise KeyUnusable(
+            "identity_key_wrong",
+            "The file of the key of patients' names holds no such key. The operator puts the right one back.",
+        )
+    return FieldKeys({_name(key): key for key in keys})
+
+
+_MEND: Final = "The operator runs `sagittal check`, and takes it from a backup or from paper."
+
+
+def say_field(name: str) -> str:
+    """What a field is called in a sentence."""
+    return {"born_on": "date of birth", "contact": "address and telephone"}.get(name, name.replace("_", " "))
+
+
+def _bind(row_id: str, name: str) -> bytes:
+    return f"sagittal field 1\0{row_id}\0{name}".encode()
+
+
+def _name(key: bytes) -> bytes:
+    return hashlib.sha256(b"sagittal field key 1" + key).digest()[:_NAME_BYTES]
+
+
+def _write(path: Path, keys: list[bytes]) -> None:
+    lines = [f"SAGITTAL-FIELD-KEY-1 {key.hex()}" for key in keys]
+    note = (
+        "# opens names and addresses of patients (sagittal identity-key); keep a copy away from the backups"
+    )
+    fs.write_file(path, "\n".join([note, *lines, ""]).encode())

@@ -1,0 +1,66 @@
+"""What a service refuses is said on a German page in German, with its values."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from sqlalchemy import Connection
+
+from server.auth.roles import Role
+from server.services import consents, notes, patients, report_links, sessions
+from server.services.errors import NotFound, ServiceError
+from server.storage.db import Database
+from tests.server.clinic import open_clinic
+from web.language import LANGUAGES, SOURCE, load_catalogue, script_texts
+
+pytestmark = pytest.mark.anyio
+
+
+def _refuse(c: Connection, patient: str) -> list[ServiceError]:
+    """Refusals as the services make them, each of another form."""
+    found = []
+    for attempt in (
+        lambda: patients.get(c, "0" * 32),
+        lambda: report_links.get(c, "0" * 32),
+        lambda: patients.create(c, None, code="P-1"),
+        lambda: patients.change(c, None, patient, {"birth_year": 2999}),
+        lambda: notes.add(c, None, patient, " "),
+        lambda: consents.give(c, None, patient, purpose="research", evidence=""),
+        lambda: sessions.create(c, None, patient, height_m=3.0),
+    ):
+        with pytest.raises(ServiceError) as refused:
+            attempt()
+        found.append(refused.value)
+    return found
+
+
+def test_every_language_says_the_common_refusals(source: Path | str) -> None:
+    db = Database(source)
+    with db.write() as c:
+        said = _refuse(c, patients.create(c, None, code="P-1").id)
+    db.close()
+    for language in set(LANGUAGES) - {SOURCE}:
+        catalogue, scripts = load_catalogue(language), script_texts(language)[1].decode()
+        for error in said:
+            text = catalogue.find(error.message)
+            assert text is not None, error.message
+            # what was given stands in it, and nothing of the English does
+            for value in re.findall(r"\b(?:P-1|0{32}|2999|200)\b", error.message):
+                assert value in text
+            assert not re.search(r"\b(the|expected|patient|belongs|been)\b", text), text
+        assert "gehört einem anderen Patienten" in scripts or language != "de"
+
+
+async def test_the_page_of_a_refusal_is_german(tmp_path: Path) -> None:
+    async with open_clinic(tmp_path) as clinic, clinic.client(Role.CLINICIAN) as client:
+        address = f"/patients/{'0' * 32}"
+        wanted = {"accept": "text/html", "accept-language": "de"}
+        german = await client.get(address, headers=wanted)
+        english = await client.get(address, headers=wanted | {"accept-language": "en"})
+    message = NotFound("patient", "0" * 32).message
+    assert (german.status_code, english.status_code) == (404, 404)
+    assert message.split(",")[1] in english.text
+    assert "Nicht vorhanden oder gelöscht: Patient" in german.text
+    assert "has been deleted" not in german.text
