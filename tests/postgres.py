@@ -26,11 +26,12 @@ from server.storage.migrate import upgrade
 USERS: Final = ("postgres", "nobody")
 """Whom root starts it as: the first there is."""
 PASSWORD: Final = "of the tests"
-FASTER: Final = (
+OPTIONS: Final = (
     "fsync=off",
     "full_page_writes=off",
     "unix_socket_directories=",
     "listen_addresses=127.0.0.1",
+    "max_connections=200",
 )
 _numbers = itertools.count()
 
@@ -83,7 +84,7 @@ def start_server() -> str:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    options = [part for option in FASTER for part in ("-c", option)]
+    options = [part for option in OPTIONS for part in ("-c", option)]
     command: list[str | Path] = [programs / "postgres", "-D", data, "-p", str(port), *options]
     url = f"postgresql://sagittal:{PASSWORD.replace(' ', '%20')}@127.0.0.1:{port}/postgres"
     server = PostgresProcess(folder, command, runs_as, url)

@@ -67,10 +67,14 @@ def test_an_hour_costs_some_ten_times_a_fixed_piece_of_work(
 
 @pytest.mark.bench
 def test_three_times_as_long_costs_three_times_as_much(day: tuple[LongStream, list[SampleBlock]]) -> None:
-    once = min(cpu_s(lambda: monitor_activity(repeat(*day, 1), "chest", 1.7)) for _ in range(2))
-    thrice = cpu_s(lambda: monitor_activity(repeat(*day, 3), "chest", 1.7))
-    sys.stdout.write(f"\nthree times as long: {thrice / once:.2f} times the CPU\n")
-    assert thrice <= 3.6 * once
+    thrice, once, times = in_pairs(
+        lambda: monitor_activity(repeat(*day, 3), "chest", 1.7),
+        lambda: monitor_activity(repeat(*day, 1), "chest", 1.7),
+        3,
+    )
+    sys.stdout.write(f"\nthree times as long: {thrice:.2f} s of CPU for {once:.2f}, {times:.2f} times\n")
+    # a machine that slows down for the longer of a pair is not counted; what grew by squares would take nine times
+    assert times <= 4.5
 
 
 MOST_MB = 300.0

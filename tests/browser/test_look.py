@@ -113,7 +113,7 @@ def test_dialogs_obey_the_design_system(opened: Opener, filled: Filled) -> None:
     ):
         for width, height in (DESK, PHONE):
             page = opened(path, width=width, height=height)
-            page.locator(f"[data-open={button}]").click()
+            page.locator(f"[commandfor={button}]").click()
             found = layout_faults(page) | text_faults(page)
             assert not found, f"{button} {width}: {found}"
             box = page.locator("dialog[open]").bounding_box()

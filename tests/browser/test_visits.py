@@ -89,9 +89,7 @@ def test_a_programme_is_started_linked_to_its_visits_and_ended(
     patient, session = newcomer
     page = opened(f"/patients/{patient}")
     page.get_by_role("link", name="Plan a programme").click()
-    page.wait_for_url(
-        re.compile(r"/programme$")
-    )  # loaded: before its scripts are there a click opens nothing
+    page.wait_for_url(re.compile(r"/programme$"))
     page.get_by_role("button", name="Start programme").click()
     today = dt.datetime.now(dt.UTC).date()
     page.get_by_label("Day of the first training").fill(today.isoformat())

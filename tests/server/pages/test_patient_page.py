@@ -151,7 +151,7 @@ async def test_a_note_is_removed_by_who_wrote_it_or_an_administrator(clinic: Cli
             "id"
         ]
         html = (await client.get(f"/patients/{patient}")).text
-        assert f'data-open="remove-note-{mine}"' in html
+        assert f'commandfor="remove-note-{mine}"' in html
         assert "Remove this note?" in html
         assert theirs not in html
         refused = await client.delete(f"{API}/notes/{theirs}")

@@ -112,8 +112,8 @@ document.addEventListener("change", (e) => e.target.matches("[data-at-once]") &&
 document.addEventListener("input", (e) => e.target.matches("[data-same]") && e.target.setCustomValidity(""));
 
 document.addEventListener("click", (e) => {
-  const opener = e.target.closest("[data-open]");
-  if (opener) return document.getElementById(opener.dataset.open).showModal(); // Escape closes, focus returns: native
+  const opener = e.target.closest("[command=show-modal]"); // opens without us, and before us, where the browser knows it
+  if (opener && !("commandForElement" in opener)) document.getElementById(opener.getAttribute("commandfor")).showModal();
   if (e.target.closest("[data-close]")) return e.target.closest("dialog").close();
   if (e.target.closest("[data-back]")) return history.back();
   if (e.target.closest("[data-print]")) return window.print();
