@@ -73,7 +73,7 @@ def test_three_times_as_long_costs_three_times_as_much(day: tuple[LongStream, li
         3,
     )
     sys.stdout.write(f"\nthree times as long: {thrice:.2f} s of CPU for {once:.2f}, {times:.2f} times\n")
-    # a machine that slows down for the longer of a pair is not counted; what grew by squares would take nine times
+    # a machine that slows down for one of a pair is not counted; what grew by squares would take nine times
     assert times <= 4.5
 
 

@@ -39,7 +39,7 @@ PAGES: Final = 20
 """Of each user."""
 
 WAIT: Final = 2.0
-"""Times that a page among so many users may take as long as all of theirs would one after the other; measured .6 to 1."""
+"""Times as long that a page among so many users may take as all of theirs one after the other; measured .9."""
 
 MARKS: Final = """
 if (window === window.top) {
@@ -135,8 +135,8 @@ def test_eight_users_at_once_wait_for_each_other_and_for_nothing_else(analysed: 
             ]
             for what, goal, ours in goals
         ],
-        f"{PAGES} pages by each user, each asked for as soon as the one before is there, over loopback. The web "
-        "process computes one page at a time, so eight wait some eight times as long as one.",
+        f"{PAGES} pages by each user, each asked for as soon as the one before is there, over loopback. The "
+        "web process computes one page at a time, so eight wait some eight times as long as one.",
     )
     assert eight <= WAIT * USERS * one
 
