@@ -12,7 +12,7 @@ from typing import Any, Self
 from core.errors import InputError, SagittalError
 from core.formats.json_tree import read_json
 from server.processes.compile_cache import has_compiled_filters
-from server.processes.compiling import OFFLINE, compile_filters_once
+from server.processes.compiling import OFFLINE, compile_filters_once, is_compiling
 from server.report import activity_files
 from server.report.estimator import estimator_view
 from server.storage import fs
@@ -43,7 +43,7 @@ def analyse(
         sources = list(list_source_files(paths))
         declared = read_named_file(manifest) if manifest else None
         with _ProgressBar() as bar:
-            if not has_compiled_filters():
+            if is_compiling() or not has_compiled_filters():
                 bar.stage("compiling, once", 0.0)
             compile_filters_once(OFFLINE)
             files = analysing.run(sources, declared, read_overrides(config, estimator), bar.stage)

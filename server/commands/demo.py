@@ -15,6 +15,7 @@ from sqlalchemy import func, select
 
 from server.commands.serve import run, say
 from server.processes.compile_cache import has_compiled_filters
+from server.processes.compiling import is_compiling
 from server.settings import load_settings
 from server.storage.db import Database, Source
 
@@ -75,7 +76,7 @@ def _report(database: Source) -> None:
     from server.storage.tables import job
 
     began, told = time.monotonic(), ""
-    if not has_compiled_filters():
+    if is_compiling() or not has_compiled_filters():
         say("Compiling the filters (once for you and this version, about half a minute) …")
     pause = threading.Event()
     with closing(Database(database)) as db:

@@ -22,7 +22,7 @@ from server.report.feedback_words import side_words
 from server.report.leaflet import list_figures
 from server.report.numbers import Numbers
 from server.services import comparisons, histories, patients, prescriptions, sessions
-from server.services.errors import NotFound
+from server.services.errors import Conflict
 from server.services.provenance import CODE_VERSION
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
@@ -89,13 +89,13 @@ def make_course(
 
 
 def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[str, Any]:
-    """What the leaflet of a walk shows; raises NotFound where there is no analysed walk."""
+    """What the leaflet of a walk shows; raises Conflict where there is no analysed walk."""
     with db.read() as c:
         patient = patients.get(c, sessions.get(c, sid).patient_id)
         done = histories.list_analysed(c, patient.id)
         this = next((a for a in done if a.session.id == sid), None)
         if this is None or this.session.protocol not in sessions.WALKS:
-            raise NotFound("analysed walk", sid)
+            raise Conflict("no_walk", "This session has no analysed walk, so there is no leaflet of it.")
         before = comparisons.find_previous(c, this.session, done)
         written = prescriptions.of_patient(c, patient.id)
     new = reviewed.read_numbers(this.found, this.edits)
@@ -124,13 +124,13 @@ def _is_usable(numbers: Numbers) -> bool:
 
 
 def gather_course(db: Database, reviewed: ReviewedAnalyses, pid: str) -> dict[str, Any]:
-    """What the report over the visits shows; raises NotFound where nothing is analysed."""
+    """What the report over the visits shows; raises Conflict where nothing is analysed."""
     with db.read() as c:
         patient = patients.get(c, pid)
         done, plans = histories.read(c, patient)
     walks = [a for a in done if a.session.protocol != "activity"]
     if not walks:
-        raise NotFound("analysed visit of patient", pid)
+        raise Conflict("no_visit", "No visit of this patient is analysed, so there is no report over visits.")
     history = histories.read_history(reviewed, patient, walks, plans)
     titles = {a.session.id: a.session.title for a in walks}
     conditions = {a.session.id: a.condition.words for a in walks}

@@ -78,3 +78,18 @@ def compile_filters_once(orders: tuple[Order, Order] = ALL) -> None:
                 compile_filters(orders)
         finally:
             os.close(lock)
+
+
+def is_compiling() -> bool:
+    """Whether another process fills the folder of compiled filters now, so that a start waits for it."""
+    try:
+        lock = os.open(Path(os.environ[VARIABLE]), os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(lock)
+    return False

@@ -39,7 +39,7 @@ PAGES: Final = 20
 """Of each user."""
 
 WAIT: Final = 2.0
-"""Times as long that a page among so many users may take as all of theirs one after the other; measured .9."""
+"""Times as long that a page among so many users may take as all of theirs in turn; measured .9."""
 
 MARKS: Final = """
 if (window === window.top) {

@@ -44,9 +44,11 @@ def test_who_comes_in_the_middle_waits_for_the_end(tmp_path: Path, monkeypatch: 
     with ThreadPoolExecutor(1) as pool:
         running = pool.submit(compiling.compile_filters_once)
         assert begun.wait(10.0)
+        assert compiling.is_compiling()
         compiling.compile_filters_once()
         assert (tmp_path / "last.nbi").exists()
         running.result()
+    assert not compiling.is_compiling()
 
 
 def test_a_filter_that_does_not_compile_is_left_to_its_caller(
