@@ -41,6 +41,8 @@ MIGRATING = 0x5A610005
 """Of whoever migrates; the others wait."""
 NODES, DUTIES = 0x5A610003, 0x5A610004
 """First halves of those of one web server among several, and of one periodic duty."""
+FULL = ("too many clients", "remaining connection slots", "too many connections")
+"""PostgreSQL's words for a connection that it has no room for; it tells no code before one is made."""
 APPLICATION = "sagittal"
 """How its connections are called in PostgreSQL's list of them."""
 DELIVERY_SCHEMA = "procrastinate"
@@ -217,6 +219,11 @@ class PostgresServer:
         """Why the server cannot be used, and what to do."""
         said = " ".join(str(error.orig).split())
         attempt = getattr(error.orig, "pgconn", None)
+        if any(words in said for words in FULL):
+            return (
+                f"PostgreSQL has no connection left for {self.name} ({said}). Raise its max_connections, "
+                "or run fewer workers: each keeps two, a web server up to 56."
+            )
         asked = attempt is not None and (attempt.needs_password or attempt.used_password)
         if asked or "FATAL" in said:
             return (

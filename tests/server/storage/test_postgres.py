@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from alembic import command
-from sqlalchemy import insert, select
+from sqlalchemy import insert, make_url, select
 from sqlalchemy.exc import IntegrityError, OperationalError
 
 from server import audit
@@ -57,6 +57,13 @@ def test_every_reason_why_it_cannot_be_used_is_a_sentence(
         without.setitem(sys.modules, "psycopg", None)
         with pytest.raises(migrate.MigrationError, match=r"pip install '.\[postgres\]'"):
             migrate.upgrade(postgres)
+
+
+def test_a_server_without_room_for_a_connection_is_told_as_that(postgres: str) -> None:
+    run_sql("CREATE ROLE crowded LOGIN PASSWORD 'of nobody' CONNECTION LIMIT 0")
+    crowded = make_url(postgres).set(username="crowded", password="of nobody")
+    with pytest.raises(migrate.MigrationError, match=r"no connection left.* max_connections"):
+        migrate.upgrade(crowded.render_as_string(hide_password=False))
 
 
 def test_a_wrong_setting_is_named_without_what_may_be_a_password(tmp_path: Path) -> None:
