@@ -129,6 +129,11 @@ if (document.getElementById("signed-out")) {
     e.preventDefault();
     watch().then(({ cover }) => cover());
   });
+  // signed in from another tab: nothing of this page is theirs
+  document.addEventListener("another-person", () => {
+    letGo();
+    location.assign("/patients");
+  });
 }
 
 // Ctrl+P on a session prints its report; everywhere else the page itself, without what only a screen needs.

@@ -1,7 +1,6 @@
 // The end of a sign-in: told two minutes before, and when it came the page is covered, not left, so that what was
 // typed is still there after signing in again.
 import { request, showProblem } from "./common/api.js";
-import { letGo } from "./forms.js";
 import { formatClock } from "./common/words.js";
 
 const SOON_S = 120;
@@ -32,10 +31,7 @@ async function look() {
     return later(SOON_S); // the server cannot be reached: nothing is known
   }
   if (state === null) return cover();
-  if (state.name !== form.elements.name.value) {
-    letGo();
-    return location.assign("/patients"); // another tab, another person
-  }
+  if (state.name !== form.elements.name.value) return document.dispatchEvent(new Event("another-person"));
   if (out.open) out.close();
   if (state.left_s > SOON_S) {
     soon.close();
