@@ -130,6 +130,8 @@ PHRASES: Final = (
     "{value} % lost",
     "Change (noun)",
     "None (ghost)",
+    "✓ pass",
+    "! redo",
     "the other side",
     "M, {age} y",
     "F, {age} y",
