@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from server.main import main
+from server.processes.compile_cache import VARIABLE
 
 
 def test_a_key_in_a_folder_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -41,3 +42,12 @@ def test_a_server_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert main(["simulate", "--out", str(tmp_path), "--script", "swings_and_bows"]) == 0
     assert main(["replay", str(tmp_path / "recording.parquet"), "--to", free, "--code", "ABCDEF"]) == 1
     assert f"{free} cannot be reached (Connection refused); is the server running" in capsys.readouterr().err
+
+
+def test_filters_are_not_compiled_into_a_folder_that_cannot_be_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "file" / "filters"))
+    assert main(["warm"]) == 1
+    assert "Check the path, its rights and the disk." in capsys.readouterr().err
