@@ -157,6 +157,19 @@ DE: Final = load_catalogue("de")
             "within measurement error; includes how the person stood",
             "innerhalb des Messfehlers; enthält, wie die Person stand",
         ),
+        (
+            "3.4 cm forward, 2.1 cm down, 1.0 cm back",
+            "3,4 cm nach vorn, 2,1 cm nach unten, 1,0 cm nach hinten",
+        ),
+        ("0.600 ± 0.030\u202fm, entered", "0,600 ± 0,030\u202fm, eingegeben"),
+        (
+            "MCID 8.5°: Guzik et al. 2020 (J Clin Med 9:3305) (children).",
+            "MCID 8,5°: Guzik et al. 2020 (J Clin Med 9:3305) (Kinder).",
+        ),
+        (
+            "MDC 15.6°: Guzik et al. 2020 (Med 9:3305), 1.96 √2 of its error of measurement (children).",
+            "MDC 15,6°: Guzik et al. 2020 (Med 9:3305), 1,96 √2 ihres Messfehlers (Kinder).",
+        ),
     ],
 )
 def test_what_was_made_from_a_message_is_found_again(english: str, german: str) -> None:

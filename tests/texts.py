@@ -86,18 +86,16 @@ WORDS: Final = frozenset(
         r"\S+",
         """
     above acceleration active admin affected after ago anatomical and ankle assessment assessments
-    assistant away
-    bad bar barefoot bars baseline before below both bouts cane centimetres changed chest clinician
-    consistent copies copy crutch days degrees early ended estimated exact fading failed fast faster feet
-    female flexion foot frontal further good gravity harness heading higher hip inclination inconsistent
-    inside insoles inward kinematic knee larger late left less limits longer low lower male mean measured
-    median
-    months more moving narrower no none norm norms now off outward pace paused pelvis points poor probe
-    push-off reconstruction repetitions rhythm right rollator sagittal shank shoes shorter silent slow
-    slower smaller socks squat squats step steps steps/min stick still
-    stopped straighter stride strides tests thigh
-    threshold training trainings transverse treadmill trunk turns unaffected unknown usable viewer walk
-    walking week wider works yes
+    assistant away back bad bar barefoot bars baseline before below both bouts cane centimetres changed
+    chest children clinician complementary consistent copies copy crutch days degrees directions down
+    early ended entered estimated exact fading failed fast faster feet female flexion foot forward
+    frontal further good gravity harness heading higher hip inclination inconsistent inside insoles
+    inward kinematic knee larger late left less limits longer low lower male mean measured median months
+    more moving narrower no none norm norms now off on outward pace pass paused pelvis points poor probe
+    push-off reconstruction redo repetitions revoked rhythm right rollator sagittal shank shoes shorter
+    silent slow slower smaller socks squat squats step steps steps/min stick still stopped straighter
+    stride strides tests thigh threshold training trainings transverse treadmill trunk turns unaffected
+    unknown up usable viewer walk walking week wider works yes
         """,
     )
 )
@@ -112,6 +110,11 @@ PHRASES: Final = (
     "{end} ↑",
     "{end} ↓",
     "MDC {limit}: {source} ({people}).",
+    "MDC {limit}: {source}, 1.96 √2 of its error of measurement ({people}).",
+    "MDC {limit}: {source}, treadmill: the largest of its temporal limits, {least} to {most} % ({people}).",
+    "MDC {limit}: {source}, treadmill: the largest of its joint angles, {least} to {most}° ({people}).",
+    "MDC {limit}: {source}, treadmill, affected side ({people}).",
+    "{source}, treadmill",
     "MDC {limit}: {source}.",
     "MCID {limit}: {source} ({people}).",
     "MCID {limit}: {source}.",
@@ -126,6 +129,9 @@ PHRASES: Final = (
     "knee-ankle-foot orthosis",
     "{value} % lost",
     "Change (noun)",
+    "None (ghost)",
+    "✓ pass",
+    "! redo",
     "the other side",
     "M, {age} y",
     "F, {age} y",

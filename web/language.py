@@ -48,7 +48,7 @@ _NUMBERED: Final = re.compile(
     r"(.*[^\W\d_])((?:[\u2009\u202f ][±−+]?[\u2009\u202f ]?\d[\d.]*[ \u2009\u202f]?[°%]?)+)", re.DOTALL
 )
 """A word with its number."""
-_SENTENCE: Final = re.compile(r"(?<=[.!?…])\s+(?=[A-Z0-9“])")
+_SENTENCE: Final = re.compile(r"(?<=[.!?…])(?<!et al\.)\s+(?=[A-Z0-9“])")
 _JOINS: Final = ("; ", " · ", " → ", " | ", ": ", ", ", " – ", " and ")
 """What pages put between parts that are messages of their own, the strongest first."""
 

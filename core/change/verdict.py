@@ -208,7 +208,7 @@ def _plain(name: str, side: Side | None, unit: str, before: float | None, after:
 
 def _judged(change: Change, mdc: ChangeLimit | None, mcid: ChangeLimit | None) -> Change:
     if mcid is not None:
-        change = replace(change, mcid=mcid.value, mcid_source=f"{mcid.source}, {mcid.people}")
+        change = replace(change, mcid=mcid.value, mcid_source=f"{mcid.source} ({mcid.people})")
     if mdc is not None:
         change = replace(change, limit=mdc.value, limit_source=mdc.source, people=mdc.people)
     if change.difference is None:

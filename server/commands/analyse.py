@@ -40,17 +40,20 @@ def analyse(
     from server.services import analysing
 
     try:
+        overrides = read_overrides(config, estimator)
+        out.mkdir(parents=True, exist_ok=True)  # before minutes of work
         sources = list(list_source_files(paths))
         declared = read_named_file(manifest) if manifest else None
         with _ProgressBar() as bar:
             if is_compiling() or not has_compiled_filters():
                 bar.stage("compiling, once", 0.0)
             compile_filters_once(OFFLINE)
-            files = analysing.run(sources, declared, read_overrides(config, estimator), bar.stage)
+            files = analysing.run(sources, declared, overrides, bar.stage)
     except SagittalError as error:
         sys.stderr.write(f"Nothing analysable ({error.code}): {error.message}\n")
+        if error.code == "no_mapping":
+            sys.stderr.write("Here --manifest FILE says it (docs/formats.md).\n")
         return 1
-    out.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         fs.write_file(out / name, content)
     result = json.loads(files["analysis.json"])
@@ -71,7 +74,8 @@ def read_overrides(path: Path | None, estimator: str) -> dict[str, Any]:
     try:
         chosen = read_json(path.read_bytes()) if path else {}
     except (OSError, ValueError) as error:
-        raise InputError("config_unreadable", f"{path} cannot be read as JSON: {error}.") from error
+        why = getattr(error, "strerror", None) or error
+        raise InputError("config_unreadable", f"{path} cannot be read as JSON: {why}.") from error
     if not isinstance(chosen, dict) or not isinstance(chosen.get("poses", {}), dict):
         raise InputError("config_unreadable", f'{path} is not of the form {{"stage": {{"name": value}}}}.')
     if estimator != "auto":

@@ -29,6 +29,10 @@ def check(data_dir: Path | None, head: Path | None = None) -> int:
         findings = checks.check(db, open_blobs(settings), settings, kept_head=head)
     for finding in findings:
         sys.stdout.write(f"{finding.area}: {finding.message}\n")
-    sys.stdout.write(f"{len(findings)} problems in {settings.data_dir}\n" if findings else "All is well.\n")
+    sys.stdout.write(
+        f"{len(findings)} problem{'s' * (len(findings) > 1)} in {settings.data_dir}\n"
+        if findings
+        else "All is well.\n"
+    )
     sys.stdout.flush()
     return 1 if findings else 0

@@ -12,7 +12,7 @@ def keygen(path: Path) -> int:
 
     try:
         public = make_key(path.absolute())
-    except (BackupFileError, OSError) as error:
+    except BackupFileError as error:
         sys.stderr.write(f"{error}\n")
         return 1
     sys.stdout.write(

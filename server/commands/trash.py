@@ -18,14 +18,16 @@ def trash(data_dir: Path | None, restore: bool) -> int:
 
     settings = load_settings({"data_dir": data_dir})
     if not restore:
-        discarded = open_blobs(settings).trash
-        files = list(discarded.files())
-        if not files:  # those of a lost database are listed without it
-            try:
+        try:
+            if not (settings.bucket or settings.blobs.is_dir()):  # opening would make the folder
                 require_database(settings.database_source)
-            except MigrationError as error:
-                sys.stderr.write(f"{error}\n")
-                return 1
+            discarded = open_blobs(settings).trash
+            files = list(discarded.files())
+            if not files:  # those of a lost database are listed without it
+                require_database(settings.database_source)
+        except MigrationError as error:
+            sys.stderr.write(f"{error}\n")
+            return 1
         for one in files:
             sys.stdout.write(
                 f"{one.since:%Y-%m-%d %H:%M}Z, until {one.until:%Y-%m-%d}: {one.size} bytes, "

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 from server.commands.serve import say
 from server.processes.compile_cache import VARIABLE
 from server.processes.compiling import compile_filters
+from server.storage import fs
 
 
 def warm() -> int:
@@ -20,7 +22,11 @@ def warm() -> int:
         ("filters of takes and of live sessions, two at a time", compile_filters),
         ("a whole analysis of a simulated walk", _analyse_walk),
     )
-    say(f"Compiling into {os.environ[VARIABLE]}")
+    folder = Path(os.environ[VARIABLE])
+    fs.make_folder(folder)
+    with fs.open_scratch(folder):  # minutes of work that could not be kept help nobody
+        pass
+    say(f"Compiling into {folder}")
     for k, (name, compile_step) in enumerate(steps, 1):
         began = time.monotonic()
         compile_step()

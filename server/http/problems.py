@@ -146,6 +146,8 @@ def install(app: FastAPI) -> None:
 
     async def handle(connection: HTTPConnection, error: Exception) -> Response | None:
         problem = as_problem(error)
+        if _names_nothing(error) and _wants_page(connection):
+            problem = Problem(404, "not_found", SENTENCES["not_found"])  # an address cut short
         if problem.status == HTTPStatus.INTERNAL_SERVER_ERROR and isinstance(error, LOGGED_HERE):
             log.error("%s %s", connection.scope["type"], problem.code, exc_info=error)
         if problem.status == HTTPStatus.INSUFFICIENT_STORAGE:
@@ -187,6 +189,11 @@ def _wants_page(connection: HTTPConnection) -> bool:
     # a form of a page without scripts posts to the API and is a browser's page request all the same
     is_form = connection.headers.get("content-type", "").startswith("application/x-www-form-urlencoded")
     return is_form or not connection.url.path.startswith(("/api/", "/health/", "/static/"))
+
+
+def _names_nothing(error: Exception) -> bool:
+    """Whether an id in the path has not the form that ids have, so that there is nothing at the address."""
+    return isinstance(error, RequestValidationError) and any(e["loc"][0] == "path" for e in error.errors())
 
 
 def _without_input(item: Mapping[str, Any]) -> str:

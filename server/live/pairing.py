@@ -49,7 +49,11 @@ def pair(address: str, code: str) -> PairingResult:
     except urllib.error.HTTPError as refused:
         raise _refusal(refused) from None
     except (OSError, ValueError) as error:
-        raise LiveError("unreachable", f"{base} cannot be reached: {error}.") from None
+        cause = getattr(error, "reason", error)
+        why = getattr(cause, "strerror", None) or cause
+        raise LiveError(
+            "unreachable", f"{base} cannot be reached ({why}); is the server running, and the address right?"
+        ) from None
     scheme = "wss" if parts.scheme == "https" else "ws"
     return PairingResult(
         token=said["token"],

@@ -93,7 +93,11 @@ class IncomingFile:
         self._limit = limit
         self._hash = hashlib.sha256()
         self._kept = False
-        self._fd: int | None = system.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
+        try:
+            self._fd: int | None = system.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
+        except OSError as error:
+            error.filename = str(folder)  # a name that nobody chose helps nobody
+            raise
 
     @property
     def sha256(self) -> str:

@@ -33,6 +33,8 @@ def test_no_clinic_begins_in_a_wrong_folder(
     assert main([*command, "--data", str(wrong)]) == 1
     assert f"There is no database in {wrong}; give the folder with --data.\n" in capsys.readouterr().err
     assert not (wrong / "sagittal.db").exists()
+    if command == ["trash"]:  # which only reads
+        assert list(wrong.iterdir()) == []
 
 
 def test_a_user_of_a_new_clinic_is_told_that_it_is_new(

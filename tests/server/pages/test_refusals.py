@@ -64,3 +64,13 @@ async def test_the_page_of_a_refusal_is_german(tmp_path: Path) -> None:
     assert message.split(",")[1] in english.text
     assert "Nicht vorhanden oder gelöscht: Patient" in german.text
     assert "has been deleted" not in german.text
+
+
+async def test_an_address_cut_short_has_nothing_and_says_so(tmp_path: Path) -> None:
+    async with open_clinic(tmp_path) as clinic, clinic.client(Role.CLINICIAN) as client:
+        page = await client.get("/sessions/0123abc", headers={"accept": "text/html"})
+        program = await client.get("/api/v1/sessions/0123abc")
+    assert page.status_code == 404
+    assert "There is nothing at this address" in page.text
+    assert "pattern" not in page.text
+    assert program.json()["code"] == "invalid_request"

@@ -59,7 +59,7 @@ function summarise() {
   const source = target?.closest("[data-source]").querySelector("b").textContent;
   const told = [...form.querySelectorAll('input[name="modes"]:checked')].map((m) => lowered(m.parentElement.querySelector("b").textContent));
   const what = option().textContent.trim().split(",")[0];
-  const wanted = (value || speak`not known yet`) + (source && value ? ` (${lowered(source)})` : "");
+  const wanted = (value || speak`not known yet`) + (source && value && target?.value !== "manual" ? ` (${lowered(source)})` : "");
   form.querySelector("[data-summary]").textContent = speak`${what}, ${side || speak`both sides`}; target ${wanted}; told by ${told.join(speak` and `) || speak`nothing yet`}.`;
 }
 
