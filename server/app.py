@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 from server.settings import Settings
 
 if TYPE_CHECKING:
     from fastapi import FastAPI
+    from starlette.routing import BaseRoute
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -22,8 +24,6 @@ def create_app(settings: Settings) -> FastAPI:
     from fastapi import FastAPI
     from starlette.middleware import Middleware
 
-    from server.api.routes import BESIDE, build_api
-    from server.auth.routes import list_declared_actions
     from server.http import problems
     from server.http.body_limit import BodyLimit
     from server.http.compression import Compression
@@ -35,10 +35,7 @@ def create_app(settings: Settings) -> FastAPI:
     from server.metrics import RequestMetrics
     from server.nodes.forwarding import Forwarding
     from server.nodes.known import KnownNodes
-    from server.pages.assets import STATIC, Assets
-    from server.pages.routes import ROUTERS
     from server.services.provenance import CODE_VERSION
-    from server.viewer import live_proxy, proxy
 
     metrics = RequestMetrics()
     app = FastAPI(
@@ -50,6 +47,7 @@ def create_app(settings: Settings) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         lifespan=run_installation,
+        routes=list(wire_routes()),
         middleware=[
             Middleware(RequestObserver, line=settings.log_format == "json", observe=metrics.observe),
             Middleware(Compression),
@@ -64,8 +62,29 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.settings = settings
     app.state.metrics = metrics
     problems.install(app)
-    for router in (build_api(app), *BESIDE, *ROUTERS, proxy.router, live_proxy.router):
-        app.include_router(router)
-    app.mount("/static", Assets(directory=STATIC), name="static")
-    list_declared_actions(app.routes)
     return app
+
+
+@cache
+def wire_routes() -> tuple[BaseRoute, ...]:
+    """Return the routes of every application, checked; nothing in them belongs to one installation.
+
+    Raises
+    ------
+    UndeclaredRouteError
+        a route declares no action.
+    """
+    from fastapi import APIRouter
+
+    from server.api.routes import BESIDE, build_api
+    from server.auth.routes import list_declared_actions
+    from server.pages.assets import STATIC, Assets
+    from server.pages.routes import ROUTERS
+    from server.viewer import live_proxy, proxy
+
+    whole = APIRouter()
+    for router in (build_api(), *BESIDE, *ROUTERS, proxy.router, live_proxy.router):
+        whole.include_router(router)
+    whole.mount("/static", Assets(directory=STATIC), name="static")
+    list_declared_actions(whole.routes)
+    return tuple(whole.routes)

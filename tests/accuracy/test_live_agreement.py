@@ -1,4 +1,7 @@
-"""Mistakes of a clinic while samples come: told after how long, of whom, and whether as the file does."""
+"""Mistakes of a clinic while samples come: told after how long, of whom, and whether as the file does.
+
+Every run has a third of the mistakes of two walks; all are run with `--write-figures`.
+"""
 
 from __future__ import annotations
 
@@ -98,8 +101,8 @@ def late_or_exchanged(name: str) -> Mapping[tuple[str, str], Heard]:
     right = take(name)
     return {
         (kind, case): hear(make(right), stood(name), stood(name)[0] / right.rate_hz)
-        for kind in (*LAGS, "exchanged")
-        for case, make in cases_of(name, kind).items()
+        for n, kind in enumerate((*LAGS, "exchanged"))
+        for case, make in sample(tuple(cases_of(name, kind).items()), 3, n)
     }
 
 
@@ -110,8 +113,8 @@ def slipped(name: str) -> Mapping[tuple[str, Segment], Heard]:
     if name.startswith("neura_walk"):
         at_s += right.t_s[-1] + 1.0 / right.rate_hz
         right = walk_again(right, WALKS)
-    for kind, by_deg in SLIPS.items():
-        for segment in LEG_SENSORS:
+    for n, (kind, by_deg) in enumerate(SLIPS.items()):
+        for segment in sample(LEG_SENSORS, 3, n):
             if not (name == "healthy" and segment.endswith("_r")):
                 wrong = slip_sensor(right, segment, np.radians(by_deg), at_s)
                 found[kind, segment] = hear(wrong, stood(name), at_s)
@@ -133,7 +136,8 @@ def test_a_slip_is_told_of_the_right_sensor(name: str) -> None:
     for (kind, segment), x in found.items():
         assert x.told <= {("sensor_slipped", segment)}, (kind, segment)
     large = [x for (kind, _), x in found.items() if "15°" in kind]
-    assert sum(bool(x.told) for x in large) >= (9 if name.startswith("neura_walk") else len(large))
+    share = 0.75 if name.startswith("neura_walk") else 1.0
+    assert sum(bool(x.told) for x in large) >= share * len(large) > 0
 
 
 @cache
