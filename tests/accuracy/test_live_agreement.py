@@ -143,13 +143,13 @@ def test_a_slip_is_told_of_the_right_sensor(name: str) -> None:
 @cache
 def right_walks() -> Mapping[str, UniformRecording]:
     walks = {x: take(x) for x in TAKES} | {"qmt_fullbody": qmt_take(QMT)}
-    for name in sample(list(SCRIPTS), 3):
+    for name in sample(list(SCRIPTS), 6):
         made = simulated(name, 1)[0]
         walks[f"{name}, script"] = only(made, *(s for s in WORN if s in made.sensors))
-    for name, seed, height in sample(PEOPLE, 3):
+    for name, seed, height in sample(PEOPLE, 6):
         scene = simulate_scenario(name, seed=seed, height_m=height)
         walks[f"{name}, {height} m"] = synchronise(seven(scene.recording))
-    for k, name in sample(list(enumerate(sorted(PATIENTS))), 3, 1):
+    for k, name in sample(list(enumerate(sorted(PATIENTS))), 6, 1):
         walks[f"{name}, again"] = synchronise(seven(simulate_scenario(name, seed=300 + k).recording))
     return walks
 
