@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -31,7 +33,6 @@ def create_app(settings: Settings) -> FastAPI:
     from server.http.headers import SecurityHeaders
     from server.http.hosts import HostGuard
     from server.http.requests import RequestObserver
-    from server.lifespan import run_installation
     from server.metrics import RequestMetrics
     from server.nodes.forwarding import Forwarding
     from server.nodes.known import KnownNodes
@@ -46,7 +47,7 @@ def create_app(settings: Settings) -> FastAPI:
         openapi_url=None,
         docs_url=None,
         redoc_url=None,
-        lifespan=run_installation,
+        lifespan=_run,
         routes=list(wire_routes()),
         middleware=[
             Middleware(RequestObserver, line=settings.log_format == "json", observe=metrics.observe),
@@ -65,9 +66,21 @@ def create_app(settings: Settings) -> FastAPI:
     return app
 
 
+@asynccontextmanager
+async def _run(app: FastAPI) -> AsyncIterator[None]:
+    """Open what the application needs while the block runs."""
+    from server.lifespan import run_installation
+    from server.viewer.proxy import open_views
+
+    async with run_installation(app), open_views(app):
+        yield
+
+
 @cache
 def wire_routes() -> tuple[BaseRoute, ...]:
     """Return the routes of every application, checked; nothing in them belongs to one installation.
+
+    A router of FastAPI's may have a lifespan; here it would be lost: what is opened is opened by `_run`.
 
     Raises
     ------
