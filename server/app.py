@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from functools import cache
 from typing import TYPE_CHECKING
 
 from server.settings import Settings
 
 if TYPE_CHECKING:
     from fastapi import FastAPI
+    from starlette.routing import BaseRoute
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -22,8 +26,6 @@ def create_app(settings: Settings) -> FastAPI:
     from fastapi import FastAPI
     from starlette.middleware import Middleware
 
-    from server.api.routes import BESIDE, build_api
-    from server.auth.routes import list_declared_actions
     from server.http import problems
     from server.http.body_limit import BodyLimit
     from server.http.compression import Compression
@@ -31,14 +33,10 @@ def create_app(settings: Settings) -> FastAPI:
     from server.http.headers import SecurityHeaders
     from server.http.hosts import HostGuard
     from server.http.requests import RequestObserver
-    from server.lifespan import run_installation
     from server.metrics import RequestMetrics
     from server.nodes.forwarding import Forwarding
     from server.nodes.known import KnownNodes
-    from server.pages.assets import STATIC, Assets
-    from server.pages.routes import ROUTERS
     from server.services.provenance import CODE_VERSION
-    from server.viewer import live_proxy, proxy
 
     metrics = RequestMetrics()
     app = FastAPI(
@@ -49,7 +47,8 @@ def create_app(settings: Settings) -> FastAPI:
         openapi_url=None,
         docs_url=None,
         redoc_url=None,
-        lifespan=run_installation,
+        lifespan=_run,
+        routes=list(wire_routes()),
         middleware=[
             Middleware(RequestObserver, line=settings.log_format == "json", observe=metrics.observe),
             Middleware(Compression),
@@ -64,8 +63,41 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.settings = settings
     app.state.metrics = metrics
     problems.install(app)
-    for router in (build_api(app), *BESIDE, *ROUTERS, proxy.router, live_proxy.router):
-        app.include_router(router)
-    app.mount("/static", Assets(directory=STATIC), name="static")
-    list_declared_actions(app.routes)
     return app
+
+
+@asynccontextmanager
+async def _run(app: FastAPI) -> AsyncIterator[None]:
+    """Open what the application needs while the block runs."""
+    from server.lifespan import run_installation
+    from server.viewer.proxy import open_views
+
+    async with run_installation(app), open_views(app):
+        yield
+
+
+@cache
+def wire_routes() -> tuple[BaseRoute, ...]:
+    """Return the routes of every application, checked; nothing in them belongs to one installation.
+
+    A router of FastAPI's may have a lifespan; here it would be lost: what is opened is opened by `_run`.
+
+    Raises
+    ------
+    UndeclaredRouteError
+        a route declares no action.
+    """
+    from fastapi import APIRouter
+
+    from server.api.routes import BESIDE, build_api
+    from server.auth.routes import list_declared_actions
+    from server.pages.assets import STATIC, Assets
+    from server.pages.routes import ROUTERS
+    from server.viewer import live_proxy, proxy
+
+    whole = APIRouter()
+    for router in (build_api(), *BESIDE, *ROUTERS, proxy.router, live_proxy.router):
+        whole.include_router(router)
+    whole.mount("/static", Assets(directory=STATIC), name="static")
+    list_declared_actions(whole.routes)
+    return tuple(whole.routes)

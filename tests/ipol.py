@@ -14,8 +14,10 @@ import numpy as np
 
 from core.formats import SourceFile, parse_manifest, read_recording
 from core.frames import FOOT, SIDES, Floats, Segment, Side
+from core.pipeline import TakeAnalysis, analyse
 from core.recording import Recording, Subject
 from tests.data import data_folder
+from tests.kept import keep_recorded
 
 RATE: Final = 100.0
 SUBJECTS: Final = ("11", "12", "13", "14")
@@ -72,6 +74,12 @@ def ipol_recording(walk: str, *segments: Segment) -> Recording:
         segments={d: s for d, s in whole.segments.items() if s in worn},
         subject=Subject(height_m=height_cm / 100.0 if np.isfinite(height_cm) else None),
     )
+
+
+@keep_recorded
+def ipol_analysis(walk: str, *segments: Segment) -> TakeAnalysis:
+    """What the product makes of it."""
+    return analyse(ipol_recording(walk, *segments))
 
 
 def first_s(recording: Recording) -> float:

@@ -29,6 +29,8 @@ PASSWORD: Final = "of the tests"
 OPTIONS: Final = (
     "fsync=off",
     "full_page_writes=off",
+    # with hundreds of databases its workers come several times a second; none of them lives long enough
+    "autovacuum=off",
     "unix_socket_directories=",
     "listen_addresses=127.0.0.1",
     "max_connections=200",

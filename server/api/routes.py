@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, Request
 
 from server.api import (
     analyses,
@@ -56,7 +56,7 @@ BESIDE: tuple[APIRouter, ...] = (sign_in.address_router, health.router, metrics.
 """Routes outside /api/v1."""
 
 
-def build_api(app: FastAPI) -> APIRouter:
+def build_api() -> APIRouter:
     """Return everything under /api/v1, with the document that describes it."""
     api = APIRouter(prefix="/api/v1")
     for part in (
@@ -101,8 +101,8 @@ def build_api(app: FastAPI) -> APIRouter:
     api.include_router(filters.references)
 
     @api.get("/openapi.json", include_in_schema=False)
-    def document(who: Annotated[Identity, require(Action.READ_API)]) -> dict[str, Any]:
+    def document(request: Request, who: Annotated[Identity, require(Action.READ_API)]) -> dict[str, Any]:
         """Describe this API as OpenAPI."""
-        return openapi(app)
+        return openapi(request.app)
 
     return api

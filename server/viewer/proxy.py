@@ -90,14 +90,15 @@ Reader = Annotated[Identity, require(Action.READ_RESULT)]
 
 
 @contextlib.asynccontextmanager
-async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+async def open_views(app: FastAPI) -> AsyncIterator[None]:
+    """Keep the figures that are looked at in `app.state.views` while the block runs."""
     nodes: Nodes = app.state.nodes
     async with FigureViews(make_id=lambda: nodes.make_id_here(new_id)).run() as views:
         app.state.views = views
         yield
 
 
-router = APIRouter(lifespan=_lifespan, include_in_schema=False)
+router = APIRouter(include_in_schema=False)
 
 
 @router.get("/views/{view_id}/")

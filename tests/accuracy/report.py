@@ -54,22 +54,38 @@ FIGURES: Final = (
 _NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?")
 
 
-def record(section: str, header: Sequence[str], rows: Sequence[Sequence[str]], note: str = "") -> None:
+def record(
+    section: str, header: Sequence[str], rows: Sequence[Sequence[str]], note: str = "", *, whole: bool = True
+) -> None:
     """Compare one section of docs/accuracy.md, a table and a note, with what was measured; or replace it.
+
+    Parameters
+    ----------
+    whole : False where this run has measured some of the rows: those and the header are compared, the note is
+        not. Where figures are written it must have all.
 
     Raises
     ------
     AssertionError
         a word differs, or a number by more than one unit of its last printed digit.
     """
-    text = _table(header, rows, note)
+    text = _table(header, rows, note if whole else "")
     if os.environ.get(WRITE):
+        assert whole, f"'{section}' would lose the rows that were not measured"
         _replace(section, lambda _: text)
         return
     printed = read_sections().get(section)
     assert printed is not None, f"docs/accuracy.md has no section '{section}': {_HOW}"
+    if not whole:
+        printed = _choose_rows(printed, text)
     differences = find_differences(printed, text)
     assert not differences, f"docs/accuracy.md, '{section}': {_HOW}\n" + "\n".join(differences)
+
+
+def _choose_rows(printed: str, measured: str) -> str:
+    """Lines of a printed table whose first cell one of the measured table has."""
+    names = {line.split(" | ")[0] for line in measured.splitlines()}
+    return "\n".join(line for line in printed.splitlines() if line.split(" | ")[0] in names)
 
 
 def record_speed(section: str, header: Sequence[str], rows: Sequence[Sequence[str]], note: str = "") -> None:

@@ -17,14 +17,13 @@ from core.body.erkf.poses import ErkfRun, foot_tracks, replace_orientations, run
 from core.body.mounting import MountedSensors
 from core.body.tree import PRESETS
 from core.frames import FOOT, SHANK, SIDES, Bools, Floats
-from core.pipeline import TakeAnalysis, analyse
 from core.rest import index_window
 from core.rotation import wrap_angle
 from core.simulate import WalkTruth, simulate_scenario
 from tests.accuracy.neura import SHIPPED, Chain, chain, take
 from tests.accuracy.report import record
 from tests.accuracy.test_neura_walk import scores
-from tests.accuracy.test_setup_mistakes import right
+from tests.accuracy.test_setup_mistakes import analyse_right
 from tests.marks import where_figures_are_written
 from tests.walks import analysed
 
@@ -125,12 +124,6 @@ def test_write_down_what_arms_from_motion_gain() -> None:
         assert both[1][key].offset_removed < both[0][key].offset_removed + 0.15, key
 
 
-@cache
-def other_person() -> TakeAnalysis:
-    """qmt_fullbody, which has no reference."""
-    return analyse(right("qmt_fullbody"))
-
-
 def ends_apart_mm(mounted: MountedSensors, arms: MeasuredArms | None) -> float:
     """RMS distance of the two ends of all joints while walking."""
     track = filter_take(mounted, arms).track
@@ -139,7 +132,7 @@ def ends_apart_mm(mounted: MountedSensors, arms: MeasuredArms | None) -> float:
 
 
 def _say_joints() -> str:
-    mounted = other_person().mounted
+    mounted = analyse_right("qmt_fullbody").mounted
     assert mounted is not None
     a, b = (ends_apart_mm(mounted, arms) for arms in (None, mounted.arms))
     assert b < a
@@ -148,7 +141,7 @@ def _say_joints() -> str:
 
 def test_left_and_right_sit_alike_on_real_people() -> None:
     """Nothing ties both legs together: who was fitted alike on both sides must come out alike."""
-    mounted = other_person().mounted
+    mounted = analyse_right("qmt_fullbody").mounted
     assert mounted is not None
     assert mounted.arms is not None
     for pair in (SHANK, FOOT):

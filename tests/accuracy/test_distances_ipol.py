@@ -25,7 +25,7 @@ from tests.accuracy.gaitmap import COPIES, recording_of, resampled, true_strides
 from tests.accuracy.gaitmap import RATE as GAITMAP_RATE
 from tests.accuracy.report import record
 from tests.accuracy.test_gaitmap_strides import errors, take
-from tests.ipol import FEET, RATE, WALKS, checked_events, first_s, ipol_recording
+from tests.ipol import FEET, RATE, WALKS, checked_events, first_s, ipol_analysis, ipol_recording
 
 pytestmark = pytest.mark.accuracy
 
@@ -40,21 +40,16 @@ HOLE = 6
 """Packets taken out of one swing in three of gaitmap_foot at 100 Hz."""
 
 
-@cache
-def analysed(walk: str) -> TakeAnalysis:
-    return analyse(ipol_recording(walk, *FEET))
-
-
 def counted(walk: str) -> int:
     """Counted strides with a length."""
-    measured = analysed(walk).measured
+    measured = ipol_analysis(walk, *FEET).measured
     assert measured is not None
     return sum(p.n for p in measured.parameters if p.name == "stride_length_m")
 
 
 def ways(walk: str, side: Side) -> tuple[float, float, float]:
     """Straight ways of one foot to the turn, back, and from its first place to its last, m."""
-    feet, events = analysed(walk).feet, checked_events(walk)
+    feet, events = ipol_analysis(walk, *FEET).feet, checked_events(walk)
     assert feet is not None
     off, p = first_s(ipol_recording(walk, *FEET)), feet.p[side][:, :2]
     times = (events.walk_s[0] - BEFORE_S, float(np.mean(events.turn_s)), events.walk_s[1] + AFTER_S)
@@ -132,12 +127,12 @@ def test_one_moment_in_each_stance_is_nearly_as_good_as_all_of_its_rest(side: Si
 
 def test_brisk_walkers_have_distances_and_no_foot_is_said_never_to_rest() -> None:
     for walk in WALKS:
-        assert "foot_never_still" not in {n.code for n in analysed(walk).notices}
+        assert "foot_never_still" not in {n.code for n in ipol_analysis(walk, *FEET).notices}
         assert counted(walk) >= (8 if walk in LOST else 12)
 
 
 def test_nobody_is_told_to_wear_the_feet_exchanged() -> None:
-    assert not any("feet_exchanged" in {n.code for n in analysed(w).notices} for w in WALKS)
+    assert not any("feet_exchanged" in {n.code for n in ipol_analysis(w, *FEET).notices} for w in WALKS)
 
 
 def test_the_way_back_is_as_long_as_the_way_there() -> None:

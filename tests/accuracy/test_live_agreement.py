@@ -1,4 +1,7 @@
-"""Mistakes of a clinic while samples come: told after how long, of whom, and whether as the file does."""
+"""Mistakes of a clinic while samples come: told after how long, of whom, and whether as the file does.
+
+Every run has a third of the mistakes of two walks; all are run with `--write-figures`.
+"""
 
 from __future__ import annotations
 
@@ -98,8 +101,8 @@ def late_or_exchanged(name: str) -> Mapping[tuple[str, str], Heard]:
     right = take(name)
     return {
         (kind, case): hear(make(right), stood(name), stood(name)[0] / right.rate_hz)
-        for kind in (*LAGS, "exchanged")
-        for case, make in cases_of(name, kind).items()
+        for n, kind in enumerate((*LAGS, "exchanged"))
+        for case, make in sample(tuple(cases_of(name, kind).items()), 3, n)
     }
 
 
@@ -110,8 +113,8 @@ def slipped(name: str) -> Mapping[tuple[str, Segment], Heard]:
     if name.startswith("neura_walk"):
         at_s += right.t_s[-1] + 1.0 / right.rate_hz
         right = walk_again(right, WALKS)
-    for kind, by_deg in SLIPS.items():
-        for segment in LEG_SENSORS:
+    for n, (kind, by_deg) in enumerate(SLIPS.items()):
+        for segment in sample(LEG_SENSORS, 3, n):
             if not (name == "healthy" and segment.endswith("_r")):
                 wrong = slip_sensor(right, segment, np.radians(by_deg), at_s)
                 found[kind, segment] = hear(wrong, stood(name), at_s)
@@ -133,19 +136,20 @@ def test_a_slip_is_told_of_the_right_sensor(name: str) -> None:
     for (kind, segment), x in found.items():
         assert x.told <= {("sensor_slipped", segment)}, (kind, segment)
     large = [x for (kind, _), x in found.items() if "15°" in kind]
-    assert sum(bool(x.told) for x in large) >= (9 if name.startswith("neura_walk") else len(large))
+    share = 0.75 if name.startswith("neura_walk") else 1.0
+    assert sum(bool(x.told) for x in large) >= share * len(large) > 0
 
 
 @cache
 def right_walks() -> Mapping[str, UniformRecording]:
     walks = {x: take(x) for x in TAKES} | {"qmt_fullbody": qmt_take(QMT)}
-    for name in sample(list(SCRIPTS), 3):
+    for name in sample(list(SCRIPTS), 6):
         made = simulated(name, 1)[0]
         walks[f"{name}, script"] = only(made, *(s for s in WORN if s in made.sensors))
-    for name, seed, height in sample(PEOPLE, 3):
+    for name, seed, height in sample(PEOPLE, 6):
         scene = simulate_scenario(name, seed=seed, height_m=height)
         walks[f"{name}, {height} m"] = synchronise(seven(scene.recording))
-    for k, name in sample(list(enumerate(sorted(PATIENTS))), 3, 1):
+    for k, name in sample(list(enumerate(sorted(PATIENTS))), 6, 1):
         walks[f"{name}, again"] = synchronise(seven(simulate_scenario(name, seed=300 + k).recording))
     return walks
 

@@ -1,7 +1,7 @@
 """The live chain against the truth of virtual people: angles, distances and contacts as a tablet shows them.
 
 Sensors sit on skin and have the errors of their kind; the chain calibrates itself on the first steps. Only
-what comes after is scored.
+what comes after is scored. Every run walks a third of the people; all walk with `--write-figures`.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from core.rotation import yaw
 from core.simulate import WalkTruth
 from tests.accuracy.report import record
 from tests.live_walks import Run, recorded
+from tests.marks import WRITES, sample, where_figures_are_written
 from tests.walks import only, simulated
 
 PEOPLE = (
@@ -116,7 +117,7 @@ def of(person: str, seed: int) -> Scored:
     return scored(recorded(recording), truth)
 
 
-@pytest.mark.parametrize("person", PEOPLE)
+@pytest.mark.parametrize("person", sample(PEOPLE, 3))
 def test_what_is_shown_live_is_what_the_person_does(person: str) -> None:
     for seed in SEEDS:
         made = of(person, seed)
@@ -147,16 +148,18 @@ def relative_heading_deg(seed: int) -> Floats:
 
 
 def test_feet_do_not_drift_off_the_pelvis() -> None:
-    held = relative_heading_deg(1)
+    assert np.abs(relative_heading_deg(1)).max() < DRIFT_DEG
+
+
+@where_figures_are_written
+def test_feet_that_are_not_held_drift_off_the_pelvis() -> None:
     with patch.object(HeadingHold, "push", lambda *_: None):
-        free = relative_heading_deg(1)
-    assert np.abs(free).max() > 2.0 * DRIFT_DEG
-    assert np.abs(held).max() < DRIFT_DEG
+        assert np.abs(relative_heading_deg(1)).max() > 2.0 * DRIFT_DEG
 
 
 def test_write_down_the_figures() -> None:
     rows = []
-    for person in PEOPLE:
+    for person in sample(PEOPLE, 3):
         made = [of(person, seed) for seed in SEEDS]
         strides = np.concatenate([x.strides for x in made])
         contacts = np.concatenate([x.contacts for x in made])
@@ -175,4 +178,5 @@ def test_write_down_the_figures() -> None:
         "− true; initial contacts, told − true, median. Limits: flexions "
         f"{FLEXION_DEG:g}°, frontal {FRONTAL_DEG:g}°, rotations {ROTATION_DEG:g}°, length {STRIDE_BIAS_MM:g} "
         f"± {STRIDE_SD_MM:g} mm, contact {CONTACT_MS:g} ms. Simulated: this shows the code, not people.",
+        whole=WRITES,
     )

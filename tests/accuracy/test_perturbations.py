@@ -26,7 +26,7 @@ from tests.accuracy.report import record
 from tests.accuracy.test_events_trunk_qmt import take as qmt_take
 from tests.marks import WRITES, sample, where_figures_are_written
 from tests.perturbations import delay_sensor, find_middle, slip_sensor
-from tests.walks import neura_recording
+from tests.walks import neura_analysis
 
 MOST_DEG = 3.0
 """RMS difference of a flexion angle that may go untold."""
@@ -58,8 +58,8 @@ def seven(recording: Recording) -> Recording:
 
 @cache
 def clean(name: str) -> TakeAnalysis:
-    source = neura_recording() if name == "neura_walk" else simulate_scenario(name, seed=5).recording
-    return analyse(seven(source))
+    # of neura_walk there are seven sensors
+    return neura_analysis() if name == "neura_walk" else analyse(seven(simulate_scenario(name, 5).recording))
 
 
 def kill(segment: Segment, channels: slice, value: float) -> Make:

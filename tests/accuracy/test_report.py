@@ -41,6 +41,19 @@ def test_a_section_that_is_not_there_fails(monkeypatch: pytest.MonkeyPatch) -> N
         record("Nowhere", ["a"], [["1"]])
 
 
+def test_some_rows_are_held_against_their_own_and_the_rest_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(report.WRITE, raising=False)
+    printed = "| a | b |\n| --- | --- |\n| one | 1.0 |\n| two | 2.0 |\n| three | 3.0 |\n\nA note."
+    monkeypatch.setattr(report, "read_sections", lambda: {"Some": printed})
+    record("Some", ["a", "b"], [["one", "1.0"], ["three", "3.1"]], "Another.", whole=False)
+    for wrong in (["three", "3.2"], ["four", "4.0"]):
+        with pytest.raises(AssertionError, match=wrong[1]):
+            record("Some", ["a", "b"], [["one", "1.0"], wrong], whole=False)
+    monkeypatch.setenv(report.WRITE, "1")
+    with pytest.raises(AssertionError, match="would lose"):
+        record("Some", ["a", "b"], [["one", "1.0"]], whole=False)
+
+
 def test_nothing_is_written_without_being_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(report.WRITE, raising=False)
     before = report.PATH.read_bytes()

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from core.frames import SIDES, Floats, Side
-from core.pipeline import analyse
 from tests.accuracy.report import record
-from tests.ipol import FEET, SUBJECTS, WALKS, ipol_recording
+from tests.ipol import FEET, SUBJECTS, WALKS, ipol_analysis
 
 pytestmark = pytest.mark.accuracy
 
@@ -24,7 +23,7 @@ SPREAD_DEG = 5.0
 @cache
 def toe_out(walk: str) -> dict[Side, float]:
     """Mean of a walk in degrees by side, where it is told."""
-    found = analyse(ipol_recording(walk, *FEET)).parameters
+    found = ipol_analysis(walk, *FEET).parameters
     return {p.side: p.mean for p in found if p.name == "toe_out_deg" and p.side and p.mean is not None}
 
 

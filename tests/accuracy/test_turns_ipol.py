@@ -7,17 +7,15 @@ a low-pass filter keeps it, not on these; that the turns agree is the test.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
 from core.frames import Floats, Segment
 from core.pipeline import analyse
-from core.pipeline.analysis import TakeAnalysis
 from core.simulate import simulate_scenario
 from tests.accuracy.report import record
-from tests.ipol import FEET, WALKS, checked_events, first_s, ipol_recording
+from tests.ipol import FEET, WALKS, checked_events, first_s, ipol_analysis, ipol_recording
 
 pytestmark = pytest.mark.accuracy
 
@@ -25,16 +23,11 @@ WORN: dict[str, tuple[Segment, ...]] = {"lower back": ("pelvis",), "both feet": 
 EDGE_S = 0.2
 
 
-@cache
-def analysed(walk: str, worn: str) -> TakeAnalysis:
-    return analyse(ipol_recording(walk, *WORN[worn]))
-
-
 def edge_errors(worn: str) -> Floats:
     """(walks, 2) begin and end of the turn minus those of the people, s."""
     errors = []
     for walk in WALKS:
-        measured, off = analysed(walk, worn).measured, first_s(ipol_recording(walk, *WORN[worn]))
+        measured, off = ipol_analysis(walk, *WORN[worn]).measured, first_s(ipol_recording(walk, *WORN[worn]))
         assert measured is not None
         true = np.array(checked_events(walk).turn_s)
         found = [np.array((t.start_s, t.end_s)) + off for t in measured.turns]
@@ -44,7 +37,7 @@ def edge_errors(worn: str) -> Floats:
 
 def stops(worn: str) -> int:
     """Walks in which a stop is told."""
-    found = [analysed(walk, worn).measured for walk in WALKS]
+    found = [ipol_analysis(walk, *WORN[worn]).measured for walk in WALKS]
     return sum(any(b.stops for b in m.bouts) for m in found if m is not None)
 
 

@@ -18,10 +18,9 @@ from core.parameters.kinematic import stride_figures
 from core.parameters.result import Parameter
 from core.parameters.uncertainty import state_uncertainty
 from core.parameters.variability import summarise_values
-from core.pipeline import analyse
 from tests.accuracy import test_distances_neura as distances
 from tests.accuracy import test_scores_neura as scores
-from tests.accuracy.gaitmap import COPIES, RATE, recording_of, reference_strides, signals, true_strides
+from tests.accuracy.gaitmap import RATE, analysed, reference_strides, true_strides
 from tests.accuracy.report import record
 from tests.true_walks import measured_walk
 
@@ -77,7 +76,7 @@ def of_distances() -> list[Pair]:
 @cache
 def of_gaitmap() -> list[Pair]:
     """Lengths, times and stance of the counted strides of gaitmap_foot against motion capture."""
-    run = analyse(recording_of(signals(COPIES[0]), RATE))
+    run = analysed()
     assert run.measured is not None
     columns, strides = run.measured.columns, run.measured.strides.strides
     pairs = []

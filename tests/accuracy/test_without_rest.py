@@ -24,11 +24,11 @@ from core.recording import ImuStream, Recording
 from core.rest import find_rest_windows, index_window
 from core.timeline import synchronise
 from tests.accuracy import mobgap
-from tests.accuracy.gaitmap import RATE, recording_of, signals
+from tests.accuracy.gaitmap import RATE, analysed, recording_of, signals
 from tests.accuracy.report import record
 from tests.data import data_folder
-from tests.ipol import WALKS, ipol_recording
-from tests.walks import neura_recording
+from tests.ipol import WALKS, ipol_analysis, ipol_recording
+from tests.walks import neura_analysis, neura_recording
 
 MARGIN_S = 0.3
 QMT: Mapping[str, Segment] = {
@@ -59,6 +59,14 @@ def read_take(name: str) -> Recording:
     if name == "qmt_fullbody":
         return _qmt()
     return ipol_recording(name)
+
+
+def analyse_take(name: str) -> TakeAnalysis:
+    if name == "neura_walk":
+        return neura_analysis()
+    if name == "gaitmap_foot":
+        return analysed()
+    return analyse(_qmt()) if name == "qmt_fullbody" else ipol_analysis(name)
 
 
 def cut_recording(recording: Recording, start_s: float, end_s: float) -> Recording:
@@ -124,8 +132,7 @@ class Pair:
 
 @cache
 def pair(name: str) -> Pair:
-    recording = read_take(name)
-    return Pair(analyse(recording), analyse(without_rest(recording)))
+    return Pair(analyse_take(name), analyse(without_rest(read_take(name))))
 
 
 def relative_pct(p: Pair, name: str) -> list[float]:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from pwdlib import PasswordHash
-from pwdlib.hashers.argon2 import Argon2Hasher
 
 from server.auth import passwords
 from tests.engines import bare_source, engine, postgres, source  # noqa: F401 - fixtures
+from tests.server.clinic import CHEAP
 
-CHEAP = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
 NOBODY = CHEAP.hash("no account has this password")
 
 

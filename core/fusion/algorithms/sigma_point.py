@@ -68,7 +68,8 @@ def make_points(
         others = np.diag(weight * share**2 * inverse @ np.ones((n, n)) @ inverse.T)
         first = np.full((1, n), -share / sqrt(weight))
         weights = np.concatenate(([weight], others))
-        return np.concatenate((first, (C / np.sqrt(others)).T)), weights, weights
+        # in rows, as the other sets are: of columns the loop would be compiled once more
+        return np.ascontiguousarray(np.concatenate((first, (C / np.sqrt(others)).T))), weights, weights
     if kind != "spherical_simplex":
         raise ParameterError("gain_out_of_range", f"No set of sigma points '{kind}'.")
     w1 = (1.0 - weight) / (n + 1)

@@ -15,6 +15,7 @@ from server.api.documents import openapi
 from server.app import create_app
 from server.services import patients, recordings, sessions
 from server.settings import Settings
+from tests.databases import write_database
 from tests.marks import slow_beyond
 from tests.server.clinic import Clinic
 
@@ -77,7 +78,9 @@ class Target:
 
 @pytest.fixture(scope="module")
 def target(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Target]:
-    settings = Settings(data_dir=tmp_path_factory.mktemp("fuzz"), allowed_hosts=(asgi.HOST,))
+    # takes are opened and recorded, nothing is estimated
+    settings = Settings(data_dir=tmp_path_factory.mktemp("fuzz"), allowed_hosts=(asgi.HOST,), live_workers=0)
+    write_database(settings.database)
     clinic = Clinic(create_app(settings), settings)
     with asgi.get_client(clinic.app):  # starts the lifespan, which goes on until it is shut down below
         pass

@@ -39,7 +39,10 @@ class Visit:
         """Somebody signed in; httpx asks for gzip unless told otherwise."""
         cookie = {"Cookie": f"sid={self.clinic.token('clinician')}"}
         async with httpx.AsyncClient(
-            base_url=f"http://127.0.0.1:{self.port}", headers={**cookie, **headers}, trust_env=False
+            base_url=f"http://127.0.0.1:{self.port}",
+            headers={**cookie, **headers},
+            trust_env=False,
+            timeout=60,
         ) as client:
             yield client
 
