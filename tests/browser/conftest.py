@@ -73,6 +73,7 @@ WITHOUT_FIGURE = "if (location.pathname.startsWith('/views/')) location.replace(
 """Without 3D nobody sees the figure; its megabytes of script would draw it all the same."""
 FORGET = """async () => {
   localStorage.clear();
+  sessionStorage.clear();
   await Promise.all((await indexedDB.databases()).map(({ name }) => new Promise((done) => {
     const asked = indexedDB.deleteDatabase(name);
     asked.onsuccess = asked.onerror = done;
@@ -298,8 +299,8 @@ def at_rest(running: RunningServer) -> None:
 def opened(flat: Browser, running: RunningServer, kept: KeptContexts, at_rest: None) -> Iterator[Opener]:
     """Opens pages signed in; a script error or a refused style fails the test at its end.
 
-    A page that a test `only_looks` at, without leaving anything on it but its size and its media, is the one
-    that stays in the context: a new one costs a quarter of a second of processor time.
+    A page that `stays` is the one that is always in the context: a new one costs a quarter of a second of
+    processor time. It is for tests that leave no listener, route or script on it, and do not close it.
     """
     contexts: list[BrowserContext] = []
     said: list[str] = []
@@ -318,7 +319,7 @@ def opened(flat: Browser, running: RunningServer, kept: KeptContexts, at_rest: N
         browser: Browser = flat,
         signed_in: bool = True,
         locale: str = "en-US",
-        only_looks: bool = False,
+        stays: bool = False,
     ) -> Page:
         if signed_in:
             context = kept.take(browser, WITHOUT_FIGURE if browser is flat else PACED, locale)
@@ -326,9 +327,10 @@ def opened(flat: Browser, running: RunningServer, kept: KeptContexts, at_rest: N
             context = browser.new_context(locale=locale, base_url=running.url)
             context.set_default_timeout(60_000)
             contexts.append(context)
-        page = context.pages[0] if signed_in and only_looks else context.new_page()
+        page = context.pages[0] if signed_in and stays else context.new_page()
         page.set_viewport_size({"width": width, "height": height})
-        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        page.emulate_media(color_scheme=scheme, reduced_motion="null", media="null")  # type: ignore[arg-type]
+        page.mouse.move(0, 0)
         hear(page, "pageerror", lambda e: said.append(f"{path}: {e}") if is_ours(str(e)) else None)
         hear(
             page, "console", lambda m: said.append(f"{path}: {m.text}") if _matters(m.type, m.text) else None

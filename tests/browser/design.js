@@ -36,7 +36,7 @@
   return { sideways: Math.max(0, document.documentElement.scrollWidth - innerWidth), small, over, clip, nested };
 },
   // Text, also in fields, under WCAG AA contrast (4.5:1, 3:1 from 24 px) or under 11 px, as it is seen: through what is
-  // transparent.
+  // transparent. What is old on a live page is meant to be faint: its cover says so.
   text: () => {
   const lum = (c) => { const f = (v) => { v /= 255; return v <= .04045 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4; }; return .2126 * f(c[0]) + .7152 * f(c[1]) + .0722 * f(c[2]); };
   const rgb = (s) => { const m = s.match(/[\d.]+/g); return m ? m.map(Number) : null; };
@@ -67,7 +67,7 @@
   const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walk.nextNode()) {
     const text = walk.currentNode.textContent.trim(), e = walk.currentNode.parentElement;
-    if (!text || !e.getClientRects().length || e.closest('title,desc,.vh,.skip,[disabled],[aria-disabled=true],option,script,style')) continue;
+    if (!text || !e.getClientRects().length || e.closest('title,desc,.vh,.skip,.stale,[disabled],[aria-disabled=true],option,script,style')) continue;
     const cs = getComputedStyle(e);
     look(e, text, cs, e.namespaceURI.includes('svg') ? cs.fill : cs.color);
   }

@@ -21,8 +21,7 @@ pytestmark = pytest.mark.usefixtures("unknown_sensors")
 
 __all__ = ["clinic", "network"]
 
-FAKE = ["--use-fake-device-for-media-stream=fps=10"]
-"""Each picture is packed by software: a third of those of a real camera say the same."""
+FAKE = ["--use-fake-device-for-media-stream"]
 CAMERA = "document.querySelector('capture-page').camera"
 
 
