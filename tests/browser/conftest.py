@@ -22,6 +22,7 @@ import pytest
 from playwright.sync_api import (
     Browser,
     BrowserContext,
+    Dialog,
     Page,
     Playwright,
     ViewportSize,
@@ -227,7 +228,7 @@ def cookies(running: RunningServer) -> list[dict[str, str]]:
 
 
 class KeptContexts:
-    """Signed-in contexts that all tests share, one for a browser and a language.
+    """Contexts that all tests share, one for a browser and a language, signed in or not.
 
     A page in a context of its own costs a second of processor time more: for a new process, and for every
     script and style that it loads and compiles again. What a test leaves behind is taken out after it.
@@ -235,35 +236,45 @@ class KeptContexts:
 
     def __init__(self, url: str, cookies: list[dict[str, str]]) -> None:
         self._url, self._cookies = url, cookies
-        self._all: dict[tuple[Browser, str], BrowserContext] = {}
-        self._used: set[BrowserContext] = set()
+        self._all: dict[tuple[Browser, str, bool], BrowserContext] = {}
+        self._used: dict[BrowserContext, bool] = {}
 
-    def take(self, browser: Browser, script: str = "", locale: str = "en-US") -> BrowserContext:
+    def take(
+        self, browser: Browser, script: str = "", locale: str = "en-US", *, signed_in: bool = True
+    ) -> BrowserContext:
         """The one of this browser and language, made at its first use; `script` runs in every document."""
-        if (browser, locale) not in self._all:
+        if (browser, locale, signed_in) not in self._all:
             made = browser.new_context(locale=locale, base_url=self._url, viewport=DESK)
             made.set_default_timeout(60_000)
             if script:
                 made.add_init_script(script)
-            made.add_cookies(self._cookies)  # type: ignore[arg-type]
+            if signed_in:
+                made.add_cookies(self._cookies)  # type: ignore[arg-type]
             made.new_page().goto(REST)  # stays, and with it the process of its pages
-            self._all[browser, locale] = made
-        found = self._all[browser, locale]
-        self._used.add(found)
+            self._all[browser, locale, signed_in] = made
+        found = self._all[browser, locale, signed_in]
+        self._used[found] = signed_in
         return found
 
     def clean(self) -> None:
         """Close the pages of a test, and forget what they stored."""
-        for context in self._used:
+        for context, signed_in in self._used.items():
             first, *others = context.pages
             for page in others:
                 page.close()
             if not first.url.endswith(REST):
+                first.on("dialog", _accept)  # what a test typed and did not send may go
                 first.goto(REST)
+                first.remove_listener("dialog", _accept)
             first.evaluate(FORGET)
             context.clear_cookies()
-            context.add_cookies(self._cookies)  # type: ignore[arg-type]
+            if signed_in:
+                context.add_cookies(self._cookies)  # type: ignore[arg-type]
         self._used.clear()
+
+
+def _accept(dialog: Dialog) -> None:
+    dialog.accept()
 
 
 @pytest.fixture(scope="session")
@@ -296,13 +307,12 @@ def at_rest(running: RunningServer) -> None:
 
 
 @pytest.fixture
-def opened(flat: Browser, running: RunningServer, kept: KeptContexts, at_rest: None) -> Iterator[Opener]:
-    """Opens pages signed in; a script error or a refused style fails the test at its end.
+def opened(flat: Browser, kept: KeptContexts, at_rest: None) -> Iterator[Opener]:
+    """Opens pages; a script error or a refused style fails the test at its end.
 
     A page that `stays` is the one that is always in the context: a new one costs a quarter of a second of
     processor time. It is for tests that leave no listener, route or script on it, and do not close it.
     """
-    contexts: list[BrowserContext] = []
     said: list[str] = []
     heard: list[tuple[Page, str, Callable[..., None]]] = []
 
@@ -321,13 +331,9 @@ def opened(flat: Browser, running: RunningServer, kept: KeptContexts, at_rest: N
         locale: str = "en-US",
         stays: bool = False,
     ) -> Page:
-        if signed_in:
-            context = kept.take(browser, WITHOUT_FIGURE if browser is flat else PACED, locale)
-        else:
-            context = browser.new_context(locale=locale, base_url=running.url)
-            context.set_default_timeout(60_000)
-            contexts.append(context)
-        page = context.pages[0] if signed_in and stays else context.new_page()
+        script = WITHOUT_FIGURE if browser is flat else PACED
+        context = kept.take(browser, script, locale, signed_in=signed_in)
+        page = context.pages[0] if stays else context.new_page()
         page.set_viewport_size({"width": width, "height": height})
         page.emulate_media(color_scheme=scheme, reduced_motion="null", media="null")  # type: ignore[arg-type]
         page.mouse.move(0, 0)
@@ -343,8 +349,6 @@ def opened(flat: Browser, running: RunningServer, kept: KeptContexts, at_rest: N
     yield open_
     for page, event, listener in heard:
         page.remove_listener(event, listener)
-    for context in contexts:
-        context.close()
     assert not said, said
 
 

@@ -1,4 +1,4 @@
-// What is pressed before the page's scripts are there is kept, and pressed again once they are. Small, no module, first of all.
+// What is pressed before the page's scripts are there is kept, and pressed again once they are. No module: it is first.
 {
   const kept = new Map(); // what was pressed → how it is pressed again
   const keep = (e, what, again) => {
@@ -12,8 +12,10 @@
     if (hit.hasAttribute("command") && "commandForElement" in hit) return; // so does a button that opens a dialog
     keep(e, hit, () => hit.click());
   };
-  const submit = (e) => { // a form that a script sends: the browser by itself would write what was typed into the address
-    if (e.target.matches("[data-api], :not([action], [method])")) keep(e, e.target, () => e.target.requestSubmit(e.submitter));
+  // A form that a script sends; the browser would write what was typed into the address.
+  const submit = (e) => {
+    const form = e.target;
+    if (form.matches("[data-api], :not([action], [method])")) keep(e, form, () => form.requestSubmit(e.submitter));
   };
   addEventListener("click", click, true);
   addEventListener("submit", submit, true);
