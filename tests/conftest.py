@@ -48,7 +48,7 @@ FIRST: Final = "pytest.mark.first"
 ORDER: Final = ("core", "server", "web", "test_", "accuracy", "acceptance", "faults", "bench", "browser")
 """Which tests come first: what a change breaks is seen in the first seconds. Pages are last: while Chromium
 is driven an event loop runs in its thread, which others must not find."""
-LONGEST: Final = ("test_german.py", "test_look.py", "test_replay.py")
+LONGEST: Final = ("test_capture.py", "test_german.py", "test_live.py", "test_look.py", "test_replay.py")
 """Files of minutes: first in their room, so that no process is left alone with one at the end."""
 
 

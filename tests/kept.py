@@ -24,6 +24,8 @@ R = TypeVar("R")
 
 SOURCES: Final = ("core", "sagittal", "tests")
 """Folders of which every module counts, and the tables beside them."""
+SERVER: Final = ("server", "migrations")
+"""Those that count besides for what a server wrote."""
 FOLDER: Final = Path(tempfile.gettempdir()) / f"sagittal-tests-{os.getuid()}"
 IN_MEMORY: Final = 6
 """Values of a function that stay in a process; the rest are read again, as several share the memory."""
@@ -55,10 +57,15 @@ def keep_recorded(make: Callable[P, R]) -> Callable[P, R]:
     return _keep(make, os.environ.get("SAGITTAL_DATA", ""))
 
 
-def _keep(make: Callable[P, R], recordings: str) -> Callable[P, R]:
+def keep_served(make: Callable[P, R]) -> Callable[P, R]:
+    """As `keep`, of what a server wrote: other sources of the server have values of their own."""
+    return _keep(make, hash_sources(SERVER))
+
+
+def _keep(make: Callable[P, R], depends_on: str) -> Callable[P, R]:
     @functools.lru_cache(IN_MEMORY)
     def kept(*args: P.args, **kwargs: P.kwargs) -> R:
-        said = f"{make.__module__}.{make.__qualname__}{args}{sorted(kwargs.items())}{recordings}"
+        said = f"{make.__module__}.{make.__qualname__}{args}{sorted(kwargs.items())}{depends_on}"
         path = folder() / hashlib.sha256(said.encode()).hexdigest()[:32]
         with _locked(path.with_suffix(".lock")):
             if not path.exists():
@@ -82,16 +89,16 @@ def folder() -> Path:
     for other in FOLDER.iterdir():
         if time.time() - other.stat().st_mtime > FORGOTTEN_S:
             shutil.rmtree(other, ignore_errors=True)
-    mine = FOLDER / hash_sources()
+    mine = FOLDER / hash_sources(SOURCES)
     mine.mkdir(exist_ok=True)
     return mine
 
 
 @functools.cache
-def hash_sources() -> str:
-    """16 hexadecimal digits that change with every source."""
+def hash_sources(folders: tuple[str, ...]) -> str:
+    """16 hexadecimal digits that change with every source in these folders."""
     digest = hashlib.sha256()
-    for name in SOURCES:
+    for name in folders:
         for path in sorted((ROOT / name).rglob("*")):
             if path.suffix in (".py", ".csv", ".json"):
                 digest.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())

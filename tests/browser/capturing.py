@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser, FilePayload, Page, expect
 
 from tests.browser import filling
-from tests.browser.conftest import RunningServer
+from tests.browser.conftest import KeptContexts, RunningServer
 from tests.browser.network import Network
 from tests.data import data_folder
 
@@ -62,19 +63,32 @@ def network(running: RunningServer) -> Iterator[Network]:
     network.close()
 
 
+@functools.cache
+def _kept_tablets(server: RunningServer) -> KeptContexts:
+    return KeptContexts(server.url, [])
+
+
 @contextmanager
-def tablet(browser: Browser, url: str, **more: Any) -> Iterator[Page]:
-    """The capture page on a new tablet; a script error or a refused style fails the test."""
-    context = browser.new_context(
-        base_url=url, viewport={"width": 810, "height": 1080}, accept_downloads=True, **more
-    )
+def tablet(browser: Browser, at: RunningServer | Network) -> Iterator[Page]:
+    """The capture page on a tablet that holds nothing; a script error or a refused style fails the test.
+
+    The tablets of a server share their context one after another; behind a network each has its own.
+    """
+    kept = _kept_tablets(at) if isinstance(at, RunningServer) else None
+    context = kept.take(browser) if kept else browser.new_context(base_url=at.url)
     page = context.new_page()
+    page.set_viewport_size({"width": 810, "height": 1080})
     said: list[str] = []
     page.on("pageerror", lambda e: said.append(str(e)))
     page.on("console", lambda m: said.append(m.text) if "Content Security" in m.text else None)
     page.goto("/capture")
-    yield page
-    context.close()
+    try:
+        yield page
+    finally:
+        if kept:
+            kept.clean()
+        else:
+            context.close()
     assert not said, said
 
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import datetime as dt
+import functools
 import os
 import shutil
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +22,7 @@ import pytest
 from playwright.sync_api import (
     Browser,
     BrowserContext,
+    Dialog,
     Page,
     Playwright,
     ViewportSize,
@@ -36,6 +40,7 @@ from server.storage.migrate import upgrade
 from server.storage.tables import device_check, job
 from tests.browser import filling
 from tests.data import ROOT
+from tests.kept import keep_served
 
 expect.set_options(timeout=30_000)  # beside other tests a page may take long; nobody waits unless it does
 
@@ -50,22 +55,34 @@ SOLID = [*FLAGS, "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-s
 page but the figure is then drawn as without 3D."""
 PACED = """
 if (window !== window.top) {
-  const draw = window.requestAnimationFrame.bind(window);
-  window.requestAnimationFrame = (then) => setTimeout(() => draw(then), 100);
-  window.cancelAnimationFrame = clearTimeout;
+  const draw = window.requestAnimationFrame.bind(window), waiting = new Map();
+  let last = 0, frames = 0;
+  window.requestAnimationFrame = (then) => { waiting.set(++last, then); return last; };
+  window.cancelAnimationFrame = (number) => waiting.delete(number);
+  window.drawNow = () => draw((now) => {
+    const all = [...waiting.values()];
+    waiting.clear();
+    for (const then of all) then(now);
+  });
+  const beat = () => { drawNow(); setTimeout(beat, frames++ < 10 ? 100 : 500); };
+  beat();
 }
 """
-"""A figure drawn by software as often as it can takes all processors from the server that is to be tested."""
+"""A figure drawn by software as often as it can takes all processors from the server that is to be tested. So
+it is drawn twice a second once it stands, and when a picture of it is taken (picture.py)."""
 WITHOUT_FIGURE = "if (location.pathname.startsWith('/views/')) location.replace('about:blank');"
 """Without 3D nobody sees the figure; its megabytes of script would draw it all the same."""
 FORGET = """async () => {
   localStorage.clear();
+  sessionStorage.clear();
   await Promise.all((await indexedDB.databases()).map(({ name }) => new Promise((done) => {
     const asked = indexedDB.deleteDatabase(name);
     asked.onsuccess = asked.onerror = done;
   })));
 }"""
 
+REST = "/health/live"
+"""Where the page of a context is that stays in it."""
 DESK = ViewportSize(width=1280, height=800)
 RECORDS_ONLY = {"SAGITTAL_WORKERS": "0", "SAGITTAL_LIVE_WORKERS": "0"}
 
@@ -90,11 +107,17 @@ class RunningServer:
             for pid in workers:
                 os.kill(pid, signal.SIGCONT)
 
+    @functools.cached_property
+    def cookies(self) -> httpx.Cookies:
+        """Of one sign-in that clients and pages share: checking a password takes tenths of a second."""
+        with httpx.Client(base_url=self.url, timeout=60) as client:
+            client.post("/api/v1/sign-in", json={"name": NAME, "password": PASSWORD}).raise_for_status()
+            return client.cookies
+
     @contextlib.contextmanager
     def client(self) -> Iterator[httpx.Client]:
         """A signed-in API client."""
-        with httpx.Client(base_url=self.url, timeout=60) as client:
-            client.post("/api/v1/sign-in", json={"name": NAME, "password": PASSWORD}).raise_for_status()
+        with httpx.Client(base_url=self.url, timeout=60, cookies=self.cookies) as client:
             yield client
 
 
@@ -131,15 +154,14 @@ def serve(folder: Path, *, records_only: bool = False) -> Iterator[RunningServer
 
 
 @pytest.fixture(scope="session")
-def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
-    """One server for all tests, with one administrator."""
+def running(tmp_path_factory: pytest.TempPathFactory, clinic_files: ClinicFiles) -> Iterator[RunningServer]:
+    """One server for all tests, with one administrator, on a clinic that has something on every page."""
     folder = tmp_path_factory.mktemp("clinic")
-    make_keys(folder / "identity.key")  # this clinic keeps names
-    upgrade(folder / "sagittal.db")
-    db = Database(folder / "sagittal.db")
-    with db.write() as c:
-        accounts.create(c, NAME, "Anna", Role.ADMIN, hash_password(PASSWORD))
-    db.close()
+    for name, content in clinic_files[1].items():
+        path = folder / name
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        path.write_bytes(content)
+        path.chmod(0o600)
     with serve(folder) as server:
         yield server
 
@@ -202,12 +224,11 @@ def unknown_sensors(running: RunningServer) -> None:
 @pytest.fixture(scope="session")
 def cookies(running: RunningServer) -> list[dict[str, str]]:
     """The cookie of one sign-in, so that a page need not sign in each time."""
-    with running.client() as client:
-        return [{"name": k, "value": v, "url": running.url} for k, v in client.cookies.items()]
+    return [{"name": k, "value": v, "url": running.url} for k, v in running.cookies.items()]
 
 
 class KeptContexts:
-    """Signed-in contexts that all tests share, one for a browser and a language.
+    """Contexts that all tests share, one for a browser and a language, signed in or not.
 
     A page in a context of its own costs a second of processor time more: for a new process, and for every
     script and style that it loads and compiles again. What a test leaves behind is taken out after it.
@@ -215,32 +236,45 @@ class KeptContexts:
 
     def __init__(self, url: str, cookies: list[dict[str, str]]) -> None:
         self._url, self._cookies = url, cookies
-        self._all: dict[tuple[Browser, str], BrowserContext] = {}
-        self._used: set[BrowserContext] = set()
+        self._all: dict[tuple[Browser, str, bool], BrowserContext] = {}
+        self._used: dict[BrowserContext, bool] = {}
 
-    def take(self, browser: Browser, script: str, locale: str = "en-US") -> BrowserContext:
+    def take(
+        self, browser: Browser, script: str = "", locale: str = "en-US", *, signed_in: bool = True
+    ) -> BrowserContext:
         """The one of this browser and language, made at its first use; `script` runs in every document."""
-        if (browser, locale) not in self._all:
+        if (browser, locale, signed_in) not in self._all:
             made = browser.new_context(locale=locale, base_url=self._url, viewport=DESK)
             made.set_default_timeout(60_000)
-            made.add_init_script(script)
-            made.add_cookies(self._cookies)  # type: ignore[arg-type]
-            made.new_page().goto("/health/live")  # stays, and with it the process of its pages
-            self._all[browser, locale] = made
-        found = self._all[browser, locale]
-        self._used.add(found)
+            if script:
+                made.add_init_script(script)
+            if signed_in:
+                made.add_cookies(self._cookies)  # type: ignore[arg-type]
+            made.new_page().goto(REST)  # stays, and with it the process of its pages
+            self._all[browser, locale, signed_in] = made
+        found = self._all[browser, locale, signed_in]
+        self._used[found] = signed_in
         return found
 
     def clean(self) -> None:
         """Close the pages of a test, and forget what they stored."""
-        for context in self._used:
+        for context, signed_in in self._used.items():
             first, *others = context.pages
             for page in others:
                 page.close()
+            if not first.url.endswith(REST):
+                first.on("dialog", _accept)  # what a test typed and did not send may go
+                first.goto(REST)
+                first.remove_listener("dialog", _accept)
             first.evaluate(FORGET)
             context.clear_cookies()
-            context.add_cookies(self._cookies)  # type: ignore[arg-type]
+            if signed_in:
+                context.add_cookies(self._cookies)  # type: ignore[arg-type]
         self._used.clear()
+
+
+def _accept(dialog: Dialog) -> None:
+    dialog.accept()
 
 
 @pytest.fixture(scope="session")
@@ -273,10 +307,18 @@ def at_rest(running: RunningServer) -> None:
 
 
 @pytest.fixture
-def opened(flat: Browser, running: RunningServer, kept: KeptContexts, at_rest: None) -> Iterator[Opener]:
-    """Opens pages signed in; a script error or a refused style fails the test at its end."""
-    contexts: list[BrowserContext] = []
+def opened(flat: Browser, kept: KeptContexts, at_rest: None) -> Iterator[Opener]:
+    """Opens pages; a script error or a refused style fails the test at its end.
+
+    A page that `stays` is the one that is always in the context: a new one costs a quarter of a second of
+    processor time. It is for tests that leave no listener, route or script on it, and do not close it.
+    """
     said: list[str] = []
+    heard: list[tuple[Page, str, Callable[..., None]]] = []
+
+    def hear(page: Page, event: str, listener: Callable[..., None]) -> None:
+        page.on(event, listener)  # type: ignore[call-overload]
+        heard.append((page, event, listener))
 
     def open_(
         path: str,
@@ -287,26 +329,26 @@ def opened(flat: Browser, running: RunningServer, kept: KeptContexts, at_rest: N
         browser: Browser = flat,
         signed_in: bool = True,
         locale: str = "en-US",
+        stays: bool = False,
     ) -> Page:
-        if signed_in:
-            context = kept.take(browser, WITHOUT_FIGURE if browser is flat else PACED, locale)
-        else:
-            context = browser.new_context(locale=locale, base_url=running.url)
-            context.set_default_timeout(60_000)
-            contexts.append(context)
-        page = context.new_page()
+        script = WITHOUT_FIGURE if browser is flat else PACED
+        context = kept.take(browser, script, locale, signed_in=signed_in)
+        page = context.pages[0] if stays else context.new_page()
         page.set_viewport_size({"width": width, "height": height})
-        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
-        page.on("pageerror", lambda e: said.append(f"{path}: {e}") if is_ours(str(e)) else None)
-        page.on("console", lambda m: said.append(f"{path}: {m.text}") if _matters(m.type, m.text) else None)
+        page.emulate_media(color_scheme=scheme, reduced_motion="null", media="null")  # type: ignore[arg-type]
+        page.mouse.move(0, 0)
+        hear(page, "pageerror", lambda e: said.append(f"{path}: {e}") if is_ours(str(e)) else None)
+        hear(
+            page, "console", lambda m: said.append(f"{path}: {m.text}") if _matters(m.type, m.text) else None
+        )
         page.goto(path)
         # what plays the figure begins once the page has been seen, which may be after it is loaded
         page.wait_for_function("() => !document.querySelector('time-bar:not(:defined)')")
         return page
 
     yield open_
-    for context in contexts:
-        context.close()
+    for page, event, listener in heard:
+        page.remove_listener(event, listener)
     assert not said, said
 
 
@@ -340,34 +382,62 @@ class Filled:
     empty: str
 
 
+ClinicFiles = tuple[Filled, Mapping[str, bytes]]
+"""What is where in a clinic, and the files of its data folder by their paths in it."""
+
+
 @pytest.fixture(scope="session")
-def filled(running: RunningServer) -> Filled:
+def clinic_files() -> ClinicFiles:
+    return _make_clinic(dt.datetime.now(dt.UTC).date())
+
+
+@pytest.fixture(scope="session")
+def filled(clinic_files: ClinicFiles) -> Filled:
+    """What the clinic of `running` has from its beginning."""
+    return clinic_files[0]
+
+
+@keep_served
+def _make_clinic(day: dt.date) -> ClinicFiles:
+    """Fill a clinic through the API, once for all processes and every `day`: pages say what is of today."""
+    with tempfile.TemporaryDirectory(dir=os.environ.get("PYTEST_DEBUG_TEMPROOT")) as made:
+        folder = Path(made)
+        make_keys(folder / "identity.key")  # this clinic keeps names
+        upgrade(folder / "sagittal.db")
+        with contextlib.closing(Database(folder / "sagittal.db")) as db, db.write() as c:
+            accounts.create(c, NAME, "Anna", Role.ADMIN, hash_password(PASSWORD))
+        with serve(folder) as server, server.client() as client:
+            filled = _fill(client)
+        files = sorted(path for path in folder.rglob("*") if path.is_file())
+        return filled, {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+def _fill(client: httpx.Client) -> Filled:
     files, sensors = filling.simulated_files()
-    with running.client() as client:
-        patient = filling.add(
-            client,
-            "/patients",
-            code="P-0042",
-            sex="male",
-            birth_year=1968,
-            height_m=1.76,
-            note="Stroke, left side affected",
-        )["id"]
-        filling.add(client, "/patients", code="P-0043", sex="female", birth_year=1951)
-        other = filling.add(client, "/patients", code="P-0047", note="Knee, after ligament repair")["id"]
-        done = filling.add_session(client, patient, "Walk, own pace", note="Barefoot, no aid")
-        earlier = filling.add_session(client, patient, "Walk, first visit", performed_on="2026-10-21")
-        for session in (done, earlier):
-            filling.upload(client, session, files)
-            assert filling.analyse(client, session, sensors)["state"] == "done"
-        filling.add(client, f"/patients/{patient}/programmes", starts_on="2026-10-26")
-        unmapped = filling.add_session(client, patient, "Walk, with stick", performed_on="2026-11-20")
-        filling.upload(client, unmapped, files)
-        unread = filling.add_session(client, other, "Walk")
-        filling.upload(client, unread, {"notes.txt": b"no recording at all\n"})
-        unusable = filling.add_session(client, other, "Walk, one sensor", performed_on="2026-11-19")
-        name, content = next(iter(files.items()))
-        filling.upload(client, unusable, {name: content})
-        filling.analyse(client, unusable, {next(iter(sensors)): "shank_l"})
-        empty = filling.add_session(client, other, "Walk, later", performed_on="2026-11-21")
+    patient = filling.add(
+        client,
+        "/patients",
+        code="P-0042",
+        sex="male",
+        birth_year=1968,
+        height_m=1.76,
+        note="Stroke, left side affected",
+    )["id"]
+    filling.add(client, "/patients", code="P-0043", sex="female", birth_year=1951)
+    other = filling.add(client, "/patients", code="P-0047", note="Knee, after ligament repair")["id"]
+    done = filling.add_session(client, patient, "Walk, own pace", note="Barefoot, no aid")
+    earlier = filling.add_session(client, patient, "Walk, first visit", performed_on="2026-10-21")
+    for session in (done, earlier):
+        filling.upload(client, session, files)
+        assert filling.analyse(client, session, sensors)["state"] == "done"
+    filling.add(client, f"/patients/{patient}/programmes", starts_on="2026-10-26")
+    unmapped = filling.add_session(client, patient, "Walk, with stick", performed_on="2026-11-20")
+    filling.upload(client, unmapped, files)
+    unread = filling.add_session(client, other, "Walk")
+    filling.upload(client, unread, {"notes.txt": b"no recording at all\n"})
+    unusable = filling.add_session(client, other, "Walk, one sensor", performed_on="2026-11-19")
+    name, content = next(iter(files.items()))
+    filling.upload(client, unusable, {name: content})
+    filling.analyse(client, unusable, {next(iter(sensors)): "shank_l"})
+    empty = filling.add_session(client, other, "Walk, later", performed_on="2026-11-21")
     return Filled(patient, done, earlier, unread, unmapped, unusable, empty)

@@ -36,10 +36,14 @@ COUNT = """async (png) => {
 
 DRAWN = """() => new Promise(done => {
   let left = 3;
-  const next = () => left-- ? requestAnimationFrame(next) : done();
+  const next = () => {
+    if (!left--) return done();
+    requestAnimationFrame(next);
+    window.drawNow?.();
+  };
   next();
 })"""
-"""Three frames later: a message is taken in one, drawn in the next."""
+"""Three frames later, at once (conftest.py, PACED): a message is taken in one, drawn in the next."""
 
 
 def wait_for_picture(page: Page, wanted: Callable[[Mapping[str, float]], bool]) -> dict[str, float]:

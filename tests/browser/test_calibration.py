@@ -8,7 +8,7 @@ from tests.browser.conftest import Filled, Opener
 
 
 def test_a_segment_leads_to_its_checks(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/sessions/{filled.done}/calibration")
+    page = opened(f"/sessions/{filled.done}/calibration", stays=True)
     segment = page.locator("svg.calbody a").last
     words = segment.get_attribute("aria-label") or ""
     segment.focus()

@@ -41,7 +41,7 @@ def agree(page: Page) -> None:
 def test_a_take_is_filmed_though_the_line_breaks_and_plays_beside_the_figure(
     filming: Browser, running: RunningServer, clinic: Clinic, network: Network, opened: Opener
 ) -> None:
-    with tablet(filming, network.url) as page:
+    with tablet(filming, network) as page:
         pair(page, clinic.code)
         card = page.locator("[data-camera]")
         expect(card.get_by_text("Without sound, at most 500")).to_be_visible()
@@ -110,7 +110,7 @@ def wait_for_analysis(clinic: Clinic) -> None:
 def test_a_page_loaded_again_keeps_what_was_filmed_and_says_nothing_of_it_is_lost(
     filming: Browser, running: RunningServer, clinic: Clinic, network: Network
 ) -> None:
-    with tablet(filming, network.url) as page:
+    with tablet(filming, network) as page:
         pair(page, clinic.code)
         agree(page)
         choose(page, walk_files())
@@ -138,7 +138,7 @@ def test_a_refused_camera_is_said_and_disturbs_nothing(
     browser = playwright_.chromium.launch(
         executable_path=CHROMIUM, args=[*FLAT, *FAKE, "--deny-permission-prompts"]
     )
-    with tablet(browser, running.url) as page:
+    with tablet(browser, running) as page:
         pair(page, clinic.code)
         page.get_by_label(re.compile("the person agreed to be filmed")).click()
         card = page.locator("[data-camera]")

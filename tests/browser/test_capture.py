@@ -62,7 +62,7 @@ def expected_samples() -> dict[str, np.ndarray[Any, np.dtype[np.float32]]]:
 def test_a_walk_played_on_the_tablet_is_the_recording_though_network_and_page_went_away(
     flat: Browser, running: RunningServer, clinic: Clinic, network: Network
 ) -> None:
-    with tablet(flat, network.url) as page:
+    with tablet(flat, network) as page:
         pair(page, clinic.code)
         choose(page, walk_files())
         expect(page.locator("[data-sum]")).to_contain_text("2 copies left out")
@@ -126,7 +126,7 @@ def test_a_walk_played_on_the_tablet_is_the_recording_though_network_and_page_we
 def test_the_tablet_says_whether_the_calibration_passes_and_takes_it_back_at_a_redo(
     flat: Browser, running: RunningServer, clinic: Clinic
 ) -> None:
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         pair(page, clinic.code)
         choose(page, walk_files())
         place(page, SEGMENTS)
@@ -157,7 +157,7 @@ def test_a_server_that_dies_in_the_middle_has_everything_in_the_end(flat: Browse
         code = filling.add(client, f"/sessions/{session}/live")["code"]
         network = Network(server.url)
         servers.callback(network.close)
-        with tablet(flat, network.url) as page:
+        with tablet(flat, network) as page:
             pair(page, code)
             choose(page, [("walk.csv", table.encode())])
             start(page)
@@ -176,7 +176,7 @@ def test_a_server_that_dies_in_the_middle_has_everything_in_the_end(flat: Browse
 def test_a_network_that_only_goes_silent_is_noticed_and_nothing_is_lost(
     flat: Browser, running: RunningServer, clinic: Clinic, network: Network
 ) -> None:
-    with tablet(flat, network.url) as page:
+    with tablet(flat, network) as page:
         pair(page, clinic.code)
         choose(page, walk_files())
         place(page, {"00B40C55": "foot_l", "00B40C48": "foot_r"})
@@ -199,7 +199,7 @@ def test_a_network_that_only_goes_silent_is_noticed_and_nothing_is_lost(
 def test_a_wrong_code_is_refused_in_words_and_the_next_one_is_taken(
     flat: Browser, running: RunningServer, clinic: Clinic
 ) -> None:
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         for key in "222222":
             page.get_by_role("button", name=key, exact=True).click()
         expect(page.get_by_role("alert")).to_be_visible()
@@ -213,7 +213,7 @@ def test_a_wrong_code_is_refused_in_words_and_the_next_one_is_taken(
 def test_the_therapist_ends_the_take_and_the_tablet_says_so(
     flat: Browser, running: RunningServer, clinic: Clinic
 ) -> None:
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         # the therapist's page on the same device leads here with its code: nobody types or sees it
         page.goto("about:blank")
         page.goto(f"/capture#{clinic.code}")
@@ -233,7 +233,7 @@ def test_the_therapist_ends_the_take_and_the_tablet_says_so(
 def test_what_is_left_when_the_take_was_closed_can_be_saved(
     flat: Browser, running: RunningServer, clinic: Clinic, network: Network
 ) -> None:
-    with tablet(flat, network.url) as page:
+    with tablet(flat, network) as page:
         pair(page, clinic.code)
         choose(page, walk_files())
         place(page, {"00B40C55": "foot_l"})
@@ -267,7 +267,7 @@ def test_what_is_left_when_the_take_was_closed_can_be_saved(
 def test_a_tablet_keeps_its_pairing_and_its_mapping_over_a_reload(
     flat: Browser, running: RunningServer, clinic: Clinic
 ) -> None:
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         pair(page, clinic.code)
         choose(page, walk_files())
         place(page, SEGMENTS)
@@ -285,7 +285,7 @@ def test_a_tablet_keeps_its_pairing_and_its_mapping_over_a_reload(
 
 
 def test_a_second_tab_stays_away(flat: Browser, running: RunningServer) -> None:
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         expect(page.get_by_label("Pairing code")).to_be_visible()
         other = page.context.new_page()
         other.goto("/capture")
@@ -313,7 +313,7 @@ def test_every_state_of_the_page_obeys_the_design_system(
                 assert not small, f"{name}: under 56 px: {small}"
         page.set_viewport_size({"width": 810, "height": 1080})
 
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         expect(page.get_by_label("Pairing code")).to_be_visible()
         check(page, "pairing")
         pair(page, clinic.code)
@@ -334,7 +334,7 @@ def test_every_state_of_the_page_obeys_the_design_system(
 
 
 def test_the_whole_page_works_by_keyboard(flat: Browser, running: RunningServer, clinic: Clinic) -> None:
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         expect(page.get_by_label("Pairing code")).to_be_focused()
         page.keyboard.type(clinic.code)
         expect(page.locator("[data-paired]")).to_be_visible()

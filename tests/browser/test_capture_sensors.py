@@ -44,7 +44,7 @@ def read_log(clinic: Clinic, running: RunningServer) -> tuple[Any, dict[int, lis
 def test_dots_stream_with_their_own_clocks_and_go_on_after_losing_the_radio(
     flat: Browser, running: RunningServer, clinic: Clinic
 ) -> None:
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         with_radio(page)
         pair(page, clinic.code)
         add_sensor(page)
@@ -88,7 +88,7 @@ def test_dots_stream_with_their_own_clocks_and_go_on_after_losing_the_radio(
 def test_dots_go_on_after_a_reload_when_they_are_connected_again(
     flat: Browser, running: RunningServer, clinic: Clinic
 ) -> None:
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         with_radio(page)
         pair(page, clinic.code)
         add_sensor(page)
@@ -118,7 +118,7 @@ def test_dots_go_on_after_a_reload_when_they_are_connected_again(
 def test_an_interrupted_take_can_be_ended_without_its_sensors(
     flat: Browser, running: RunningServer, clinic: Clinic
 ) -> None:
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         with_radio(page)
         pair(page, clinic.code)
         add_sensor(page)
@@ -132,7 +132,7 @@ def test_an_interrupted_take_can_be_ended_without_its_sensors(
 
 
 def test_a_browser_without_bluetooth_says_so(flat: Browser, running: RunningServer, clinic: Clinic) -> None:
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         page.add_init_script("Object.defineProperty(navigator, 'bluetooth', { value: undefined });")
         page.reload()
         pair(page, clinic.code)
@@ -161,7 +161,7 @@ def test_the_device_itself_is_a_sensor_after_its_self_test(
 ) -> None:
     turning = turned_device("zxy", -1)  # signs of one family of browsers, order of another
     lying = [[n / 60, 0.0, 0.0, -9.81, 30.0, 10.0, 20.0] for n in range(240)]
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         pair(page, clinic.code)
         page.get_by_role("button", name="This device itself").click()
         expect(page.locator("[data-axes-say]")).to_have_text("1 of 4: Lay the device flat, screen up")
@@ -190,7 +190,7 @@ def test_a_failed_self_test_is_said_and_can_be_repeated(
     flat: Browser, running: RunningServer, clinic: Clinic
 ) -> None:
     broken = [[*row[:4], 0.0, 0.0, 0.0] for row in turned_device("xyz", 1)]
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         pair(page, clinic.code)
         page.get_by_role("button", name="This device itself").click()
         page.evaluate(MOVE, broken)
@@ -204,7 +204,7 @@ def test_a_new_code_goes_on_with_the_take_of_a_tablet_that_was_sent_away(
 ) -> None:
     rows = "t_s," + ",".join(f"L_foot.{k}_{a}" for k in ("acc", "gyr") for a in "xyz")
     table = "\n".join([rows, *(f"{n / 100:.2f},0,0,9.81,0,0,{n / 1000:.3f}" for n in range(3000))])
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         pair(page, clinic.code)
         page.locator("[data-files]").set_input_files(
             {"name": "walk.csv", "mimeType": "text/csv", "buffer": table.encode()}
@@ -236,7 +236,7 @@ def test_a_storage_that_refuses_is_told_and_nothing_is_lost_when_it_recovers(
 ) -> None:
     rows = "t_s," + ",".join(f"L_foot.{k}_{a}" for k in ("acc", "gyr") for a in "xyz")
     table = "\n".join([rows, *(f"{n / 100:.2f},0,0,9.81,0,0,{n / 1000:.3f}" for n in range(3000))])
-    with tablet(flat, running.url) as page:
+    with tablet(flat, running) as page:
         pair(page, clinic.code)
         page.locator("[data-files]").set_input_files(
             {"name": "walk.csv", "mimeType": "text/csv", "buffer": table.encode()}

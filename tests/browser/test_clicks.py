@@ -28,7 +28,7 @@ def test_an_upload_is_five_clicks_from_its_overview(opened: Opener, running: Run
     with running.client() as client:
         patient = filling.add(client, "/patients", code=f"CLICK-{uuid4().hex[:6]}", height_m=1.75)["id"]
         session = filling.add_session(client, patient, "Walk, 10 m overground")
-    page, hand = opened(f"/sessions/{session}/upload"), Hand()
+    page, hand = opened(f"/sessions/{session}/upload", stays=True), Hand()
     hand.pick_files(page.get_by_role("button", name="Choose files"), files)
     left_foot = page.locator("[data-ask-id]")
     expect(left_foot).to_have_text(re.compile(r"\S"), timeout=60_000)
@@ -42,7 +42,7 @@ def test_an_upload_is_five_clicks_from_its_overview(opened: Opener, running: Run
 
 def test_a_number_is_one_click_from_its_strides(opened: Opener, filled: Filled) -> None:
     overview = f"/sessions/{filled.done}"
-    page = opened(overview)
+    page = opened(overview, stays=True)
     rows = page.locator("#rows a[href*='/parameters/']")
     assert rows.count() >= 5
     for k in range(rows.count()):
@@ -65,7 +65,7 @@ def _shows_strides(page: Page) -> None:
 
 
 def test_a_stride_is_left_out_by_two_clicks(opened: Opener, running: RunningServer, filled: Filled) -> None:
-    page, hand = opened(f"/sessions/{filled.done}/timeline"), Hand()
+    page, hand = opened(f"/sessions/{filled.done}/timeline", stays=True), Hand()
     page.locator(".ev").first.wait_for()
     try:
         pick_counted(page)
@@ -137,7 +137,7 @@ def test_an_unknown_table_is_eight_clicks_from_its_analysis(
     with running.client() as client:
         patient = filling.add(client, "/patients", code=f"CLICK-{uuid4().hex[:6]}", height_m=1.75)["id"]
         session = filling.add_session(client, patient, "Walk, 10 m overground")
-    page, hand = opened(f"/sessions/{session}/upload"), Hand()
+    page, hand = opened(f"/sessions/{session}/upload", stays=True), Hand()
     hand.pick_files(page.get_by_role("button", name="Choose files"), files)
     columns = page.locator("column-map")
     expect(columns).to_be_visible(timeout=60_000)

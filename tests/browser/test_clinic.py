@@ -19,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("unknown_sensors")
 
 
 def test_a_wrong_password_is_said_and_the_right_one_leads_on(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/patients/{filled.patient}", signed_in=False)
+    page = opened(f"/patients/{filled.patient}", signed_in=False, stays=True)
     expect(page).to_have_url(re.compile(r"/sign-in\?next="))
     page.get_by_label("User name").fill("anna")
     page.get_by_label("Password").fill("not the password")
@@ -31,7 +31,7 @@ def test_a_wrong_password_is_said_and_the_right_one_leads_on(opened: Opener, fil
 
 
 def test_signing_out_ends_the_sign_in(opened: Opener, running: RunningServer) -> None:
-    page = opened("/sign-in?next=/account", signed_in=False)
+    page = opened("/sign-in?next=/account", signed_in=False, stays=True)
     page.get_by_label("User name").fill("anna")
     page.get_by_label("Password").fill(PASSWORD)
     page.get_by_role("button", name="Sign in").click()
@@ -43,7 +43,7 @@ def test_signing_out_ends_the_sign_in(opened: Opener, running: RunningServer) ->
 
 
 def test_a_patient_is_added_found_renamed_and_deleted(opened: Opener) -> None:
-    page = opened("/patients")
+    page = opened("/patients", stays=True)
     page.get_by_role("button", name="New patient").first.click()
     page.locator("dialog[open]").get_by_label("Code").fill("Ü-17 (b)")
     page.get_by_role("button", name="Add patient").click()
@@ -67,7 +67,7 @@ def test_a_patient_is_added_found_renamed_and_deleted(opened: Opener) -> None:
 
 
 def test_a_code_that_is_taken_is_said_in_the_dialog(opened: Opener, filled: Filled) -> None:
-    page = opened("/patients")
+    page = opened("/patients", stays=True)
     page.get_by_role("button", name="New patient").first.click()
     page.locator("dialog[open]").get_by_label("Code").fill("P-0042")
     page.get_by_role("button", name="Add patient").click()
@@ -85,7 +85,7 @@ def test_another_mapping_runs_the_analysis_again(
         turn = {"l": "r", "r": "l"}
         wrong = {d: s[:-1] + turn[s[-1]] if s and s[-2:] in {"_l", "_r"} else s for d, s in sensors.items()}
         filling.analyse(client, session, wrong)
-    page = opened(f"/sessions/{session}/data")
+    page = opened(f"/sessions/{session}/data", stays=True)
     page.get_by_role("link", name="Change mapping").click()
     page.wait_for_url(re.compile(r"/upload$"))
     page.get_by_role("button", name="Swap left and right").click()
@@ -115,7 +115,7 @@ def test_a_waiting_job_is_shown_live_and_can_be_cancelled(
         session = filling.add_session(client, patient, "Walk")
         filling.upload(client, session, files)
     with running.without_workers():
-        page = opened(f"/sessions/{session}/upload")
+        page = opened(f"/sessions/{session}/upload", stays=True)
         page.locator("[data-sides=keep]").click()
         page.get_by_role("button", name="Analyse").click()
         card = page.locator("job-progress.card")
@@ -133,7 +133,7 @@ def test_a_waiting_job_is_shown_live_and_can_be_cancelled(
 
 
 def test_a_take_without_strides_says_why_and_offers_the_mapping(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/sessions/{filled.unusable}")
+    page = opened(f"/sessions/{filled.unusable}", stays=True)
     expect(page.locator(".quality")).to_contain_text("No strides")
     empty = page.locator(".empty", has_text="No strides found")
     assert len(empty.locator("p").inner_text()) > 40
@@ -142,7 +142,7 @@ def test_a_take_without_strides_says_why_and_offers_the_mapping(opened: Opener, 
 
 
 def test_an_unknown_page_is_a_page_with_a_way_back(opened: Opener) -> None:
-    page = opened("/sessions/00000000000000000000000000000000")
+    page = opened("/sessions/00000000000000000000000000000000", stays=True)
     expect(page.locator("h1")).to_have_text("Nothing here")
     page.get_by_role("link", name="Patients").click()
     page.wait_for_url(re.compile(r":\d+/patients$"))
@@ -153,7 +153,7 @@ def test_an_assistant_sees_uploads_but_no_results(
 ) -> None:
     with running.client() as client:
         filling.add(client, "/users", name="tom", role="assistant", password=PASSWORD)
-    page = opened("/sign-in?next=/patients", signed_in=False)
+    page = opened("/sign-in?next=/patients", signed_in=False, stays=True)
     page.get_by_label("User name").fill("tom")
     page.get_by_label("Password").fill(PASSWORD)
     page.get_by_role("button", name="Sign in").click()
@@ -169,7 +169,7 @@ def test_an_assistant_sees_uploads_but_no_results(
 
 
 def test_light_and_dark_can_be_chosen_and_are_remembered(opened: Opener) -> None:
-    page = opened("/patients")
+    page = opened("/patients", stays=True)
     ground = "getComputedStyle(document.body).backgroundColor"
     light = page.evaluate(ground)
     page.locator(".rail [data-theme-toggle]").click()

@@ -45,7 +45,7 @@ def lived(running: RunningServer) -> tuple[str, str]:
 
 
 def test_the_page_of_daily_life_shows_what_was_lived(opened: Opener, lived: tuple[str, str]) -> None:
-    page = opened(f"/sessions/{lived[1]}")
+    page = opened(f"/sessions/{lived[1]}", stays=True)
     days = page.get_by_role("region", name="Days")
     expect(days.get_by_role("img", name="hours and minutes")).to_have_count(1)
     for word in ("Lying", "Sitting", "Standing", "Walking"):
@@ -67,7 +67,7 @@ def test_the_page_of_daily_life_shows_what_was_lived(opened: Opener, lived: tupl
 def test_trends_and_paper_of_daily_life_obey_the_design_system(
     opened: Opener, lived: tuple[str, str]
 ) -> None:
-    page = opened(f"/patients/{lived[0]}/trends")
+    page = opened(f"/patients/{lived[0]}/trends", stays=True)
     expect(page.get_by_role("region", name="Capacity and performance")).to_contain_text("not known")
     faults = all_faults(page)
     page.goto(f"/sessions/{lived[1]}/print")

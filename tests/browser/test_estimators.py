@@ -32,7 +32,7 @@ def find_row(page: Page, name: str) -> Locator:
 
 
 def test_the_overview_names_the_estimator_and_leads_to_its_health(opened: Opener, walk: str) -> None:
-    page = opened(f"/sessions/{walk}")
+    page = opened(f"/sessions/{walk}", stays=True)
     page.get_by_role("link", name="How it was measured").click()
     quality = page.locator(".quality")
     expect(quality).to_contain_text("ErKF, smoothed")
@@ -44,7 +44,7 @@ def test_the_overview_names_the_estimator_and_leads_to_its_health(opened: Opener
 
 
 def test_another_estimator_runs_and_its_angles_are_marked(opened: Opener, walk: str) -> None:
-    page = opened(f"/sessions/{walk}/data")
+    page = opened(f"/sessions/{walk}/data", stays=True)
     page.get_by_label("Another estimator on this take").select_option("l7s_3i")
     page.get_by_role("button", name="Run it").click()
     page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")
@@ -60,8 +60,8 @@ def test_another_estimator_runs_and_its_angles_are_marked(opened: Opener, walk: 
     expect(page.locator(".quality")).to_contain_text("ErKF, smoothed", timeout=60_000)
 
 
-def test_the_ankles_distance_gives_step_width(opened: Opener, walk: str, running: RunningServer) -> None:
-    page = opened(f"/sessions/{walk}")
+def test_the_ankles_distance_gives_step_width(opened: Opener, walk: str) -> None:
+    page = opened(f"/sessions/{walk}", stays=True)
     expect(find_row(page, "Step width")).to_contain_text("enter how far apart the ankles are")
     page.goto(f"/sessions/{walk}/upload")
     ankles = page.get_by_label("Ankles apart while standing")
@@ -71,8 +71,7 @@ def test_the_ankles_distance_gives_step_width(opened: Opener, walk: str, running
     ankles.fill("0.2")
     page.get_by_role("button", name="Analyse").click()
     page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")
-    expect(page.locator("job-progress")).to_have_count(0, timeout=60_000)
-    page.reload()
+    _wait_for_results(page)
     width = find_row(page, "Step width")
     expect(width.locator("td.n .num").first).to_have_text(re.compile(r"^\s*0\.\d\d(\s*± [\d.]+)?\s*$"))
     page.goto(f"/sessions/{walk}/upload")
@@ -82,7 +81,7 @@ def test_the_ankles_distance_gives_step_width(opened: Opener, walk: str, running
 def test_the_belts_speed_is_asked_for_on_a_treadmill_only(
     opened: Opener, walk: str, running: RunningServer
 ) -> None:
-    page = opened(f"/sessions/{walk}/upload")
+    page = opened(f"/sessions/{walk}/upload", stays=True)
     expect(page.get_by_label("Speed of the belt")).to_be_hidden()
     files, _ = filling.simulated_files()
     with running.client() as client:
@@ -101,7 +100,7 @@ def test_the_belts_speed_is_asked_for_on_a_treadmill_only(
 def test_goniometer_and_shoe_go_into_the_manifest_and_leave_it(
     opened: Opener, walk: str, running: RunningServer
 ) -> None:
-    page = opened(f"/sessions/{walk}/upload")
+    page = opened(f"/sessions/{walk}/upload", stays=True)
     page.get_by_text("Angles of standing by goniometer").click()
     page.get_by_label("Knee flexion, left").fill("8")
     page.get_by_label("Knee flexion, right").fill("-2")
@@ -110,8 +109,7 @@ def test_goniometer_and_shoe_go_into_the_manifest_and_leave_it(
     page.get_by_label("To the tip").fill("0.12")
     page.get_by_role("button", name="Analyse").click()
     page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")
-    expect(page.locator("job-progress")).to_have_count(0, timeout=60_000)
-    page.reload()
+    _wait_for_results(page)
     clearance = find_row(page, "Toe clearance")
     expect(clearance.locator("td.n .num").first).to_have_text(re.compile(r"^\s*−?0\.\d+(\s*± [\d.]+)?\s*$"))
     with running.client() as client:
@@ -125,3 +123,9 @@ def test_goniometer_and_shoe_go_into_the_manifest_and_leave_it(
     page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")
     with running.client() as client:
         assert "shoe" not in client.get(f"/api/v1/sessions/{walk}/recording").json()["manifest"]["subject"]
+
+
+def _wait_for_results(page: Page) -> None:
+    """Wait until the page has loaded itself with new results; before it has come it shows no progress too."""
+    page.wait_for_load_state("domcontentloaded")
+    expect(page.locator("job-progress")).to_have_count(0, timeout=60_000)

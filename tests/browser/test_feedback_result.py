@@ -62,7 +62,7 @@ def trained(running: RunningServer) -> str:
 
 
 def test_a_session_shows_its_strides_with_and_without_feedback(opened: Opener, trained: str) -> None:
-    page = opened(f"/sessions/{trained}")
+    page = opened(f"/sessions/{trained}", stays=True)
     section = page.get_by_role("region", name="Feedback")
     expect(section).to_contain_text("Step length, left: target 0.680 ± 0.020")
     rows = section.get_by_role("row")
@@ -78,7 +78,7 @@ def test_a_session_shows_its_strides_with_and_without_feedback(opened: Opener, t
 
 
 def test_feedback_has_a_sheet_of_its_own_on_paper(opened: Opener, trained: str) -> None:
-    page = opened(f"/sessions/{trained}/print")
+    page = opened(f"/sessions/{trained}/print", stays=True)
     sheet = page.locator("article.sheet").last
     expect(sheet.get_by_role("heading", name="Feedback")).to_be_visible()
     assert sheet.evaluate("s => s.scrollHeight <= s.clientHeight + 1"), "one sheet"

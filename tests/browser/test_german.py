@@ -41,7 +41,7 @@ def left_english(page: Page) -> list[str]:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_a_page_is_german_and_keeps_to_the_design(name: str, opened: Opener, filled: Filled) -> None:
-    page = opened(PAGES[name](filled), signed_in=name not in OUT, locale="de-DE")
+    page = opened(PAGES[name](filled), signed_in=name not in OUT, locale="de-DE", stays=True)
     page.wait_for_load_state()
     assert page.locator("html").get_attribute("lang") == "de"
     for width, height in (DESK, TABLET) if name in BOTH else (TABLET,):

@@ -25,7 +25,7 @@ def test_sign_in_and_open_a_patient_with_keys_only(opened: Opener, filled: Fille
 
 
 def test_the_first_tab_stop_skips_to_the_content(opened: Opener) -> None:
-    page = opened("/patients")
+    page = opened("/patients", stays=True)
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.textContent") == "Skip to content"
     page.keyboard.press("Enter")
@@ -34,7 +34,7 @@ def test_the_first_tab_stop_skips_to_the_content(opened: Opener) -> None:
 
 
 def test_every_focus_is_seen(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/sessions/{filled.unmapped}/upload")
+    page = opened(f"/sessions/{filled.unmapped}/upload", stays=True)
     page.emulate_media(reduced_motion="reduce")
     unseen = []
     for _ in range(40):
@@ -51,7 +51,7 @@ def test_every_focus_is_seen(opened: Opener, filled: Filled) -> None:
 
 
 def test_a_dialog_closes_with_escape_and_gives_the_focus_back(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/patients/{filled.patient}")
+    page = opened(f"/patients/{filled.patient}", stays=True)
     _tab_to(page, "Edit")
     page.keyboard.press("Enter")
     dialog = page.locator("dialog[open]")
@@ -63,7 +63,7 @@ def test_a_dialog_closes_with_escape_and_gives_the_focus_back(opened: Opener, fi
 
 
 def test_a_sensor_is_placed_with_keys(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/sessions/{filled.unmapped}/upload")
+    page = opened(f"/sessions/{filled.unmapped}/upload", stays=True)
     row = page.locator("tr[data-device]").first
     select = row.locator("select")
     select.select_option("")
@@ -76,7 +76,7 @@ def test_a_sensor_is_placed_with_keys(opened: Opener, filled: Filled) -> None:
 
 
 def test_swapping_left_and_right_swaps_every_leg_sensor(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/sessions/{filled.unmapped}/upload")
+    page = opened(f"/sessions/{filled.unmapped}/upload", stays=True)
     before = _segments(page)
     page.locator("[data-swap]").focus()
     page.keyboard.press("Enter")
@@ -87,7 +87,7 @@ def test_swapping_left_and_right_swaps_every_leg_sensor(opened: Opener, filled: 
 
 
 def test_two_sensors_on_one_segment_cannot_be_analysed(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/sessions/{filled.unmapped}/upload")
+    page = opened(f"/sessions/{filled.unmapped}/upload", stays=True)
     rows = page.locator("tr[data-device] select")
     rows.nth(0).select_option("foot_l")
     rows.nth(1).select_option("foot_l")
@@ -96,7 +96,7 @@ def test_two_sensors_on_one_segment_cannot_be_analysed(opened: Opener, filled: F
 
 
 def test_keys_move_the_cursor_of_all_charts_and_the_time_bar(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/sessions/{filled.done}/kinematics")
+    page = opened(f"/sessions/{filled.done}/kinematics", stays=True)
     time = page.locator("time-bar input")
     start = float(time.input_value())
     page.keyboard.press("ArrowRight")
@@ -111,7 +111,7 @@ def test_keys_move_the_cursor_of_all_charts_and_the_time_bar(opened: Opener, fil
 
 
 def test_play_moves_the_time_and_pauses(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/sessions/{filled.done}")
+    page = opened(f"/sessions/{filled.done}", stays=True)
     time = page.locator("time-bar input")
     start = float(time.input_value())
     page.get_by_role("button", name="Play").focus()
@@ -125,7 +125,7 @@ def test_play_moves_the_time_and_pauses(opened: Opener, filled: Filled) -> None:
 
 
 def test_pointing_at_a_curve_moves_the_cursor_of_all_charts(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/sessions/{filled.done}/kinematics")
+    page = opened(f"/sessions/{filled.done}/kinematics", stays=True)
     plot = page.locator("[data-variable=hip_flexion] > svg")
     box = plot.bounding_box()
     assert box is not None

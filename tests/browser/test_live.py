@@ -92,7 +92,7 @@ def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(
     page.wait_for_url(re.compile(r"/live$"))  # loaded: its button works
     page.get_by_role("button", name="Open for the tablet").click()
     expect(page.locator("[data-code]")).to_have_text(re.compile(r"^\w{3} \w{3}$"))
-    with tablet(flat, network.url) as device:
+    with tablet(flat, network) as device:
         device.get_by_label("Pairing code").press_sequentially(page.locator("[data-code]").inner_text())
         expect(device.locator("[data-paired]")).to_contain_text(code)
         expect(page.locator("[data-waiting]")).to_contain_text("The tablet is paired")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import httpx
@@ -19,6 +20,9 @@ from tests.browser.feed import Told
 from tests.browser.test_german import left_english
 
 Opener = Callable[..., Told]
+
+LIFTED = "(e) => e.hidden"
+"""Of what covers a picture, for `_seen`."""
 
 HEARD = """() => {
   window.heard = [];
@@ -165,11 +169,13 @@ def test_old_data_cover_the_charts_until_new_ones_come(told: Opener, trained: tu
     this.walk([0.53], ["in"])
     cover = this.page.locator("[data-cover]")
     expect(cover).to_be_visible()
-    _say_and_see_lifted(this, cover, 200.0)  # later than any machine is slow
+    with _seen(cover, LIFTED, True):
+        this.say_fresh()
     expect(cover).to_be_visible()
     expect(this.page.locator("stride-chart canvas")).to_be_hidden()
-    _say_and_see_lifted(this, cover, 300.0)
-    this.say(feed.frame(301.1, stale=True))
+    with _seen(cover, LIFTED, True):
+        this.say_fresh()
+    this.say(feed.frame(this.at_s + 1.1, stale=True))
     expect(cover).to_be_visible()
 
 
@@ -311,12 +317,12 @@ def test_the_patient_sees_no_number_and_reads_the_way_to_the_zone(
     told: Opener, trained: tuple[str, str, str]
 ) -> None:
     this = _patient(told, trained[0])
-    this.say(feed.cue(0, 0.53, "in"))
+    this.say_fresh(feed.cue(0, 0.53, "in"))
     message = this.page.locator("[data-message]")
     expect(message).to_have_text("Good step")
-    this.say(feed.cue(2, 0.49, "near_low"))
+    this.say_fresh(feed.cue(2, 0.49, "near_low"))
     expect(message).to_have_text("A little longer")
-    this.say(feed.cue(4, 0.62, "high"))
+    this.say_fresh(feed.cue(4, 0.62, "high"))
     expect(message).to_have_text("Shorter")
     assert not re.search(r"\d", this.page.locator("patient-screen").inner_text())
     kinds = [m.get_attribute("class") for m in this.page.locator("[data-last] svg").all()]
@@ -339,9 +345,9 @@ def test_the_patient_sees_no_number_and_reads_the_way_to_the_zone(
     # what to do is said at every stage
     stages: tuple[tuple[Stage, str], ...] = (("stand", "Stand still"), ("walk", "Walk on"))
     for stage, words in stages:
-        this.say(feed.frame(101.0, stage))
-        expect(this.page.locator("[data-pause-title]")).to_have_text(words)
-    this.say(feed.frame(102.0), feed.feedback(on=False))
+        with _seen(this.page.locator("[data-pause-title]"), "(e) => e.textContent", words):
+            this.say_fresh(stage=stage)
+    this.say_fresh(feed.feedback(on=False))
     expect(message).to_have_text("On your own")
     this.say(feed.state("finished"))
     expect(this.page.locator("[data-pause-title]")).to_have_text("Well done")
@@ -352,35 +358,41 @@ def test_sound_follows_the_error_and_the_contacts_after_one_tap(
 ) -> None:
     this = _patient(told, trained[0], sound=True)
     page = this.page
-    this.say(feed.frame(100.1, contact="r"), feed.cue(2, 0.47, "low"))
-    this.say(feed.frame(100.2, contact="rl"), feed.frame(100.3, contact="l"), feed.frame(100.4, contact="lr"))
+    this.say_fresh(feed.cue(2, 0.47, "low"), contact="r")
+    for contact in ("rl", "l", "lr"):
+        this.say_fresh(contact=contact)
+    page.wait_for_function("() => heard.length === 3")
     assert page.evaluate("heard") == [240, 880, 660]
-    this.say(feed.frame(100.5, contact="l"), feed.cue(4, 0.53, "in"))
+    this.say_fresh(feed.cue(4, 0.53, "in"), contact="l")
+    expect(page.locator("[data-last] svg.in")).to_have_count(1)  # it has been taken
     assert len(page.evaluate("heard")) == 3
-    this.say(feed.feedback(paused=True), feed.frame(100.6, contact="lr"))
+    this.say(feed.feedback(paused=True))
+    this.say_fresh(contact="lr")
+    expect(page.locator("[data-pause-title]")).to_be_visible()
     assert len(page.evaluate("heard")) == 3
 
 
 def test_a_stride_without_feedback_dims_everything(told: Opener, trained: tuple[str, str, str]) -> None:
     this = _patient(told, trained[0])
-    this.say(feed.cue(0, 0.53, "in"), feed.cue(2, 0.45, "low", "probe"))
+    this.say_fresh(feed.cue(0, 0.53, "in"), feed.cue(2, 0.45, "low", "probe"))
     expect(this.page.locator("patient-screen")).to_have_attribute("data-faded", "")
     expect(this.page.locator("[data-message]")).to_have_text("On your own")
     assert this.page.locator("[data-last] svg").count() == 1
-    this.say(feed.frame(100.4), feed.cue(4, 0.53, "in"))
-    assert this.page.locator("patient-screen").get_attribute("data-faded") is None
+    this.say_fresh(feed.cue(4, 0.53, "in"))
+    expect(this.page.locator("patient-screen")).not_to_have_attribute("data-faded", "")
 
 
 def test_the_patient_screen_pauses_when_data_are_old(told: Opener, trained: tuple[str, str, str]) -> None:
     this = _patient(told, trained[0])
     pause = this.page.locator("[data-pause]")
-    expect(pause).to_be_hidden()
-    expect(pause).to_be_visible(timeout=1500)
+    with _seen(pause, LIFTED, True):
+        this.say_fresh()
+    expect(pause).to_be_visible()
     expect(pause).to_contain_text("Short pause")
     this.say(feed.cue(2, 0.53, "in"))
     assert this.page.locator("[data-last] svg").count() == 0
-    this.say(feed.frame(101.0))
-    expect(pause).to_be_hidden()
+    with _seen(pause, LIFTED, True):
+        this.say_fresh()
 
 
 def test_the_picture_moves_aside_for_neglect_and_stays_so(
@@ -424,42 +436,45 @@ def test_every_state_obeys_the_design_system(told: Opener, trained: tuple[str, s
     this.say(feed.state("pairing", "none"))
     faults["pair"] = _faults_everywhere(this)
     this.say(feed.state())
-    faults["stand"] = _faults_everywhere(this, feed.frame(1.0, "stand"))
+    faults["stand"] = _faults_everywhere(this, "stand")
     this.walk([0.53, 0.49], ["in", "near_low"])
-    faults["run"] = _faults_everywhere(this, feed.frame(100.0))
+    faults["run"] = _faults_everywhere(this, "running")
     expect(this.page.locator("[data-cover]")).to_be_visible()
     faults["stale"] = _faults_everywhere(this)
     screen = _patient(told, trained[0])
-    screen.say(feed.cue(0, 0.49, "near_low"))
-    faults["patient"] = _faults_everywhere(screen, feed.frame(100.0))
+    screen.say_fresh(feed.cue(0, 0.49, "near_low"))
+    faults["patient"] = _faults_everywhere(screen, "running")
     assert not {k: v for k, v in faults.items() if v}
 
 
 def test_a_running_take_is_german(told: Opener, trained: tuple[str, str, str]) -> None:
     this = told(f"/sessions/{trained[0]}/live", locale="de-DE")
     this.say(feed.state())
-    faults = {"walk": _faults_everywhere(this, feed.frame(2.0, "walk"))}
+    faults = {"walk": _faults_everywhere(this, "walk")}
     assert left_english(this.page) == []
     this.walk([0.53, 0.49], ["in", "near_low"])
-    faults["run"] = _faults_everywhere(this, feed.frame(100.0))
+    faults["run"] = _faults_everywhere(this, "running")
     assert left_english(this.page) == []
     screen = told(f"/sessions/{trained[0]}/live/patient", locale="de-DE")
     screen.page.get_by_role("button", name="Ohne Ton").click()
     screen.say(feed.state(), feed.feedback(), feed.frame(100.0, contact="r"), feed.cue(0, 0.49, "near_low"))
     expect(screen.page.locator("[data-what]")).to_have_text("Schritt links")
-    faults["patient"] = _faults_everywhere(screen, feed.frame(100.0))
+    faults["patient"] = _faults_everywhere(screen, "running")
     assert left_english(screen.page) == []
     assert not {k: v for k, v in faults.items() if v}
 
 
-def _faults_everywhere(this: Told, *messages: str) -> dict[str, Any]:
-    """Faults of a state in every size, light and dark; what is said each time keeps it from going old."""
+def _faults_everywhere(this: Told, stage: Stage | None = None) -> dict[str, Any]:
+    """Faults of a state in every size, light and dark; a new frame each time keeps a stage from going old."""
     found: dict[str, Any] = {}
     for width, height in SIZES:
         this.page.set_viewport_size({"width": width, "height": height})
         for scheme in ("light", "dark"):
             this.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
-            this.say(*messages)
+            if stage is None:
+                this.say()
+            else:
+                this.say_fresh(stage=stage)
             faults = {**layout_faults(this.page), **text_faults(this.page)}
             found |= {f"{width} {scheme}": faults} if faults else {}
     return found
@@ -478,14 +493,20 @@ def _patient(told: Opener, session: str, *, sound: bool = False, **size: Any) ->
     return this
 
 
-def _say_and_see_lifted(this: Told, cover: Locator, at_s: float) -> None:
-    """A new frame lifts the cover, if only for a moment: it may be old before anybody looks."""
-    cover.evaluate(
-        "c => { window.lifted = false;"
-        " new MutationObserver(() => { window.lifted ||= c.hidden }).observe(c, {attributes: true}) }"
+@contextmanager
+def _seen(place: Locator, what: str, wanted: Any) -> Iterator[None]:
+    """What happens within makes `what` of the place as wanted, if only for a moment: it may soon be old.
+
+    Parameters
+    ----------
+    what : JavaScript, the element → what is compared.
+    """
+    place.evaluate(
+        f"""(e) => {{ window.seen = []; new MutationObserver(() => seen.push(({what})(e)))
+          .observe(e, {{attributes: true, childList: true, characterData: true, subtree: true}}); }}"""
     )
-    this.say(feed.frame(at_s))
-    this.page.wait_for_function("() => window.lifted")
+    yield
+    place.page.wait_for_function("wanted => seen.includes(wanted)", arg=wanted)
 
 
 def _until(done: Callable[[], bool], page: Page) -> None:

@@ -77,7 +77,7 @@ pictures = pytest.mark.skipif(
 
 @pytest.mark.parametrize("name", PAGES)
 def test_page_obeys_the_design_system(name: str, opened: Opener, filled: Filled) -> None:
-    page = opened(PAGES[name](filled), signed_in=name not in OUT)
+    page = opened(PAGES[name](filled), signed_in=name not in OUT, stays=True)
     page.wait_for_load_state()
     faults = all_faults(page)
     assert not faults, "\n".join(faults)
@@ -111,8 +111,9 @@ def test_dialogs_obey_the_design_system(opened: Opener, filled: Filled) -> None:
         (f"/patients/{filled.patient}", "delete-patient"),
         ("/users", "new-user"),
     ):
+        page = opened(path, stays=True)
         for width, height in (DESK, PHONE):
-            page = opened(path, width=width, height=height)
+            page.set_viewport_size({"width": width, "height": height})
             page.locator(f"[commandfor={button}]").click()
             found = layout_faults(page) | text_faults(page)
             assert not found, f"{button} {width}: {found}"
@@ -120,7 +121,7 @@ def test_dialogs_obey_the_design_system(opened: Opener, filled: Filled) -> None:
             assert box is not None
             assert box["x"] >= 0
             assert box["x"] + box["width"] <= width
-            page.close()
+            page.keyboard.press("Escape")
 
 
 def sheets(page: Page) -> int:

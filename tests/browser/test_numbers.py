@@ -10,7 +10,7 @@ from tests.browser.conftest import Filled, Opener
 
 
 def test_a_number_opens_to_its_strides_and_a_stride_to_its_moment(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/sessions/{filled.done}")
+    page = opened(f"/sessions/{filled.done}", stays=True)
     page.locator("summary", has_text="Timing").click()
     page.locator(".params").get_by_role("link", name="Stride time").click()
     page.wait_for_url(re.compile(r"/parameters/stride_time_s$"))
@@ -28,7 +28,7 @@ def test_a_number_opens_to_its_strides_and_a_stride_to_its_moment(opened: Opener
 
 
 def test_a_value_is_found_by_its_name_among_all_folds(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/sessions/{filled.done}")
+    page = opened(f"/sessions/{filled.done}", stays=True)
     page.get_by_label("Find a value").fill("toe clearance")
     found = page.locator("all-values tbody tr:visible")
     expect(found.first).to_be_visible()

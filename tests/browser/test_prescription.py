@@ -28,7 +28,7 @@ def walker(running: RunningServer) -> str:
 
 
 def test_a_prescription_is_written_changed_and_ended(opened: Opener, walker: str) -> None:
-    page = opened(f"/patients/{walker}")
+    page = opened(f"/patients/{walker}", stays=True)
     page.get_by_role("link", name="Prescribe").click()
     page.wait_for_url(re.compile(r"/prescription$"))
     # one choice says it all; the rest waits behind "More"
@@ -105,7 +105,7 @@ def test_without_a_walk_only_an_entered_target_can_be_chosen(opened: Opener, fil
 
 
 def test_the_form_is_filled_with_the_keyboard_alone(opened: Opener, walker: str) -> None:
-    page = opened(f"/patients/{walker}/prescription")
+    page = opened(f"/patients/{walker}/prescription", stays=True)
     expect(page.locator("[data-source=own_baseline] [data-value]")).not_to_be_empty()
     page.locator("[data-more] > summary").focus()
     page.keyboard.press("Enter")
@@ -132,7 +132,7 @@ def test_the_form_is_filled_with_the_keyboard_alone(opened: Opener, walker: str)
 def test_the_pages_obey_the_design_system(opened: Opener, walker: str) -> None:
     faults = []
     for path in (f"/patients/{walker}/prescription", f"/patients/{walker}"):
-        page = opened(path)
+        page = opened(path, stays=True)
         page.wait_for_load_state("networkidle")
         faults += [f"{path} {fault}" for fault in all_faults(page)]
     assert not faults, "\n".join(faults)

@@ -34,6 +34,7 @@ def figure_page(
     context.add_cookies(cookies)  # type: ignore[arg-type]
     context.add_init_script(PACED)
     page, said = context.new_page(), list[str]()
+    page.emulate_media(color_scheme="light")
     page.on("pageerror", lambda e: said.append(str(e)) if is_ours(str(e)) else None)
     page.goto(f"/sessions/{filled.done}")
     _wait_until_drawn(page)
@@ -50,23 +51,22 @@ def figure(figure_page: tuple[Page, list[str]]) -> Iterator[Page]:
     while switched.count():
         switched.first.click()
     page.get_by_label("Look from").select_option("near")
+    if page.locator("html[data-theme=dark]").count():
+        page.locator(".rail [data-theme-toggle]").click()
     _seek(page, 0)
     assert not said, said
 
 
-def test_the_figure_has_two_legs_and_follows_the_clock(
-    opened: Opener, solid: Browser, filled: Filled
-) -> None:
-    page = _open(opened, solid, filled.done)
-    before = wait_until_still(page)
+def test_the_figure_has_two_legs_and_follows_the_clock(figure: Page) -> None:
+    before = wait_until_still(figure)
     assert before["orange"] > 200
     assert before["blue"] > 200
-    page.keyboard.press("j")
-    page.wait_for_function(
+    figure.keyboard.press("j")
+    figure.wait_for_function(
         "() => Math.abs(document.querySelector('gait-view').dataset.shown"
         " - document.querySelector('time-bar input').value) < 0.05"
     )
-    after = wait_for_picture(page, lambda now: now != before)
+    after = wait_for_picture(figure, lambda now: now != before)
     assert after["orange"] > 100, "the figure is gone"
 
 
@@ -89,7 +89,7 @@ def test_a_session_loads_little_the_first_time_and_next_to_nothing_again(
     )
     html = page.evaluate("() => performance.getEntriesByType('navigation')[0].decodedBodySize")
     assert html <= 80_000
-    assert len(loaded) <= 14, loaded
+    assert len(loaded) <= 15, loaded
     assert any(size > 500_000 for path, size in loaded if path.startswith("/views/")), "viser's is among them"
     assert sum(size for _, size in loaded) <= 700_000, loaded
     folds = page.locator("all-values").bounding_box()
@@ -127,21 +127,23 @@ def test_the_first_picture_gives_way_to_the_figure_without_a_jump(
         assert (first & then).sum() > 0.7 * max(first.sum(), then.sum()), side
 
 
-def test_a_lost_line_comes_back_by_itself(opened: Opener, solid: Browser, filled: Filled) -> None:
-    page = _open(opened, solid, filled.done)
-    page.evaluate("document.querySelector('gait-view').socket.close()")
-    view = page.locator("gait-view")
-    expect(view).to_have_attribute("data-state", "lost")
-    expect(view).to_have_attribute("data-state", "open", timeout=10_000)
-    found = wait_for_picture(page, lambda now: now["orange"] > 200)
-    assert found["blue"] > 200
+def test_a_lost_line_comes_back_by_itself_and_keeps_what_was_switched(figure: Page) -> None:
+    view = figure.locator("gait-view")
+    for least in (200, 60):
+        if least == 60:  # from afar it is small
+            _switch(figure, "follow")
+        figure.evaluate("document.querySelector('gait-view').socket.close()")
+        expect(view).to_have_attribute("data-state", "lost")
+        expect(view).to_have_attribute("data-state", "open", timeout=10_000)
+        found = wait_for_picture(figure, lambda now: now["orange"] > least)  # noqa: B023 - called at once
+        assert found["blue"] > least
+    expect(figure.locator("[data-switch=follow]")).to_have_attribute("aria-pressed", "false")
 
 
-def test_the_figure_goes_dark_with_the_page(opened: Opener, solid: Browser, filled: Filled) -> None:
-    page = _open(opened, solid, filled.done)
-    light = wait_until_still(page)
-    page.locator(".rail [data-theme-toggle]").click()
-    dark = wait_for_picture(page, lambda now: now["mean"] < 80 and now["blue"] > 0)
+def test_the_figure_goes_dark_with_the_page(figure: Page) -> None:
+    light = wait_until_still(figure)
+    figure.locator(".rail [data-theme-toggle]").click()
+    dark = wait_for_picture(figure, lambda now: now["mean"] < 80 and now["blue"] > 0)
     assert light["mean"] > 200
     assert dark["orange"] > 0
 
@@ -171,28 +173,18 @@ def test_steps_and_trails_are_left_behind_and_can_be_hidden(figure: Page) -> Non
     assert min(hidden["orange"], hidden["blue"]) > 200, "the figure is hidden too"
 
 
-def test_a_lost_line_keeps_what_was_switched(opened: Opener, solid: Browser, filled: Filled) -> None:
-    page = _open(opened, solid, filled.done)
-    _switch(page, "follow")
-    page.evaluate("document.querySelector('gait-view').socket.close()")
-    expect(page.locator("gait-view")).to_have_attribute("data-state", "lost")
-    expect(page.locator("gait-view")).to_have_attribute("data-state", "open", timeout=10_000)
-    expect(page.locator("[data-switch=follow]")).to_have_attribute("aria-pressed", "false")
-
-
 def test_a_take_of_two_feet_says_which_parts_are_estimated(
-    opened: Opener, solid: Browser, running: RunningServer, filled: Filled
+    figure: Page, opened: Opener, solid: Browser, running: RunningServer
 ) -> None:
     files, sensors = filling.simulated_files()
     feet = {k: v if v in ("foot_l", "foot_r") else None for k, v in sensors.items()}
+    faint_page = _open(opened, solid, _analysed(running, files, feet))
     seen = []
-    for session, estimated in ((filled.done, False), (_analysed(running, files, feet), True)):
-        page = _open(opened, solid, session)
+    for page, estimated in ((figure, False), (faint_page, True)):
         expect(page.locator("[data-estimated]")).to_be_visible(visible=estimated)
         _switch(page, "ground")
         _seek(page, 20)
         seen.append(wait_until_still(page))
-        page.close()
     full, faint = seen
     for colour in ("orange", "blue"):
         assert 30 < faint[colour] < 0.6 * full[colour]

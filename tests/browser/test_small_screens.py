@@ -24,7 +24,7 @@ def test_edit_delete_and_the_note_are_there_in_every_size(
     size: tuple[int, int], opened: Opener, filled: Filled
 ) -> None:
     width, height = size
-    page = opened(f"/sessions/{filled.done}", width=width, height=height)
+    page = opened(f"/sessions/{filled.done}", width=width, height=height, stays=True)
     for name in ("Delete session", "Edit session"):
         button = page.get_by_role("button", name=name)
         expect(button).to_be_visible()
@@ -52,7 +52,7 @@ def test_forms_in_cards_keep_their_distance_from_the_edge(
         (f"/patients/{filled.patient}/sessions/new", "Name of the visit"),
         ("/account", "New password again"),
     ):
-        page = opened(path, width=width, height=height)
+        page = opened(path, width=width, height=height, stays=True)
         field = page.get_by_label(label)
         card = page.locator(".card", has=field)
         inner, outer = field.bounding_box(), card.bounding_box()
@@ -60,7 +60,6 @@ def test_forms_in_cards_keep_their_distance_from_the_edge(
         assert outer is not None
         assert inner["x"] - outer["x"] >= 12, path
         assert outer["x"] + outer["width"] - inner["x"] - inner["width"] >= 12, path
-        page.close()
 
 
 def test_the_one_question_comes_first_and_unused_files_are_folded(
@@ -76,7 +75,7 @@ def test_the_one_question_comes_first_and_unused_files_are_folded(
         session = add_session(client, patient, "Walk, the whole folder")
         upload(client, session, {"neura_walk.zip": packed.getvalue()})
     for width, height in SIZES:
-        page = opened(f"/sessions/{session}/upload", width=width, height=height)
+        page = opened(f"/sessions/{session}/upload", width=width, height=height, stays=True)
         question = page.locator("[data-ask]")
         expect(question).to_contain_text("on the left foot?")
         box = question.bounding_box()
@@ -91,13 +90,12 @@ def test_the_one_question_comes_first_and_unused_files_are_folded(
         expect(unused.get_by_text("reference_angles.csv")).to_be_hidden()
         unused.locator("summary").click()
         expect(unused.get_by_text("reference_angles.csv")).to_be_visible()
-        page.close()
 
 
 def test_progress_is_told_once_by_the_bar_and_not_counted_in_steps(
     opened: Opener, filled: Filled, running: RunningServer
 ) -> None:
-    page = opened("/jobs")
+    page = opened("/jobs", stays=True)
     page.evaluate(
         """async () => {
           await import('/static/js/progress.js');
@@ -120,7 +118,7 @@ def test_progress_is_told_once_by_the_bar_and_not_counted_in_steps(
 def test_titles_of_charts_are_read_whole_and_charts_of_a_row_stand_level(
     width: int, opened: Opener, filled: Filled
 ) -> None:
-    page = opened(f"/sessions/{filled.done}/kinematics", width=width, height=1180)
+    page = opened(f"/sessions/{filled.done}/kinematics", width=width, height=1180, stays=True)
     cells = page.locator(".kin .cell")
     expect(cells).to_have_count(12)
     cut = page.evaluate(
@@ -141,7 +139,7 @@ def test_titles_of_charts_are_read_whole_and_charts_of_a_row_stand_level(
 
 
 def test_a_tablet_held_upright_shows_the_norm(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/sessions/{filled.done}", width=820, height=1180)
+    page = opened(f"/sessions/{filled.done}", width=820, height=1180, stays=True)
     expect(page.get_by_role("columnheader", name="Norm", exact=True)).to_be_visible()
     table, card = page.locator("table.params"), page.locator(".card", has=page.locator("table.params"))
     inner, outer = table.first.bounding_box(), card.first.bounding_box()

@@ -30,7 +30,7 @@ def walked(running: RunningServer) -> str:
 @pytest.fixture
 def timeline(opened: Opener, running: RunningServer, walked: str) -> Iterator[Page]:
     """The page; what a test changed is undone after it."""
-    page = opened(f"/sessions/{walked}/timeline")
+    page = opened(f"/sessions/{walked}/timeline", stays=True)
     expect(page.locator("[data-counts=left]")).to_have_text(re.compile(r"\d+ of \d+"))
     page.locator(".ev").first.wait_for()
     yield page
@@ -285,7 +285,7 @@ def test_the_figure_comes_when_asked_for_and_stands_where_the_event_is(
 
 
 def test_a_link_opens_a_moment(opened: Opener, walked: str) -> None:
-    page = opened(f"/sessions/{walked}/timeline#t=30.5")
+    page = opened(f"/sessions/{walked}/timeline#t=30.5", stays=True)
     page.locator(".ev").first.wait_for()
     start, end = re.findall(r"\d+\.\d", page.locator("[data-span]").inner_text())[:2]
     assert float(start) < 30.5 < float(end)
@@ -328,7 +328,7 @@ def test_a_drag_on_a_lane_moves_all_of_them_and_picks_nothing(timeline: Page) ->
 
 @pytest.mark.parametrize("width", [1280, 360])
 def test_the_dialogs_obey_the_design_system(opened: Opener, walked: str, width: int) -> None:
-    page = opened(f"/sessions/{walked}/timeline", width=width, height=760)
+    page = opened(f"/sessions/{walked}/timeline", width=width, height=760, stays=True)
     expect(page.locator("[data-verdict]")).to_have_text("counts")
     for button in ("[data-add]", "[data-out]"):
         page.locator(button).click()

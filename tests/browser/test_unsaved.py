@@ -32,7 +32,7 @@ def leave(page: Page) -> list[str]:
 
 
 def test_a_note_that_is_being_written_is_asked_for_before_the_page_goes(opened: Opener, patient: str) -> None:
-    page = opened(f"/patients/{patient}")
+    page = opened(f"/patients/{patient}", stays=True)
     assert leave(page) == []
     page.get_by_role("region", name="Notes").get_by_role("button", name="Add", exact=True).click()
     text = page.locator("dialog[open] textarea")
@@ -62,7 +62,7 @@ def test_a_visit_being_made_is_asked_for_and_goes_when_it_is_sent(opened: Opener
 def test_the_name_of_a_visit_follows_its_protocol_until_somebody_writes_one(
     opened: Opener, patient: str
 ) -> None:
-    page = opened(f"/patients/{patient}/sessions/new")
+    page = opened(f"/patients/{patient}/sessions/new", stays=True)
     name = page.get_by_label("Name of the visit")
     expect(name).to_have_value("Walk")
     page.get_by_role("radio", name="Timed up and go").check()
@@ -77,7 +77,7 @@ def test_the_name_of_a_visit_follows_its_protocol_until_somebody_writes_one(
 def test_a_note_of_one_long_word_breaks_no_page(opened: Opener, running: RunningServer, patient: str) -> None:
     with running.client() as client:
         filling.add(client, f"/patients/{patient}/notes", content="x" * 9000)
-    page = opened(f"/patients/{patient}")
+    page = opened(f"/patients/{patient}", stays=True)
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
@@ -86,7 +86,7 @@ def test_a_page_that_follows_a_job_waits_for_the_dialog_that_is_in_use(
 ) -> None:
     with running.client() as client:
         (job, *_) = [j["id"] for j in client.get("/api/v1/jobs").json() if j["state"] == "done"]
-    page = opened("/patients")
+    page = opened("/patients", stays=True)
     page.get_by_role("button", name="New patient").click()
     code = page.locator("dialog[open]").get_by_label("Code")
     code.press_sequentially("P-0778")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
-from tests.browser.conftest import NAME, PASSWORD, Opener, RunningServer
+from tests.browser.conftest import NAME, PACED, PASSWORD, Opener, RunningServer
 from tests.browser.filling import add, add_session
 from tests.browser.network import Network
 from tests.data import ROOT, data_folder
@@ -35,6 +35,7 @@ def test_eleven_files_become_a_session_page(solid: Browser, running: RunningServ
     files = sorted(data_folder("neura_walk", "rawimu").glob("*.txt"))
     assert len(files) == 11
     context = solid.new_context(base_url=running.url, viewport={"width": 1280, "height": 800})
+    context.add_init_script(PACED)
     page = context.new_page()
     _sign_in(page)
     _new_session(page)

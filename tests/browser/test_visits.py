@@ -14,7 +14,7 @@ from tests.browser.conftest import Filled, Opener, RunningServer
 
 
 def test_the_reader_chooses_the_figures_and_the_address_keeps_them(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/patients/{filled.patient}")
+    page = opened(f"/patients/{filled.patient}", stays=True)
     page.get_by_role("link", name="All trends").click()
     expect(page.get_by_role("heading", name="Cadence")).to_be_visible()
     page.get_by_text("Choose figures").click()
@@ -31,7 +31,7 @@ def test_the_reader_chooses_the_figures_and_the_address_keeps_them(opened: Opene
 
 
 def test_the_table_of_a_trend_can_be_saved(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/patients/{filled.patient}/trends?show=stride_time_s")
+    page = opened(f"/patients/{filled.patient}/trends?show=stride_time_s", stays=True)
     with page.expect_download() as saved:
         page.get_by_role("link", name="CSV").click()
     lines = saved.value.path().read_text().splitlines()
@@ -41,7 +41,7 @@ def test_the_table_of_a_trend_can_be_saved(opened: Opener, filled: Filled) -> No
 
 
 def test_two_visits_are_ticked_and_compared(opened: Opener, filled: Filled) -> None:
-    page = opened(f"/patients/{filled.patient}")
+    page = opened(f"/patients/{filled.patient}", stays=True)
     button = page.get_by_role("button", name="Compare two")
     expect(button).to_be_disabled()
     boxes = page.locator("input[name=visit]")
@@ -59,7 +59,7 @@ def test_two_visits_are_ticked_and_compared(opened: Opener, filled: Filled) -> N
 
 @pytest.mark.parametrize("width", [1024, 1200, 1280, 1400])
 def test_the_results_by_visit_fit_a_window_of_a_laptop(opened: Opener, filled: Filled, width: int) -> None:
-    page = opened(f"/patients/{filled.patient}")
+    page = opened(f"/patients/{filled.patient}", stays=True)
     page.set_viewport_size({"width": width, "height": 900})
     expect(page.locator(".results").get_by_text("Data", exact=True)).to_be_visible()
     room, needed = page.locator(".scroll:has(> .results)").evaluate("e => [e.clientWidth, e.scrollWidth]")
@@ -87,7 +87,7 @@ def test_a_programme_is_started_linked_to_its_visits_and_ended(
     opened: Opener, newcomer: tuple[str, str]
 ) -> None:
     patient, session = newcomer
-    page = opened(f"/patients/{patient}")
+    page = opened(f"/patients/{patient}", stays=True)
     page.get_by_role("link", name="Plan a programme").click()
     page.wait_for_url(re.compile(r"/programme$"))
     page.get_by_role("button", name="Start programme").click()
