@@ -21,7 +21,7 @@ from server.pages.words import PROTOCOL_NAMES
 from server.services import pdfs
 from server.settings import Settings
 
-SHEETS: Final = ("tokens", "base", "pages", "visits", "daily", "paper")
+SHEETS: Final = ("base", "pages", "visits", "daily", "paper")
 """Style sheets of paper, in their order."""
 
 _STYLE: Final = re.compile(r"<style>(.*?)</style>", re.DOTALL)

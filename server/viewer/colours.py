@@ -24,7 +24,7 @@ TINTS: Final[Mapping[bool, Mapping[Tint, Rgb]]] = {
         "ring": (0x0E, 0x3A, 0x57),
     },
 }
-"""Dark → colours of the parts; the leg pairs are --left and --right of the page's tokens.css.
+"""Dark → colours of the parts; the leg pairs are --left and --right of the page's base.css.
 
 Two rings around the right shank tell the sides where colours do not.
 """

@@ -89,7 +89,7 @@ def test_a_session_loads_little_the_first_time_and_next_to_nothing_again(
     )
     html = page.evaluate("() => performance.getEntriesByType('navigation')[0].decodedBodySize")
     assert html <= 80_000
-    assert len(loaded) <= 15, loaded
+    assert len(loaded) <= 14, loaded
     assert any(size > 500_000 for path, size in loaded if path.startswith("/views/")), "viser's is among them"
     assert sum(size for _, size in loaded) <= 700_000, loaded
     folds = page.locator("all-values").bounding_box()

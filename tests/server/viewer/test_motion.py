@@ -56,7 +56,7 @@ def test_limbs_reach_from_joint_to_joint(motion: ReplayMotion) -> None:
 def test_left_and_right_have_the_colours_of_the_charts(motion: ReplayMotion) -> None:
     assert motion.batches["thighs"].tint == motion.batches["shanks"].tint == ("left", "right")
     assert (motion.batches["foot_l"].tint, motion.batches["foot_r"].tint) == (("left",), ("right",))
-    tokens = (ROOT / "web/static/css/tokens.css").read_text()
+    tokens = (ROOT / "web/static/css/base.css").read_text()
     for side in SIDES:
         named = re.search(rf"--{side}: light-dark\((#\w+), (#\w+)\);", tokens)
         assert named
