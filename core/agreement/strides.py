@@ -12,6 +12,7 @@ from core.agreement.params import SlipParams
 from core.agreement.terms import LevelMotion
 from core.filtering import low_pass
 from core.frames import Bools, Floats, Segment
+from core.peaks import find_peaks
 from core.rotation import conjugate, exp, rotate, to_matrix
 
 SMOOTH_HZ: Final = 4.0
@@ -51,14 +52,12 @@ def find_largest_axis(moments: Floats) -> Floats:
 
 def find_swings(rate: Floats, rate_hz: float) -> Floats:
     """Samples (k,) of the mid-swings of a leg: peaks of the rate about its main axis, the larger lobe up."""
-    from scipy.signal import find_peaks
-
     x = low_pass(rate @ find_main_axis(rate), SMOOTH_HZ, rate_hz)
     low, high = np.percentile(x, (2, 98))
     x, top = (x, high) if high >= -low else (-x, -low)
     if top < LEAST_SWING:
         return np.zeros(0, np.int64)
-    return np.asarray(find_peaks(x, height=HEIGHT * top, distance=max(1, round(SHORTEST_S * rate_hz)))[0])
+    return find_peaks(x, height=HEIGHT * top, distance=max(1, round(SHORTEST_S * rate_hz)))
 
 
 def choose_leg(segment: Segment) -> tuple[Segment, ...]:

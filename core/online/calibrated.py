@@ -138,8 +138,7 @@ def _check(segment: Segment, calibrated: CalibratedRecording, notices: Sequence[
 
 def compile_calibration_kernels() -> None:
     """Load and compile all that a calibration needs, so that the first one does not take a second longer."""
-    import scipy.ndimage
-    import scipy.signal  # noqa: F401
+    import scipy.ndimage  # noqa: F401
 
     compile_attitude_kernel()
     compile_pose_kernels()
