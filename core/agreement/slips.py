@@ -359,7 +359,7 @@ def question_strides(
     at, within = step.at_s, half
     share = None
     for leg in choose_leg(segment):
-        borders = find_swings(motions[leg].rate, rate_hz) if leg in motions else np.zeros(0)
+        borders = find_swings(motions[leg].rate, rate_hz) if leg in motions else np.zeros(0, np.int64)
         if len(borders) > 2 * params.strides:
             u = find_stride_turns(motions[segment], valid, borders, rate_hz, params)
             x = u.turn @ axis

@@ -132,7 +132,7 @@ def _measure_turns(
             for window in (before, walk, after):
                 there = index_window(window, rate_hz)
                 ok = x.valid[there]
-                ups.append(x.acc[there][ok].mean(axis=0) if ok.any() else np.full(3, np.nan))
+                ups.append(x.cut("acc", there)[ok].mean(axis=0) if ok.any() else np.full(3, np.nan))
             walking, standing = (_turn_about(axis, ups[0], up) for up in ups[1:])
             if np.isfinite(walking + standing):
                 found[segment] = walking, standing, axis

@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.agreement.params import SlipParams
 from core.agreement.terms import LevelMotion
@@ -50,7 +51,7 @@ def find_largest_axis(moments: Floats) -> Floats:
     return np.ascontiguousarray(np.linalg.eigh(moments)[1][:, -1])
 
 
-def find_swings(rate: Floats, rate_hz: float) -> Floats:
+def find_swings(rate: Floats, rate_hz: float) -> NDArray[np.int64]:
     """Samples (k,) of the mid-swings of a leg: peaks of the rate about its main axis, the larger lobe up."""
     x = low_pass(rate @ find_main_axis(rate), SMOOTH_HZ, rate_hz)
     low, high = np.percentile(x, (2, 98))
@@ -67,7 +68,7 @@ def choose_leg(segment: Segment) -> tuple[Segment, ...]:
 
 
 def find_stride_turns(
-    motion: LevelMotion, valid: Bools, borders: Floats, rate_hz: float, params: SlipParams
+    motion: LevelMotion, valid: Bools, borders: NDArray[np.int64], rate_hz: float, params: SlipParams
 ) -> StrideTurns:
     """Fit each stride's curve of vertical and rate to the typical one by a rotation.
 

@@ -140,7 +140,7 @@ def find_bias(signals: SensorSignals, rate_hz: float, quiet: Quietness | None = 
     if not quiet.quiet[calmest]:
         return np.zeros(3)
     half = max(1, round(0.5 * rate_hz))
-    return np.asarray(signals.gyr[max(0, calmest - half) : calmest + half].mean(axis=0))
+    return np.asarray(signals.cut("gyr", slice(max(0, calmest - half), calmest + half)).mean(axis=0))
 
 
 def start_tilt(acc: Floats, valid: Bools, rate_hz: float) -> tuple[AttitudeState, float]:

@@ -26,7 +26,7 @@ def correct_signals(
     for i, segment in enumerate(segments):
         signals, mounted = calibrated.recording.sensors[segment], calibrated.calibration.segments[segment]
         excess = (mounted.rest_norm - GRAVITY) * mounted.R_segment_sensor[1]
-        np.subtract(signals.acc[part], excess, out=acc[:, i])
-        np.subtract(signals.gyr[part], mounted.gyro_bias, out=gyr[:, i])
+        np.subtract(signals.held("acc")[part], excess, out=acc[:, i])
+        np.subtract(signals.held("gyr")[part], mounted.gyro_bias, out=gyr[:, i])
         valid[:, i] = signals.valid[part]
     return acc, gyr, valid

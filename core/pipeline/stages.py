@@ -118,7 +118,7 @@ def judge_signals(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
 def forget_magnetometers(analysis: TakeAnalysis) -> TakeAnalysis:
     """No magnetometers: behind quality only a comparison of filters reads them."""
     source, uniform, agreed = analysis.source, analysis.uniform, analysis.agreed
-    streams = {d: replace(s, mag=None) for d, s in source.streams.items()}
+    streams = {d: s.change(mag=None) for d, s in source.streams.items()}
     analysis = replace(analysis, source=replace(source, streams=streams))
     if uniform is not None:
         analysis = replace(analysis, uniform=_without_magnetometers(uniform))
@@ -130,7 +130,7 @@ def forget_magnetometers(analysis: TakeAnalysis) -> TakeAnalysis:
 
 
 def _without_magnetometers(recording: UniformRecording) -> UniformRecording:
-    return replace(recording, sensors={s: replace(x, mag=None) for s, x in recording.sensors.items()})
+    return replace(recording, sensors={s: x.change(mag=None) for s, x in recording.sensors.items()})
 
 
 def calibrate_sensors(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:

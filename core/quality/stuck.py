@@ -338,7 +338,7 @@ def mark_stuck(recording: UniformRecording, params: StuckParams | None = None) -
                 if (kind := int(bad[k, i])) not in said:
                     said.add(kind)
                     notices.append(watch.describe(segments[i], i, kind, first / recording.rate_hz))
-        sensors[segments[i]] = replace(signals[i], valid=valid, interpolated=signals[i].interpolated & valid)
+        sensors[segments[i]] = signals[i].change(valid=valid, interpolated=signals[i].interpolated & valid)
     marked = replace(recording, sensors=sensors, notices=tuple(notices))
     if not drop_stuck_sensors(marked).sensors:
         marked = replace(marked, notices=(*notices, Notice("no_working_sensor", NONE_LEFT, severity="error")))

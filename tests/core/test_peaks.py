@@ -30,7 +30,7 @@ def walk(seed: int, decimals: int) -> Floats:
 def test_peaks_are_those_of_scipy(asked: dict[str, float], decimals: int) -> None:
     for seed in range(20):
         x = walk(seed, decimals)
-        assert np.array_equal(find_peaks(x, **asked), signal.find_peaks(x, **asked)[0])
+        assert np.array_equal(find_peaks(x, **asked), signal.find_peaks(x, **asked)[0])  # type: ignore[call-overload]
 
 
 def test_a_plateau_is_one_peak_and_an_end_is_none() -> None:
