@@ -18,7 +18,7 @@ import numpy as np
 from core.agreement.lags import MAD
 from core.agreement.params import JointParams, SlipParams
 from core.agreement.strides import choose_leg, find_main_axis, find_stride_turns, find_swings
-from core.agreement.terms import LevelMotion, SensorTerms, find_terms
+from core.agreement.terms import Motion, SensorTerms, find_terms
 from core.agreement.windows import JointWindows, compare_at_joint
 from core.frames import Bools, Floats, Segment
 from core.recording import SensorSignals, UniformRecording
@@ -102,8 +102,12 @@ def find_slips(
     terms, joints : of a recording whose late sensors were shifted.
     """
     rate_hz = recording.rate_hz
-    axes: dict[Segment, Floats] = {s: find_main_axis(x.rate) for s, x in terms.items() if s != "pelvis"}
-    power = {s: np.concatenate(([0.0], np.cumsum((terms[s].rate ** 2).sum(axis=1)))) for s in axes}
+    axes: dict[Segment, Floats] = {}
+    power: dict[Segment, Floats] = {}
+    for s in (s for s in terms if s != "pelvis"):
+        rate = terms[s].rate
+        axes[s] = find_main_axis(rate)
+        power[s] = np.concatenate(([0.0], np.cumsum((rate**2).sum(axis=1))))
     moving = [_find_moving(w, power, rate_hz, params) for w in joints]
     turns = find_turns([w.choose(ok) for w, ok in zip(joints, moving, strict=True)], axes, params)
     half = 0.5 * max((w.width_s for w in joints), default=0.0)
@@ -344,7 +348,7 @@ def question_strides(
     segment: Segment,
     step: PlaceStep,
     axis: Floats,
-    motions: Mapping[Segment, LevelMotion],
+    motions: Mapping[Segment, Motion],
     valid: Bools,
     rate_hz: float,
     half: float,

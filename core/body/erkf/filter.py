@@ -107,19 +107,29 @@ class ErkfTrack:
 
     Parameters
     ----------
-    p, q : (T, n, 3) m and (T, n, 4), sensor positions and orientations in W.
+    places, turns : of each sensor (T, 3) m and (T, 4), its position and orientation in W.
     heading_sd : (T, n) rad, of the filter, about the vertical.
     joint_residual : (T, joints) distance of the two ends of each joint, m.
     refused : (T, n) zero velocities that the gate refused.
     nominal : (T, n, 16) as in `ErkfState`, of the filter; (0, n, 16) of the smoother.
     """
 
-    p: Floats
-    q: Floats
+    places: tuple[Floats, ...]
+    turns: tuple[Floats, ...]
     heading_sd: Floats
     joint_residual: Floats
     refused: Bools
     nominal: Floats
+
+    @property
+    def p(self) -> Floats:
+        """Sensor positions (T, n, 3) in W, m; a copy."""
+        return np.stack(self.places, axis=1)
+
+    @property
+    def q(self) -> Floats:
+        """Sensor orientations (T, n, 4); a copy."""
+        return np.stack(self.turns, axis=1)
 
 
 class SampleSeries(Protocol):
@@ -207,8 +217,8 @@ def filter_block(
     lam = np.zeros(len(run.memory.P))
     broke = filter_segments(*run.arguments(), record, tuple(run.output), NONE_KEPT, 0, False, lam)
     output, x = run.output, run.output.nominal
-    track = ErkfTrack(x[..., 0:3], x[..., 6:10], output.heading_sd, output.residual, output.refused, x)
-    return track, run.end(broke)
+    places, turns = (tuple(x[..., k].swapaxes(0, 1)) for k in (slice(3), slice(6, 10)))
+    return ErkfTrack(places, turns, output.heading_sd, output.residual, output.refused, x), run.end(broke)
 
 
 @dataclass(frozen=True, eq=False)

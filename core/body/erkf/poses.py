@@ -18,7 +18,7 @@ from core.body.feet import FootTracks
 from core.body.kinematics import incomplete_legs
 from core.body.model import BodyModel
 from core.body.places import joint_places, sensor_place
-from core.body.poses import Poses
+from core.body.poses import Poses, figure_precision
 from core.body.tree import ImuTree, person_tree
 from core.calibration.result import CalibratedRecording
 from core.estimators import ERKF, LINKED_PATHS, SINGLE_PATHS
@@ -143,11 +143,11 @@ def find_segment_tracks(run: ErkfRun, *, in_place: bool = False) -> SegmentTrack
     """
     q, p = {}, {}
     for i, segment in enumerate(run.segments):
-        q[segment], p[segment] = run.tree.segment(i, run.track.p, run.track.q)
+        place, turn = run.track.places[i], run.track.turns[i]
+        q[segment], p[segment] = run.tree.segment(i, place, turn)
         if in_place:
-            for own, whole in ((q, run.track.q), (p, run.track.p)):
-                whole[:, i] = own[segment]
-                own[segment] = whole[:, i]
+            turn[:], place[:] = q[segment], p[segment]
+            q[segment], p[segment] = turn, place
     return SegmentTracks(q, p)
 
 
@@ -184,7 +184,9 @@ def place_figure(
         place |= _hang_together(run, orientations, place, side, body)
     floor = _floor({s: place[FOOT[s]][:, 2] - body.ankle_height for s in legs}, still)
     for s, p in place.items():
-        place[s] = p - np.array([0.0, 0.0, 1.0]) * floor[:, None]
+        level = p.astype(figure_precision(len(p)))
+        level[:, 2] = p[:, 2] - floor
+        place[s] = level
     return Poses(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,

@@ -67,8 +67,7 @@ def smooth(
         rows = kept[first:past]
         broke = filter_segments(*run.arguments(), record, tuple(run.output), rows, segment, False, lam)
         final = run.end(broke, float(known.step_s[: first * segment].sum()))
-    # by sensor, so that what is asked for of one lies together
-    p, q = np.empty((n, T, 3)), np.empty((n, T, 4))
+    places, turns = (tuple(np.empty((T, k)) for _ in range(n)) for k in (3, 4))
     heading_sd, residual = np.empty((T, n)), np.empty((T, len(tree.joints)))
     refused = np.empty((T, n), np.bool_)
     record = tuple(new_record(tree, params, segment))
@@ -77,7 +76,7 @@ def smooth(
         run = prepare_run(final, inputs.part(part.start, part.stop), tree, params, segment)
         rows, found = kept[first:past], run.output
         filter_segments(*run.arguments(), record, tuple(found), rows, segment, True, lam)
-        p[:, part], q[:, part] = (found.smoothed[..., k].swapaxes(0, 1) for k in (slice(3), slice(3, 7)))
+        for i in range(n):
+            places[i][part], turns[i][part] = found.smoothed[:, i, :3], found.smoothed[:, i, 3:]
         heading_sd[part], residual[part], refused[part] = found.heading_sd, found.residual, found.refused
-    none = np.empty((0, n, 16))
-    return ErkfTrack(p.swapaxes(0, 1), q.swapaxes(0, 1), heading_sd, residual, refused, none), final
+    return ErkfTrack(places, turns, heading_sd, residual, refused, np.empty((0, n, 16))), final
