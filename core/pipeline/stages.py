@@ -238,7 +238,11 @@ def keep_what_is_measured(analysis: TakeAnalysis) -> TakeAnalysis:
     kind = figure_precision(len(poses.t_s))
     turned = {s: q if s in kept else np.asarray(q, kind) for s, q in poses.q.items()}
     posed = replace(posed, orientations=orientations, poses=replace(poses, q=turned))
-    return replace(analysis, mounted=replace(mounted, orientations=orientations), posed=posed)
+    # a foot that the estimator left out keeps what it had
+    fused = require_stage(analysis.fused, "orientation")
+    fused = replace(fused, q={s: kept.get(s, q) for s, q in fused.q.items()})
+    mounted = replace(mounted, orientations=orientations)
+    return replace(analysis, fused=fused, mounted=mounted, posed=posed)
 
 
 def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:

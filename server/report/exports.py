@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
@@ -58,8 +58,13 @@ STRIDE_COLUMNS = ("side", "start_s", "tc_s", "end_s", "opposite_tc_s", "opposite
 """What a stride is; its parameters, `flags` and `excluded_reason` follow in strides.csv."""
 
 
-def analysis_files(analysis: TakeAnalysis) -> dict[str, bytes]:
-    """Write an analysis as files, name → bytes; a stage that gave nothing leaves its file out."""
+def analysis_files(analysis: TakeAnalysis, let_go: Callable[[], None] = lambda: None) -> dict[str, bytes]:
+    """Write an analysis as files, name → bytes; a stage that gave nothing leaves its file out.
+
+    Parameters
+    ----------
+    let_go : called when something large is no longer held.
+    """
     if analysis.source.protocol == "activity":
         written = {} if analysis.activity is None else write_activity(analysis.activity)
         return {"analysis.json": _json_bytes(summarise_analysis(analysis)), **written}
@@ -68,9 +73,11 @@ def analysis_files(analysis: TakeAnalysis) -> dict[str, bytes]:
     recording, poses, angles = analysis.recording, analysis.poses, analysis.angles
     measured, squats, held = analysis.measured, analysis.squats, analysis.tracks
     del analysis
+    let_go()
     if poses is not None:
         files["poses.parquet"] = poses_parquet(poses)
         del poses
+        let_go()
     if measured is not None:
         files["events.csv"] = events_csv(measured.events)
         files["strides.csv"] = strides_csv(measured.strides, measured.columns)
@@ -82,6 +89,7 @@ def analysis_files(analysis: TakeAnalysis) -> dict[str, bytes]:
         held = None if held is None else replace(held, angles=None)
         files["angles.parquet"] = angles_parquet(angles)
         del angles
+        let_go()
     if held is not None:
         files[tracks.NAME] = tracks.tracks_parquet(held)
         del held

@@ -24,8 +24,8 @@ SEGMENT = 128
 """Samples per segment, at least: 21 MB of kept states for ten minutes of seven sensors, and a record of 8 MB.
 Longer ones outgrow the processor's cache: with 256 a step takes 8 % longer."""
 
-AT_ONCE: Final = 1 << 14
-"""Samples, about, that are laid side by side for the filter: 6 MB of seven sensors, 6 of what it gives."""
+AT_ONCE: Final = 1 << 12
+"""Samples, about, that are laid side by side for the filter: 1.4 MB of seven sensors."""
 
 
 def smooth(
