@@ -400,6 +400,7 @@ def compile_agreement_kernels() -> None:
     wave = np.random.default_rng(0).normal(size=(2, n, 3))
     still = SensorSignals("", wave[0], wave[1], None, np.ones(n, np.bool_), np.zeros(n, np.bool_))
     terms = find_terms(still, 100.0, JointParams())
+    _ = terms.level
     compare_at_joint(("pelvis", "thigh_l"), terms, terms, JointParams())
     turn, places = _turn_places(np.ones((4, 2, 3)), np.array([1.0, 0.0, 0.0]))
     found = PlaceTurns(np.arange(4.0), turn, places, 1.0)

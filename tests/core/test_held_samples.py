@@ -38,6 +38,7 @@ def test_missing_samples_are_the_same_in_both() -> None:
     mag[4] = np.nan
     one = sensor(np.ones((10, 3)), mag)
     assert one.held("mag").dtype == np.float32
+    assert one.mag is not None
     assert np.array_equal(one.mag, mag, equal_nan=True)
 
 
