@@ -16,6 +16,7 @@ import numpy as np
 from core.anthropometry import BodyMeasures
 from core.errors import Notice, ParameterError, SignalError
 from core.frames import PROTOCOLS, SEGMENTS, Bools, Floats, Protocol, Segment
+from core.held_samples import HoldsSamples, hold_samples
 from core.sample_blocks import LongStream, SampleBlock
 from core.shoe import Shoe
 from core.standing_angles import check_standing
@@ -114,8 +115,9 @@ class Subject:
         }
 
 
+@hold_samples("acc", "gyr", "mag", "quat")
 @dataclass(frozen=True, eq=False)
-class ImuStream:
+class ImuStream(HoldsSamples):
     """One sensor as its file gives it, in SI units, on its own clock; missing samples are NaN rows.
 
     Parameters
@@ -150,10 +152,10 @@ class ImuStream:
             raise SignalError("empty", f"{self.source}: no samples.", sensor=self.device_id)
         for name, a, shape in (
             ("t_s", self.t_s, (n,)),
-            ("acc", self.acc, (n, 3)),
-            ("gyr", self.gyr, (n, 3)),
-            ("mag", self.mag, (n, 3)),
-            ("quat", self.quat, (n, 4)),
+            ("acc", self.held("acc"), (n, 3)),
+            ("gyr", self.held("gyr"), (n, 3)),
+            ("mag", self.held("mag"), (n, 3)),
+            ("quat", self.held("quat"), (n, 4)),
         ):
             _frozen(a, name, shape, self.source)
         if np.any(np.diff(self.t_s) <= 0):
@@ -194,14 +196,14 @@ def as_long_stream(stream: ImuStream, rows: int = BLOCK_ROWS) -> LongStream:
     def open_blocks() -> Iterator[SampleBlock]:
         for i in range(0, len(stream.t_s), rows):
             part = slice(i, i + rows)
-            gyr = None if stream.gyr is None else stream.gyr[part]
-            yield SampleBlock(stream.t_s[part] - stream.t_s[0], stream.acc[part], gyr)
+            gyr = None if stream.held("gyr") is None else stream.cut("gyr", part)
+            yield SampleBlock(stream.t_s[part] - stream.t_s[0], stream.cut("acc", part), gyr)
 
     return LongStream(
         device_id=stream.device_id,
         source=stream.source,
         rate_hz=stream.rate_hz,
-        has_gyro=stream.gyr is not None,
+        has_gyro=stream.held("gyr") is not None,
         duration_s=float(stream.t_s[-1] - stream.t_s[0]),
         open_blocks=open_blocks,
         notices=stream.notices,
@@ -266,8 +268,9 @@ class Recording:
         return tuple(d for d in dict.fromkeys((*self.streams, *self.long)) if d not in self.segments)
 
 
+@hold_samples("acc", "gyr", "mag")
 @dataclass(frozen=True, eq=False)
-class SensorSignals:
+class SensorSignals(HoldsSamples):
     """One sensor on the uniform axis.
 
     Parameters
@@ -285,16 +288,17 @@ class SensorSignals:
     interpolated: Bools
 
     def __post_init__(self) -> None:
-        n = len(self.acc)
+        acc, gyr = self.held("acc"), self.held("gyr")
+        n = len(acc)
         for name, a, shape in (
-            ("acc", self.acc, (n, 3)),
-            ("gyr", self.gyr, (n, 3)),
-            ("mag", self.mag, (n, 3)),
+            ("acc", acc, (n, 3)),
+            ("gyr", gyr, (n, 3)),
+            ("mag", self.held("mag"), (n, 3)),
             ("valid", self.valid, (n,)),
             ("interpolated", self.interpolated, (n,)),
         ):
             _frozen(a, name, shape, self.device_id)
-        if not (np.isfinite(self.acc).all() and np.isfinite(self.gyr).all()):
+        if not (np.isfinite(acc).all() and np.isfinite(gyr).all()):
             raise SignalError(
                 "bad_signal", f"{self.device_id}: non-finite samples left.", sensor=self.device_id
             )
@@ -322,10 +326,10 @@ class UniformRecording:
     def __post_init__(self) -> None:
         _frozen(self.t_s, "t_s", (None,), "UniformRecording")
         for segment, s in self.sensors.items():
-            if len(s.acc) != len(self.t_s):
+            if len(s.valid) != len(self.t_s):
                 raise ParameterError(
                     "bad_shape",
-                    f"{segment} has {len(s.acc)} samples, the axis {len(self.t_s)}.",
+                    f"{segment} has {len(s.valid)} samples, the axis {len(self.t_s)}.",
                     sensor=segment,
                 )
         object.__setattr__(self, "sensors", MappingProxyType(dict(self.sensors)))

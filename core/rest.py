@@ -69,9 +69,9 @@ def measure_quietness(signals: SensorSignals, rate_hz: float, params: RestParams
     """Measure how quiet a sensor is in the window around every sample; borders hold the nearest window."""
     params = params or RestParams()
     width = max(2, round(params.window_s * rate_hz))
-    if len(signals.acc) < width:
-        never = np.full(len(signals.acc), np.inf)
-        return Quietness(never, never, np.zeros(len(signals.acc), bool))
+    if len(signals.valid) < width:
+        never = np.full(len(signals.valid), np.inf)
+        return Quietness(never, never, np.zeros(len(signals.valid), bool))
     # one row an axis: sums along a row take a fifth of the time of sums down the columns
     rate, force = np.ascontiguousarray(signals.gyr.T), np.ascontiguousarray(signals.acc.T)
     mean_rate = _moving_mean(rate, width)
@@ -119,7 +119,7 @@ def drop_false_rests(
 
 def is_drifting(signals: SensorSignals, window: Window, rate_hz: float, params: RestParams) -> bool:
     """Does the vertical turn in a sensor between the ends of a window, a quarter of a second to one each?"""
-    turned = measure_turn(signals.acc[index_window(window, rate_hz)], rate_hz)
+    turned = measure_turn(signals.cut("acc", index_window(window, rate_hz)), rate_hz)
     return turned[0] > params.drift and turned[0] > params.drift_rate * turned[1]
 
 

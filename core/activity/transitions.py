@@ -13,6 +13,7 @@ from core.activity.frames import FRAME_HZ, Frames, Singles, measure_length
 from core.activity.params import TransitionParams
 from core.activity.result import PosturalTransition, TransitionCandidate, TransitionKind, TransitionRefusal
 from core.frames import GRAVITY, Bools, Floats
+from core.peaks import find_peaks
 from core.rest import find_runs
 
 EDGE_RISE = 0.035
@@ -101,8 +102,6 @@ def _count_above(tilt: Singles, there: Bools, limit: float) -> int:
 
 def find_leans(theta: Singles, there: Bools, params: TransitionParams) -> list[Lean]:
     """Peaks of the inclination (f,) that are candidates, each with the minima beside it."""
-    from scipy.signal import find_peaks
-
     least = 0.5 * params.prominence_rad
     foot = max(0.0, params.candidate_rad - least)
     tops: list[int] = []
@@ -110,7 +109,7 @@ def find_leans(theta: Singles, there: Bools, params: TransitionParams) -> list[L
     for first, last in find_runs(there & (theta > foot)):
         part = slice(max(0, first - 1), last + 1)
         rising = np.where(there[part], theta[part], 0.0)
-        found, _ = find_peaks(rising, height=params.candidate_rad, prominence=least)
+        found = find_peaks(rising, height=params.candidate_rad, prominence=least)
         tops += (part.start + found).tolist()
     reach = round(params.half_s * FRAME_HZ)
     return [

@@ -19,7 +19,7 @@ from core.agreement.labels import sort_by_joints
 from core.agreement.mirrored import find_mirrored
 from core.agreement.params import ExchangeParams, JointParams
 from core.agreement.strides import find_swings
-from core.agreement.terms import LevelMotion, SensorTerms, cut_terms
+from core.agreement.terms import Motion, SensorTerms, cut_terms
 from core.agreement.windows import JointWindows, compare_at_joint
 from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
 from core.rotation import rotate
@@ -184,7 +184,7 @@ def _simplify(swap: Swap) -> Swap:
 
 
 def compare_hips(
-    motions: Mapping[Segment, LevelMotion],
+    motions: Mapping[Segment, Motion],
     joints: Mapping[tuple[Segment, Segment], JointWindows],
     rate_hz: float,
     params: ExchangeParams,
@@ -216,7 +216,7 @@ def compare_hips(
 
 
 def _cosines(
-    motions: Mapping[Segment, LevelMotion],
+    motions: Mapping[Segment, Motion],
     chain: Sequence[JointWindows],
     line: Floats,
     rate_hz: float,
@@ -224,7 +224,7 @@ def _cosines(
 ) -> list[float]:
     """One cosine per swing of a leg."""
     foot, shank = motions[chain[-1].second], motions[chain[-1].first]
-    speed = np.linalg.norm(foot.rate, axis=1)
+    speed, level, pelvis = np.linalg.norm(foot.rate, axis=1), foot.level, motions["pelvis"].q
     swings, said = find_swings(shank.rate, rate_hz), []
     for a, b in pairwise(swings):
         if b - a > LONGEST_SWING_S * rate_hz or b - a < 5:
@@ -232,14 +232,14 @@ def _cosines(
         middle = 0.5 * (a + b) / rate_hz
         turn = sum(float(w.turn[int(np.argmin(np.abs(w.t_s - middle)))]) for w in chain)
         # from mid-swing to mid-swing: constant errors out, zero velocity where the foot is quietest
-        h = foot.level[:2, a:b] - foot.level[:2, a:b].mean(axis=1, keepdims=True)
+        h = level[:2, a:b] - level[:2, a:b].mean(axis=1, keepdims=True)
         v = np.cumsum(h, axis=1) / rate_hz
         way = (v - v[:, [int(np.argmin(speed[a:b]))]]).sum(axis=1) / rate_hz
         if np.linalg.norm(way) < params.least_way_m:
             continue
         c, s = np.cos(turn), np.sin(turn)
         ahead = np.array([c * way[0] - s * way[1], s * way[0] + c * way[1]])
-        across = rotate(motions["pelvis"].q[(a + b) // 2], line)[:2]
+        across = rotate(pelvis[(a + b) // 2], line)[:2]
         size = np.linalg.norm(across) * np.linalg.norm(ahead)
         said.append(float((across[0] * ahead[1] - across[1] * ahead[0]) / max(size, 1e-9)))
     return said

@@ -72,4 +72,4 @@ def turn_back(signals: SensorSignals, t_s: Floats, slip: SensorSlip) -> SensorSi
 def leave_out(signals: SensorSignals, t_s: Floats, doubtful: Window) -> SensorSignals:
     """The sensor as one that does not measure while nobody knows how it sits."""
     valid = signals.valid & ~((t_s >= doubtful[0]) & (t_s <= doubtful[1]))
-    return replace(signals, valid=valid, interpolated=signals.interpolated & valid)
+    return signals.change(valid=valid, interpolated=signals.interpolated & valid)

@@ -18,7 +18,7 @@ import numpy as np
 from core.agreement.lags import MAD
 from core.agreement.params import JointParams, SlipParams
 from core.agreement.strides import choose_leg, find_main_axis, find_stride_turns, find_swings
-from core.agreement.terms import LevelMotion, SensorTerms, find_terms
+from core.agreement.terms import Motion, SensorTerms, find_terms
 from core.agreement.windows import JointWindows, compare_at_joint
 from core.frames import Bools, Floats, Segment
 from core.recording import SensorSignals, UniformRecording
@@ -102,8 +102,12 @@ def find_slips(
     terms, joints : of a recording whose late sensors were shifted.
     """
     rate_hz = recording.rate_hz
-    axes: dict[Segment, Floats] = {s: find_main_axis(x.rate) for s, x in terms.items() if s != "pelvis"}
-    power = {s: np.concatenate(([0.0], np.cumsum((terms[s].rate ** 2).sum(axis=1)))) for s in axes}
+    axes: dict[Segment, Floats] = {}
+    power: dict[Segment, Floats] = {}
+    for s in (s for s in terms if s != "pelvis"):
+        rate = terms[s].rate
+        axes[s] = find_main_axis(rate)
+        power[s] = np.concatenate(([0.0], np.cumsum((rate**2).sum(axis=1))))
     moving = [_find_moving(w, power, rate_hz, params) for w in joints]
     turns = find_turns([w.choose(ok) for w, ok in zip(joints, moving, strict=True)], axes, params)
     half = 0.5 * max((w.width_s for w in joints), default=0.0)
@@ -344,7 +348,7 @@ def question_strides(
     segment: Segment,
     step: PlaceStep,
     axis: Floats,
-    motions: Mapping[Segment, LevelMotion],
+    motions: Mapping[Segment, Motion],
     valid: Bools,
     rate_hz: float,
     half: float,
@@ -359,7 +363,7 @@ def question_strides(
     at, within = step.at_s, half
     share = None
     for leg in choose_leg(segment):
-        borders = find_swings(motions[leg].rate, rate_hz) if leg in motions else np.zeros(0)
+        borders = find_swings(motions[leg].rate, rate_hz) if leg in motions else np.zeros(0, np.int64)
         if len(borders) > 2 * params.strides:
             u = find_stride_turns(motions[segment], valid, borders, rate_hz, params)
             x = u.turn @ axis
@@ -396,6 +400,7 @@ def compile_agreement_kernels() -> None:
     wave = np.random.default_rng(0).normal(size=(2, n, 3))
     still = SensorSignals("", wave[0], wave[1], None, np.ones(n, np.bool_), np.zeros(n, np.bool_))
     terms = find_terms(still, 100.0, JointParams())
+    _ = terms.level
     compare_at_joint(("pelvis", "thigh_l"), terms, terms, JointParams())
     turn, places = _turn_places(np.ones((4, 2, 3)), np.array([1.0, 0.0, 0.0]))
     found = PlaceTurns(np.arange(4.0), turn, places, 1.0)

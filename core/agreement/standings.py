@@ -102,12 +102,13 @@ def _list_walks(
 ) -> Iterator[tuple[Window, Window, Window]]:
     """Every walk, from its first to its last mid-swing, with the first rest before and after it."""
     first = rests[0] if rests else None
+    rates = [terms[SHANK[side]].rate for side in SIDES]
     for a, b in pairwise(rests):
         gap = slice(round(a[1] * rate_hz), round(b[0] * rate_hz))
         swings: list[float] = []
         if gap.stop - gap.start > params.strides * rate_hz:
-            for side in SIDES:
-                swings += (gap.start + find_swings(terms[SHANK[side]].rate[gap], rate_hz)).tolist()
+            for rate in rates:
+                swings += (gap.start + find_swings(rate[gap], rate_hz)).tolist()
         if first is not None and len(swings) >= 2 * params.strides:
             yield first, (min(swings) / rate_hz, max(swings) / rate_hz), b
             first = b
@@ -132,7 +133,7 @@ def _measure_turns(
             for window in (before, walk, after):
                 there = index_window(window, rate_hz)
                 ok = x.valid[there]
-                ups.append(x.acc[there][ok].mean(axis=0) if ok.any() else np.full(3, np.nan))
+                ups.append(x.cut("acc", there)[ok].mean(axis=0) if ok.any() else np.full(3, np.nan))
             walking, standing = (_turn_about(axis, ups[0], up) for up in ups[1:])
             if np.isfinite(walking + standing):
                 found[segment] = walking, standing, axis

@@ -7,11 +7,13 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.agreement.params import SlipParams
-from core.agreement.terms import LevelMotion
+from core.agreement.terms import Motion
 from core.filtering import low_pass
 from core.frames import Bools, Floats, Segment
+from core.peaks import find_peaks
 from core.rotation import conjugate, exp, rotate, to_matrix
 
 SMOOTH_HZ: Final = 4.0
@@ -49,16 +51,14 @@ def find_largest_axis(moments: Floats) -> Floats:
     return np.ascontiguousarray(np.linalg.eigh(moments)[1][:, -1])
 
 
-def find_swings(rate: Floats, rate_hz: float) -> Floats:
+def find_swings(rate: Floats, rate_hz: float) -> NDArray[np.int64]:
     """Samples (k,) of the mid-swings of a leg: peaks of the rate about its main axis, the larger lobe up."""
-    from scipy.signal import find_peaks
-
     x = low_pass(rate @ find_main_axis(rate), SMOOTH_HZ, rate_hz)
     low, high = np.percentile(x, (2, 98))
     x, top = (x, high) if high >= -low else (-x, -low)
     if top < LEAST_SWING:
         return np.zeros(0, np.int64)
-    return np.asarray(find_peaks(x, height=HEIGHT * top, distance=max(1, round(SHORTEST_S * rate_hz)))[0])
+    return find_peaks(x, height=HEIGHT * top, distance=max(1, round(SHORTEST_S * rate_hz)))
 
 
 def choose_leg(segment: Segment) -> tuple[Segment, ...]:
@@ -68,7 +68,7 @@ def choose_leg(segment: Segment) -> tuple[Segment, ...]:
 
 
 def find_stride_turns(
-    motion: LevelMotion, valid: Bools, borders: Floats, rate_hz: float, params: SlipParams
+    motion: Motion, valid: Bools, borders: NDArray[np.int64], rate_hz: float, params: SlipParams
 ) -> StrideTurns:
     """Fit each stride's curve of vertical and rate to the typical one by a rotation.
 
@@ -77,19 +77,20 @@ def find_stride_turns(
     """
     length = np.diff(borders)
     usual = float(np.median(length)) if len(length) else 0.0
-    smooth = low_pass(np.ascontiguousarray(motion.rate.T), 15.0, rate_hz).T
+    q, rate, level = motion.q, motion.rate, motion.level
+    smooth = low_pass(np.ascontiguousarray(rate.T), 15.0, rate_hz).T
     curves, spans = [], []
     for a, b in pairwise(borders):
         if not USUAL[0] * usual <= b - a <= USUAL[1] * usual or b - a > LONGEST_S * rate_hz:
             continue
         if not valid[a : b + 1].all():
             continue
-        up = motion.level[:, a:b].mean(axis=1)
+        up = level[:, a:b].mean(axis=1)
         up /= np.linalg.norm(up)
-        if abs(float(np.sum(rotate(motion.q[a:b], motion.rate[a:b]) @ up))) / rate_hz > params.straight_rad:
+        if abs(float(np.sum(rotate(q[a:b], rate[a:b]) @ up))) / rate_hz > params.straight_rad:
             continue
         k = a + (np.arange(POINTS) * (b - a)) // POINTS
-        curves.append(np.concatenate((rotate(conjugate(motion.q[k]), np.tile(up, (POINTS, 1))), smooth[k])))
+        curves.append(np.concatenate((rotate(conjugate(q[k]), np.tile(up, (POINTS, 1))), smooth[k])))
         spans.append((a / rate_hz, b / rate_hz))
     if len(curves) < 2 * params.strides:
         return StrideTurns(np.zeros(0), np.zeros(0), np.zeros((0, 3)))

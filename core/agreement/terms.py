@@ -7,7 +7,7 @@ R (tilt by the complementary filter, heading free) that is R f + R K r: linear i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numba
 import numpy as np
@@ -22,6 +22,22 @@ from core.rotation import compiled, from_matrix
 
 TERMS: Final = 4
 """Columns of a sensor's terms: three for the place, one for its own specific force."""
+
+
+class Motion(Protocol):
+    """How one sensor moves: of the arrays, or worked out each time it is asked for; see `LevelMotion`."""
+
+    @property
+    def q(self) -> Floats:
+        """(n, 4)."""
+
+    @property
+    def level(self) -> Floats:
+        """(3, n)."""
+
+    @property
+    def rate(self) -> Floats:
+        """(n, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,18 +56,34 @@ class LevelMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class SensorTerms(LevelMotion):
+class SensorTerms:
     """One sensor's side of every joint, and how it moves at every sample of the take.
 
     Parameters
     ----------
+    q : as in `LevelMotion`. signals : of the sensor. bias : (3,) rad/s, its rate at rest.
     M : (m, 3, 4) [R K | R f] in m/s² per m and m/s², x and y horizontal, z up. usable : (m,) no lost
         sample is near. rate_hz : of these samples.
     """
 
+    q: Floats
+    signals: SensorSignals
+    bias: Floats
     M: Floats
     usable: Bools
     rate_hz: float
+
+    @property
+    def level(self) -> Floats:
+        """(3, n) as in `LevelMotion`, worked out anew: an hour of seven sensors has 62 MB."""
+        out = np.empty((3, len(self.q)))
+        _write_level(self.q, self.signals.acc, out)
+        return out
+
+    @property
+    def rate(self) -> Floats:
+        """(n, 3) as in `LevelMotion`, as well."""
+        return self.signals.gyr - self.bias
 
 
 NORMS: Final = (9.0, 10.6)
@@ -69,14 +101,16 @@ STEEPEST: Final = 4.0
 
 def find_terms(signals: SensorSignals, rate_hz: float, params: JointParams) -> SensorTerms:
     """Tilt the sensor level and band-pass its terms."""
-    gyr = signals.gyr - find_bias(signals, rate_hz)
-    state, rest_norm = start_tilt(signals.acc, signals.valid, rate_hz)
-    q = advance(state, gyr, signals.acc, signals.valid, rate_hz, rest_norm, params.attitude)[0]
-    slow, level = low_pass_terms(q[None], signals.acc[None], gyr[None], rate_hz, params)
+    bias = find_bias(signals, rate_hz)
+    acc, gyr = signals.acc, signals.gyr - bias
+    state, rest_norm = start_tilt(acc, signals.valid, rate_hz)
+    q = advance(state, gyr, acc, signals.valid, rate_hz, rest_norm, params.attitude)[0]
+    slow, _ = low_pass_terms(q[None], acc[None], gyr[None], rate_hz, params)
+    del acc, gyr
     thin = find_thinning(rate_hz, params)
     M = take_mean_out(slow, rate_hz / thin, params)[0]
     usable = find_usable(signals.valid[:, None], rate_hz)[0]
-    return SensorTerms(q, level[0], gyr, M, usable[::thin], rate_hz / thin)
+    return SensorTerms(q, signals, bias, M, usable[::thin], rate_hz / thin)
 
 
 def find_thinning(rate_hz: float, params: JointParams) -> int:
@@ -97,8 +131,12 @@ def low_pass_terms(
     w = low_pass(np.ascontiguousarray(gyr.transpose(0, 2, 1)), STEEPEST * edge, rate_hz, pad)
     rows = np.empty((len(q), 3 * TERMS, q.shape[1]))
     _write_terms(q, np.ascontiguousarray(acc), w, np.gradient(w, 1.0 / rate_hz, axis=2), rows)
-    slow = low_pass(rows, edge, rate_hz, pad)[:, :, :: find_thinning(rate_hz, params)]
-    return slow, rows[:, TERMS - 1 :: TERMS].copy()
+    level = rows[:, TERMS - 1 :: TERMS].copy()
+    thin = find_thinning(rate_hz, params)
+    slow = np.empty((*rows.shape[:2], -(-rows.shape[2] // thin)))
+    for i in range(rows.shape[1]):  # one after the other: all that is thinned away is not held at once
+        slow[:, i] = low_pass(rows[:, i], edge, rate_hz, pad)[:, ::thin]
+    return slow, level
 
 
 def take_mean_out(slow: Floats, rate_hz: float, params: JointParams, pad: int | None = None) -> Floats:
@@ -118,10 +156,17 @@ def cut_terms(terms: SensorTerms, start_s: float, end_s: float) -> SensorTerms:
     thin = round((len(terms.q) - 1) / max(1, len(terms.M) - 1))
     first, last = (max(0, round(x * terms.rate_hz)) for x in (start_s, end_s))
     part, whole = slice(first, last), slice(first * thin, last * thin)
+    signals = terms.signals
     return SensorTerms(
         terms.q[whole],
-        terms.level[:, whole],
-        terms.rate[whole],
+        signals.change(
+            acc=signals.held("acc")[whole],
+            gyr=signals.held("gyr")[whole],
+            mag=None,
+            valid=signals.valid[whole],
+            interpolated=signals.interpolated[whole],
+        ),
+        terms.bias,
         terms.M[part],
         terms.usable[part],
         terms.rate_hz,
@@ -140,7 +185,7 @@ def find_bias(signals: SensorSignals, rate_hz: float, quiet: Quietness | None = 
     if not quiet.quiet[calmest]:
         return np.zeros(3)
     half = max(1, round(0.5 * rate_hz))
-    return np.asarray(signals.gyr[max(0, calmest - half) : calmest + half].mean(axis=0))
+    return np.asarray(signals.cut("gyr", slice(max(0, calmest - half), calmest + half)).mean(axis=0))
 
 
 def start_tilt(acc: Floats, valid: Bools, rate_hz: float) -> tuple[AttitudeState, float]:
@@ -153,6 +198,16 @@ def start_tilt(acc: Floats, valid: Bools, rate_hz: float) -> tuple[AttitudeState
     across /= max(float(np.linalg.norm(across)), 1e-9)
     start = AttitudeState(from_matrix(np.stack((across, np.cross(up, across), up))), np.zeros(3), 0.0)
     return start, norm if NORMS[0] < norm < NORMS[1] else GRAVITY
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _write_level(q, f, out):  # type: ignore[no-untyped-def]
+    """Write R f of q (n, 4) and f (n, 3) into out (3, n)."""
+    R = np.empty((3, 3))
+    for n in range(q.shape[0]):
+        compiled.to_matrix(q[n], R)
+        for i in range(3):
+            out[i, n] = R[i, 0] * f[n, 0] + R[i, 1] * f[n, 1] + R[i, 2] * f[n, 2]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

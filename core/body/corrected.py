@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -21,12 +23,33 @@ def correct_signals(
     rest, not as a scale; the gyroscope's mean at rest is taken off (docs/science/calibration.md, "Standing").
     """
     samples = len(calibrated.recording.t_s[part])
-    acc, gyr = np.empty((samples, len(segments), 3)), np.empty((samples, len(segments), 3))
     valid = np.empty((samples, len(segments)), np.bool_)
     for i, segment in enumerate(segments):
-        signals, mounted = calibrated.recording.sensors[segment], calibrated.calibration.segments[segment]
-        excess = (mounted.rest_norm - GRAVITY) * mounted.R_segment_sensor[1]
-        np.subtract(signals.acc[part], excess, out=acc[:, i])
-        np.subtract(signals.gyr[part], mounted.gyro_bias, out=gyr[:, i])
-        valid[:, i] = signals.valid[part]
+        valid[:, i] = calibrated.recording.sensors[segment].valid[part]
+    acc, gyr = (CorrectedSignals(calibrated, segments, name)[part] for name in SIGNALS)
     return acc, gyr, valid
+
+
+SignalName = Literal["acc", "gyr"]
+SIGNALS: tuple[SignalName, SignalName] = ("acc", "gyr")
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectedSignals:
+    """One signal as `correct_signals` gives it, of the part that is asked for."""
+
+    calibrated: CalibratedRecording
+    segments: Sequence[Segment]
+    name: SignalName
+
+    def __getitem__(self, part: slice, /) -> Floats:
+        samples = len(self.calibrated.recording.t_s[part])
+        out = np.empty((samples, len(self.segments), 3))
+        for i, segment in enumerate(self.segments):
+            mounted = self.calibrated.calibration.segments[segment]
+            off = mounted.gyro_bias
+            if self.name == "acc":
+                off = (mounted.rest_norm - GRAVITY) * mounted.R_segment_sensor[1]
+            held = self.calibrated.recording.sensors[segment].held(self.name)
+            np.subtract(held[part], off, out=out[:, i], dtype=np.float64)
+        return out

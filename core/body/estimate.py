@@ -20,7 +20,13 @@ from core.body.erkf.filter import erkf_inputs
 from core.body.erkf.headings import judge_turned_axes, report_turned_axes
 from core.body.erkf.health import erkf_health, erkf_notices
 from core.body.erkf.params import ErkfParams
-from core.body.erkf.poses import foot_tracks, place_figure, replace_orientations, run_erkf
+from core.body.erkf.poses import (
+    find_segment_tracks,
+    foot_tracks,
+    place_figure,
+    replace_orientations,
+    run_erkf,
+)
 from core.body.erkf.smoother import smooth
 from core.body.erkf.start import start_state
 from core.body.feet import FootTracks
@@ -161,9 +167,10 @@ class _Take:
         run = run_erkf(
             self.calibrated, self.orientations, self.body, segments, self.params.erkf, self.mounted.arms
         )
-        orientations = replace_orientations(run, self.orientations)
-        poses = place_figure(run, orientations, self.contacts, self.body)
         health, turned = erkf_health(run), self.mounted.turned_rad
+        tracks = find_segment_tracks(run, in_place=True)
+        orientations = replace_orientations(run, self.orientations, tracks)
+        poses = place_figure(run, orientations, self.contacts, self.body, tracks)
         poses = replace(
             poses,
             health=(*health, *judge_turned_axes(turned)),
@@ -175,7 +182,7 @@ class _Take:
             ),
             diagnostics={"heading_error_rad": turned},
         )
-        return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body))
+        return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body, tracks))
 
     def anchored(self) -> PoseEstimate:
         """Orientations as they are, a figure by forward kinematics."""
@@ -209,7 +216,8 @@ class _Take:
             health=(*made.poses.health, *(f for f in health if (f.name, f.of) not in known)),
             notices=(*made.poses.notices, *erkf_notices(run, health)),
         )
-        paths = foot_tracks(run, replace_orientations(run, self.orientations), self.body)
+        tracks = find_segment_tracks(run, in_place=True)
+        paths = foot_tracks(run, replace_orientations(run, self.orientations, tracks), self.body, tracks)
         return replace(made, poses=poses, feet=replace(paths, posture=self.calibrated.calibration.posture))
 
 

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
 
 from core.body.health import HealthFinding
 from core.body.model import BodyModel
 from core.errors import Notice
 from core.frames import Bools, Floats, Segment
+
+SHORT: Final = 1 << 16
+"""Samples up to which a figure is held in double precision: eleven minutes at 100 Hz."""
+
+
+def figure_precision(samples: int) -> type[np.floating[Any]]:
+    """Of a figure of so many samples: a longer one is held as its file has it, at half of 850 MB for 6 h."""
+    return np.float64 if samples <= SHORT else np.float32
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +33,7 @@ class Poses:
         mid-hip, thigh hip centre, shank knee centre, foot ankle centre (docs/coordinate-systems.md).
     valid : (n,) all segments of the figure measured.
     contact : segment (feet) → (n,) True while the foot is taken to be on the floor.
+    q, p : in single precision where the take is long (`figure_precision`).
     method : of an estimator of `core.estimators`, or its NO_FIGURE.
     reduced : a stable code when a better estimator was not possible or not asked for: "sensor_failed",
         "not_calibrated", "no_standing", "estimator_failed"; None for the best one of the worn sensors.

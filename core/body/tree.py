@@ -159,10 +159,10 @@ class ImuTree:
         return turned.reshape(q.shape), origin.reshape(p.shape)
 
     def segment(self, i: int, p: Floats, q: Floats) -> tuple[Floats, Floats]:
-        """Orientation (T, 4) and origin (T, 3) of one segment; arguments (T, n, ·) as of `segments`."""
+        """Orientation (T, 4) and origin (T, 3) of one segment in W; p (T, 3), q (T, 4) of its sensor."""
         one = replace(self, imus=self.imus[i : i + 1], joints=(), feet=(), q_mount=self.q_mount[i : i + 1],
                       place=self.place[i : i + 1], origin=self.origin[i : i + 1])  # fmt: skip
-        turned, origin = one.segments(p[:, i : i + 1], q[:, i : i + 1])
+        turned, origin = one.segments(p[:, None], q[:, None])
         return turned[:, 0], origin[:, 0]
 
     def segment_q(self, q: Floats) -> Floats:

@@ -349,7 +349,7 @@ class _Evidence:
         if self.calibration.posture != "standing":
             return self._leave("stillness", segment, "Nobody stood still; the walk alone had to do.")
         part = index_window(self.calibration.zero, self.recording.rate_hz)
-        turned, _ = measure_turn(self.recording.sensors[segment].acc[part], self.recording.rate_hz)
+        turned, _ = measure_turn(self.recording.sensors[segment].cut("acc", part), self.recording.rate_hz)
         return self._judge("stillness", segment, degrees(turned))
 
     def check_gravity(self, segment: Segment) -> CalibrationCheck:

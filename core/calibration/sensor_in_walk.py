@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from core.frames import FOOT, Bools, Floats, Segment
 from core.fusion.attitude import AttitudeParams, AttitudeState, advance, estimate_orientation
+from core.peaks import find_peaks
 from core.recording import SensorSignals
 from core.rest import find_runs
 from core.rotation import conjugate, multiply, rotate, wrap_angle
@@ -85,11 +86,10 @@ def find_flat_moments(gyr: Floats, walked: Bools, rate_hz: float, params: WalkRu
     gyr : (n, 3) rad/s. walked : (n,) somebody walks and the sensor is there.
     """
     from scipy.ndimage import uniform_filter1d
-    from scipy.signal import find_peaks
 
     width = max(2, round(params.flat_mean_s * rate_hz))
     rate = np.sqrt(uniform_filter1d((gyr**2).sum(axis=1), width, mode="nearest"))
-    lows, _ = find_peaks(-np.where(walked, rate, rate.max()), distance=params.flat_apart_s * rate_hz)
+    lows = find_peaks(-np.where(walked, rate, rate.max()), distance=params.flat_apart_s * rate_hz)
     lows = lows[walked[lows]]
     if not len(lows):
         return lows

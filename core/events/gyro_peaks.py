@@ -23,6 +23,7 @@ from core.errors import Notice, SignalError
 from core.events.result import GaitEvent, GaitEvents
 from core.filtering import low_pass
 from core.frames import FOOT, SHANK, SIDES, Bools, Floats, Oriented, Segment, Side
+from core.peaks import find_peaks
 from core.rotation import conjugate, log, multiply
 
 
@@ -166,10 +167,8 @@ def _events(
     side: Side, rate: Floats, valid: Bools, t_s: Floats, rate_hz: float, params: GyroPeakParams
 ) -> list[GaitEvent]:
     """Contacts of one segment, swing by swing."""
-    from scipy.signal import find_peaks
-
     distance = max(1.0, params.refractory_s * rate_hz)
-    swings, _ = find_peaks(np.where(valid, rate, 0.0), height=params.swing_rad_s, distance=distance)
+    swings = find_peaks(np.where(valid, rate, 0.0), height=params.swing_rad_s, distance=distance)
     reach = round(params.longest_s * rate_hz)
     step = 1.0 / rate_hz
     events: list[GaitEvent] = []
@@ -211,13 +210,11 @@ def _contact(
 
 def _unclear(rate: Floats, rate_hz: float, params: GyroPeakParams) -> tuple[int, int] | None:
     """Number of peaks just below the threshold and above it, where that leaves the swings unclear."""
-    from scipy.signal import find_peaks
-
     share, most = params.unclear
     low = share * params.swing_rad_s
     # a swing may have a smaller peak beside its own: only what stands for itself counts
     distance = max(1.0, params.apart_s * rate_hz)
-    peaks, _ = find_peaks(rate, height=low, prominence=low, distance=distance)
+    peaks = find_peaks(rate, height=low, prominence=low, distance=distance)
     above = int((rate[peaks] >= params.swing_rad_s).sum())
     below = len(peaks) - above
     return (below, above) if above and below > most * above else None

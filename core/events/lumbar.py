@@ -25,6 +25,7 @@ from core.events.periodicity import Periodicity, PeriodicityParams, step_times
 from core.events.steps import Step, Steps
 from core.filtering import low_pass
 from core.frames import Bools, Floats, Segment, Side
+from core.peaks import find_peaks
 from core.recording import SensorSignals, UniformRecording
 from core.rest import STANDING, find_rest_windows, find_runs
 
@@ -215,7 +216,6 @@ def _steps(
 ) -> list[float]:
     """Times of the maxima of every moving part, at the scale of its own step time."""
     from scipy.ndimage import gaussian_filter1d
-    from scipy.signal import find_peaks
 
     good = _good(rhythm, params)
     usual = float(np.median(rhythm.step_s[good]))
@@ -226,7 +226,7 @@ def _steps(
         reach = round(2.0 * step * rate_hz)
         low = max(0, first - reach)
         smooth = gaussian_filter1d(vertical[low : end + reach], params.scale * step * rate_hz, mode="nearest")
-        peaks, _ = find_peaks(smooth, prominence=params.prominence, distance=params.apart * step * rate_hz)
+        peaks = find_peaks(smooth, prominence=params.prominence, distance=params.apart * step * rate_hz)
         inside = [int(p) for p in peaks + low if first <= p < end and moving[p]]
         row = [float(p + _offset(smooth, p - low)) / rate_hz for p in inside]
         times += _together(row, params.bouts.long_share * step, params.row_steps)

@@ -312,14 +312,14 @@ def _recording(file: pq.ParquetFile, info: Mapping[str, object], source: str) ->
 
 def _signal(
     file: pq.ParquetFile, device: str, names: tuple[str, ...], rows: NDArray[np.int64] | slice
-) -> Floats | None:
-    """One signal (n, axes) alone: the whole table beside the signals would be half of these once more."""
+) -> Any:
+    """One signal (n, axes) alone, as float32: beside the signals a whole table would be as much once more."""
     columns = [f"{device}.{n}" for n in names]
     if columns[0] not in file.schema_arrow.names:
         return None
     table = file.read(columns, use_threads=False)
     with np.errstate(invalid="ignore"):
-        return np.stack([table[n].to_numpy()[rows] for n in columns], axis=-1, dtype=np.float64)
+        return np.stack([table[n].to_numpy()[rows] for n in columns], axis=-1, dtype=np.float32)
 
 
 def _clear_infinite(device: str, signals: Mapping[str, Floats | None]) -> list[Notice]:

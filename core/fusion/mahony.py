@@ -77,7 +77,7 @@ def segment_orientation(
     start = mounted.start_q
     if start is None:
         start = from_matrix(R_NEUTRAL @ mounted.R_segment_sensor)
-    at = min(round(0.5 * (zero[0] + zero[1]) * rate_hz), len(signals.acc) - 1)
+    at = min(round(0.5 * (zero[0] + zero[1]) * rate_hz), len(signals.valid) - 1)
     gyr = signals.gyr - mounted.gyro_bias
     sensor = estimate_orientation(
         start, at, gyr, signals.acc, signals.valid, rate_hz, mounted.rest_norm, params

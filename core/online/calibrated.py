@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from core.agreement import Agreement
 from core.agreement.agree import compare_sensors, measure_misfits
 from core.agreement.params import JointParams
@@ -18,11 +20,13 @@ from core.calibration import CalibrationParams
 from core.calibration.result import CalibratedRecording
 from core.calibration.score import CalibrationScore, score_calibration
 from core.errors import Notice
+from core.filtering import low_pass
 from core.frames import Segment
 from core.fusion.attitude import compile_attitude_kernel
 from core.fusion.mahony import MahonyParams, estimate_orientations
 from core.fusion.orientations import Orientations
 from core.online.frame import SegmentCheck
+from core.peaks import find_peaks
 from core.recording import UniformRecording
 
 
@@ -138,8 +142,9 @@ def _check(segment: Segment, calibrated: CalibratedRecording, notices: Sequence[
 
 def compile_calibration_kernels() -> None:
     """Load and compile all that a calibration needs, so that the first one does not take a second longer."""
-    import scipy.ndimage
-    import scipy.signal  # noqa: F401
+    import scipy.ndimage  # noqa: F401
 
+    # the kernels of filter and peaks
+    find_peaks(low_pass(np.arange(9.0), 1.0, 100.0), height=0.0, distance=1.0, prominence=0.0)
     compile_attitude_kernel()
     compile_pose_kernels()

@@ -97,12 +97,12 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
                 names[name] = name
         for segment, variable in (("pelvis", "pelvis_rotation"), (FOOT[side], "foot_progression")):
             if segment in angles.headings:
-                (row,) = resample(angles.headings[segment][np.newaxis], angles.t_s, bounds, POINTS)
+                (row,) = resample([angles.headings[segment]], angles.t_s, bounds, POINTS)
                 turned = row - row[:, :-1].mean(axis=1, keepdims=True)
                 curves.setdefault(variable, {})[side] = -turned if side == "left" else turned
         if not names:
             continue
-        rows = resample(np.stack([angles.angles[name] for name in names]), angles.t_s, bounds, POINTS)
+        rows = resample((angles.angles[name] for name in names), angles.t_s, bounds, POINTS)
         for (name, base), row in zip(names.items(), rows, strict=True):
             sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
             # from the mean of walking nobody knows where straight is
@@ -112,7 +112,8 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
                 row = np.where(torn[:, None], np.nan, row)
                 if torn.any():
                     why.setdefault(base, {})[side] = IMPOSSIBLE
-            curves.setdefault(base, {})[side] = sign * row
+            row *= sign
+            curves.setdefault(base, {})[side] = row
             if name in angles.bounds:
                 ends.setdefault(base, {})[side] = angles.bounds[name]
     return CycleCurves(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from core.frames import Floats
 
 
-def resample(signals: Floats, t_s: Floats, bounds: Floats, points: int = 101) -> Floats:
-    """Interpolate (k, n) signals on a uniform axis linearly to (k, pieces, points), both ends included.
+def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int = 101) -> list[Floats]:
+    """Interpolate signals (n,) on a uniform axis linearly to (pieces, points) each, both ends included.
 
     Parameters
     ----------
@@ -18,14 +20,17 @@ def resample(signals: Floats, t_s: Floats, bounds: Floats, points: int = 101) ->
     place = place[:, :1] + (place[:, 1:] - place[:, :1]) * np.linspace(0.0, 1.0, points)
     known = np.isfinite(place)
     low = np.clip(np.floor(np.where(known, place, 0.0)).astype(np.int64), 0, len(t_s) - 2)
-    here = np.take(signals, low, axis=1)
-    rows = np.take(signals, low + 1, axis=1)
-    # in place: ten minutes of all angles are a million points
-    rows -= here
-    rows *= place - low
-    rows += here
-    rows[~np.isfinite(rows.sum(axis=-1))] = np.nan
-    return rows
+    high, share = low + 1, place - low
+    found = []
+    for signal in signals:
+        here, rows = np.take(signal, low), np.take(signal, high)
+        # in place: ten minutes of all angles are a million points
+        rows -= here
+        rows *= share
+        rows += here
+        rows[~np.isfinite(rows.sum(axis=-1))] = np.nan
+        found.append(rows)
+    return found
 
 
 def first_crossing(pieces: Floats) -> Floats:

@@ -52,7 +52,7 @@ def stride_smoothness(strides: Sequence[Window], t_s: Floats, trunk: Mapping[Seg
         return summarise_values(NAME, None, [], "", "no_strides")
     force = np.linalg.norm(trunk["pelvis"] + (0.0, 0.0, GRAVITY), axis=1)
     bounds = np.array(strides)
-    pieces = resample(np.abs(force - GRAVITY)[None], t_s, bounds, POINTS + 1)[0, :, :-1]
+    pieces = resample(np.abs(force - GRAVITY)[None], t_s, bounds, POINTS + 1)[0][:, :-1]
     values = spectral_arc_length(pieces, (bounds[:, 1] - bounds[:, 0]) / POINTS)
     known = values[np.isfinite(values)].tolist()
     return summarise_values(NAME, None, known, "", "gap" if np.isfinite(force).any() else "no_forward")

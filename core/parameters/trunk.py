@@ -97,7 +97,7 @@ def _why(acceleration: Floats, axis: str) -> str:
 
 
 def _harmonic_ratios(own: Sequence[Window], t_s: Floats, acceleration: Floats) -> Iterator[Parameter]:
-    pieces = resample(acceleration.T, t_s, np.array(own), POINTS + 1)[..., :-1]
+    pieces = np.stack(resample(acceleration.T, t_s, np.array(own), POINTS + 1))[..., :-1]
     for axis, values in harmonic_ratios(pieces).items():
         known = values[np.isfinite(values)]
         yield summarise_values(f"harmonic_ratio_{axis}", None, known.tolist(), "", _why(acceleration, axis))

@@ -19,6 +19,7 @@ from core.angles.measure import measure_angles
 from core.body.estimate import estimate_poses
 from core.body.l7s.inputs import remove_gravity
 from core.body.mounting import mount_sensors
+from core.body.poses import figure_precision
 from core.body.walking_frame import in_walking_frame
 from core.calibration.declared import propose_mountings
 from core.calibration.result import CalibratedRecording
@@ -118,7 +119,7 @@ def judge_signals(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
 def forget_magnetometers(analysis: TakeAnalysis) -> TakeAnalysis:
     """No magnetometers: behind quality only a comparison of filters reads them."""
     source, uniform, agreed = analysis.source, analysis.uniform, analysis.agreed
-    streams = {d: replace(s, mag=None) for d, s in source.streams.items()}
+    streams = {d: s.change(mag=None) for d, s in source.streams.items()}
     analysis = replace(analysis, source=replace(source, streams=streams))
     if uniform is not None:
         analysis = replace(analysis, uniform=_without_magnetometers(uniform))
@@ -130,7 +131,7 @@ def forget_magnetometers(analysis: TakeAnalysis) -> TakeAnalysis:
 
 
 def _without_magnetometers(recording: UniformRecording) -> UniformRecording:
-    return replace(recording, sensors={s: replace(x, mag=None) for s, x in recording.sensors.items()})
+    return replace(recording, sensors={s: x.change(mag=None) for s, x in recording.sensors.items()})
 
 
 def calibrate_sensors(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -226,6 +227,22 @@ def keep_refined_alone(analysis: TakeAnalysis) -> TakeAnalysis:
     """No orientations from before the estimator."""
     mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
     return replace(analysis, mounted=replace(mounted, orientations=posed.orientations))
+
+
+def keep_what_is_measured(analysis: TakeAnalysis) -> TakeAnalysis:
+    """Orientations of feet and trunk alone, of which there are parameters; of a long take the figure as it is
+    written."""
+    mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
+    kept = {s: q for s, q in posed.orientations.q.items() if s in (*FOOT.values(), *TRUNK)}
+    orientations, poses = replace(posed.orientations, q=kept), posed.poses
+    kind = figure_precision(len(poses.t_s))
+    turned = {s: q if s in kept else np.asarray(q, kind) for s, q in poses.q.items()}
+    posed = replace(posed, orientations=orientations, poses=replace(poses, q=turned))
+    # a foot that the estimator left out keeps what it had
+    fused = require_stage(analysis.fused, "orientation")
+    fused = replace(fused, q={s: kept.get(s, q) for s, q in fused.q.items()})
+    mounted = replace(mounted, orientations=orientations)
+    return replace(analysis, fused=fused, mounted=mounted, posed=posed)
 
 
 def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -376,7 +393,7 @@ MOUNTING: Final = PipelineStage(
     "mounting", 0.15, mount_on_segments, ("mounted",), ("poses", "calibration"), let_go=keep_feet_alone
 )
 POSES: Final = PipelineStage("poses", 0.4, build_figure, ("posed",), ("poses",), let_go=keep_refined_alone)
-ANGLES: Final = PipelineStage("angles", 0.95, compute_angles, ("angles",))
+ANGLES: Final = PipelineStage("angles", 0.95, compute_angles, ("angles",), let_go=keep_what_is_measured)
 PARAMETERS: Final = PipelineStage(
     "parameters", 0.98, measure_walk, ("tracks", "measured"), ("strides", "bouts"), runs_after_problem=True
 )

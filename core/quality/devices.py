@@ -136,7 +136,7 @@ def check_device(stream: ImuStream, params: RestParams | None = None) -> DeviceC
         return DeviceCheck(stream.device_id, rate, reason="no_rest")
     rest = max(still, key=lambda r: r[1] - r[0])
     part = index_window(rest, rate)
-    acc, gyr = signals.acc[part], signals.gyr[part]
+    acc, gyr = (signals.cut(name, part) for name in ("acc", "gyr"))
     mean = acc.mean(axis=0)
     norm = float(np.linalg.norm(mean))
     if not NORM_RANGE[0] <= norm <= NORM_RANGE[1]:

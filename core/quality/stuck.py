@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from core.errors import Notice
 from core.frames import GRAVITY, Bools, Floats, Segment
 from core.quality.signals import RANGES
-from core.recording import UniformRecording
+from core.recording import SensorSignals, UniformRecording
 from core.rest import find_runs
 
 CHANNELS: Final = 6
@@ -321,11 +321,15 @@ def mark_stuck(recording: UniformRecording, params: StuckParams | None = None) -
     if not signals:
         return recording
     watch = StuckWatch(len(segments), recording.rate_hz, params)
-    acc, gyr = (np.stack(x, axis=1) for x in ([s.acc for s in signals], [s.gyr for s in signals]))
-    found = watch.push(acc, gyr, np.stack([s.valid for s in signals], axis=1))
-    if found is None:
+    found = [_look_at(watch, signals, slice(a, a + AT_ONCE)) for a in range(0, len(recording.t_s), AT_ONCE)]
+    if all(x is None for x in found):
         return recording
-    bad, back = found
+    lengths = [min(AT_ONCE, len(recording.t_s) - a) for a in range(0, len(recording.t_s), AT_ONCE)]
+    nothing = [np.zeros((n, len(signals)), np.int64) for n in lengths]
+    bad, back = (
+        np.concatenate([none if x is None else x[i] for x, none in zip(found, nothing, strict=True)])
+        for i in (0, 1)
+    )
     sensors, notices = dict(recording.sensors), list(recording.notices)
     for i in np.flatnonzero(bad.any(axis=0)).tolist():
         valid = signals[i].valid.copy()
@@ -338,11 +342,20 @@ def mark_stuck(recording: UniformRecording, params: StuckParams | None = None) -
                 if (kind := int(bad[k, i])) not in said:
                     said.add(kind)
                     notices.append(watch.describe(segments[i], i, kind, first / recording.rate_hz))
-        sensors[segments[i]] = replace(signals[i], valid=valid, interpolated=signals[i].interpolated & valid)
+        sensors[segments[i]] = signals[i].change(valid=valid, interpolated=signals[i].interpolated & valid)
     marked = replace(recording, sensors=sensors, notices=tuple(notices))
     if not drop_stuck_sensors(marked).sensors:
         marked = replace(marked, notices=(*notices, Notice("no_working_sensor", NONE_LEFT, severity="error")))
     return marked
+
+
+AT_ONCE: Final = 1 << 14
+"""Samples that are laid side by side to be looked at: 5 MB of seven sensors."""
+
+
+def _look_at(watch: StuckWatch, signals: Sequence[SensorSignals], part: slice) -> tuple[Ints, Ints] | None:
+    acc, gyr = (np.stack([s.cut(name, part) for s in signals], axis=1) for name in ("acc", "gyr"))
+    return watch.push(acc, gyr, np.stack([s.valid[part] for s in signals], axis=1))
 
 
 NONE_LEFT: Final = (

@@ -193,7 +193,7 @@ def _judge_hands(
     way the feet go. Exchanged legs would look the same: one mistake is likelier than two.
     """
     fixed = {
-        s: replace(x, gyr=np.ascontiguousarray(x.gyr @ gyr[s].T)) if s in gyr else x
+        s: x.change(gyr=np.ascontiguousarray(x.gyr @ gyr[s].T)) if s in gyr else x
         for s, x in uniform.sensors.items()
     }
     joints, terms = compare_sensors(replace(uniform, sensors=fixed), agreement.joints)

@@ -31,7 +31,7 @@ def cut_curves(angles: JointAngles, side: Side, bounds: Sequence[tuple[float, fl
     known = {name: values for name, values in own.items() if values is not None}
     if not known or not bounds:
         return {}
-    rows = resample(np.stack(list(known.values())), angles.t_s, np.array(bounds))
+    rows = resample(known.values(), angles.t_s, np.array(bounds))
     found = dict(zip(known, rows, strict=True))
     if all(name in found for name in INWARD):
         found[VALGUS] = np.add(*(found[name] - found[name][:, :1] for name in INWARD))

@@ -14,6 +14,7 @@ import numpy as np
 
 from core.errors import ParameterError
 from core.frames import Bools, Floats, Side
+from core.peaks import find_peaks
 
 FOOT_LIFTED: Final = "foot_lifted"
 CODES: Final = (FOOT_LIFTED, "incomplete", "signal_lost", "foot_moved")
@@ -134,11 +135,9 @@ def find_repetitions(
 
 def _find_bottoms(knee: Floats, params: RepetitionParams) -> list[tuple[int, int, int]]:
     """Of each squat the straightest sample before it, the deepest, and the straightest after it."""
-    from scipy.signal import find_peaks
-
     # at the ends as straight as ever, so that a squat that the take cuts is a peak too
     low = float(knee.min())
-    peaks = find_peaks(np.concatenate(([low], knee, [low])), prominence=params.least_rad)[0] - 1
+    peaks = find_peaks(np.concatenate(([low], knee, [low])), prominence=params.least_rad) - 1
     bottoms: list[int] = []
     for peak in peaks.tolist():
         if bottoms:

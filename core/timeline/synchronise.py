@@ -50,7 +50,7 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
     _refuse_copies(worn)
     notices = list(recording.notices)
     notices += [n for s in worn.values() for n in s.notices]
-    usable = {segment: s for segment, s in worn.items() if s.gyr is not None}
+    usable = {segment: s for segment, s in worn.items() if s.held("gyr") is not None}
     if not usable:
         raise SignalError(
             "missing_gyro",
@@ -184,8 +184,7 @@ def _lay_sensor(
     s: ImuStream, start_s: float, samples: int, rate: float, params: TimelineParams
 ) -> SensorSignals:
     """One sensor on the axis of so many samples."""
-    assert s.gyr is not None  # noqa: S101 - sensors without gyroscope were set aside
-    good = is_complete(s.acc) & is_complete(s.gyr)
+    good = is_complete(s.held("acc")) & is_complete(s.held("gyr"))
     if not good.any():
         raise SignalError(
             "bad_signal",
@@ -196,15 +195,16 @@ def _lay_sensor(
     first = int(np.searchsorted(s.t_s, start_s - params.on_grid / rate))
     if _lies_on_axis(s.t_s, good, first, start_s, samples, rate, params):
         # what laying would copy bit for bit; rows one after the other, as sums over others round otherwise
-        acc, gyr = (np.ascontiguousarray(x[first : first + samples]) for x in (s.acc, s.gyr))
+        rows = slice(first, first + samples)
+        acc, gyr = (np.ascontiguousarray(s.held(name)[rows]) for name in ("acc", "gyr"))
         valid = np.ones(samples, np.bool_)
         return SensorSignals(s.device_id, acc, gyr, mag, valid, ~valid)
-    channels = np.concatenate((s.acc[good], s.gyr[good]), axis=1)
+    channels = np.concatenate((s.held("acc")[good], s.held("gyr")[good]), axis=1)
     (acc, gyr), valid, filled = lay_signal(s.t_s[good], channels, start_s, samples, s.rate_hz, rate, params)
     return SensorSignals(
         s.device_id,
-        _hold_once(acc, s.acc[first:]),
-        _hold_once(gyr, s.gyr[first:]),
+        _hold_once(acc, s.held("acc")[first:]),
+        _hold_once(gyr, s.held("gyr")[first:]),
         mag,
         valid,
         filled,
@@ -239,16 +239,17 @@ def _lay_magnetometer(
     s: ImuStream, start_s: float, samples: int, rate: float, params: TimelineParams
 ) -> Floats | None:
     """The magnetometer has its own holes and never makes a sample invalid; None when mostly missing."""
-    if s.mag is None:
+    mag = s.held("mag")
+    if mag is None:
         return None
-    good = is_complete(s.mag)
+    good = is_complete(mag)
     if np.count_nonzero(good) < 0.5 * len(good):
         return None
     first = int(np.searchsorted(s.t_s, start_s - params.on_grid / rate))
     if _lies_on_axis(s.t_s, good, first, start_s, samples, rate, params):
-        return np.ascontiguousarray(s.mag[first : first + samples])
-    values, _, _ = lay_signal(s.t_s[good], s.mag[good], start_s, samples, s.rate_hz, rate, params)
-    return _hold_once(np.asarray(values[0]), s.mag[first:])
+        return np.ascontiguousarray(mag[first : first + samples])
+    values, _, _ = lay_signal(s.t_s[good], mag[good], start_s, samples, s.rate_hz, rate, params)
+    return _hold_once(np.asarray(values[0]), mag[first:])
 
 
 def is_complete(x: Floats) -> Bools:

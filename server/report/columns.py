@@ -67,7 +67,7 @@ def repeat_words(words: Sequence[str], times: int) -> pa.Array[Any]:
 ParquetColumn: TypeAlias = "np.ndarray | pa.Array[Any] | Callable[[slice], np.ndarray]"
 """Of every row, or what gives those of some rows when they are written."""
 
-GROUP: Final = 1 << 20
+GROUP: Final = 1 << 17
 """Rows that are laid out and written together."""
 
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
@@ -30,6 +30,7 @@ from core.angles import JointAngles
 from core.body.poses import Poses
 from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
+from core.frames import Floats
 from core.parameters.catalogue import list_names
 from core.parameters.catalogue.entry import SQUAT
 from core.parameters.rows import Column
@@ -57,36 +58,50 @@ STRIDE_COLUMNS = ("side", "start_s", "tc_s", "end_s", "opposite_tc_s", "opposite
 """What a stride is; its parameters, `flags` and `excluded_reason` follow in strides.csv."""
 
 
-def analysis_files(analysis: TakeAnalysis) -> dict[str, bytes]:
-    """Write an analysis as files, name → bytes; a stage that gave nothing leaves its file out."""
+def analysis_files(analysis: TakeAnalysis, let_go: Callable[[], None] = lambda: None) -> dict[str, bytes]:
+    """Write an analysis as files, name → bytes; a stage that gave nothing leaves its file out.
+
+    Parameters
+    ----------
+    let_go : called when something large is no longer held.
+    """
     if analysis.source.protocol == "activity":
         written = {} if analysis.activity is None else write_activity(analysis.activity)
         return {"analysis.json": _json_bytes(summarise_analysis(analysis)), **written}
     files = {"analysis.json": _json_bytes(summarise_analysis(analysis))}
-    if analysis.poses is not None:
-        files["poses.parquet"] = poses_parquet(analysis.poses)
-        # the most that is held: free from here on, where the caller keeps no name for the analysis
-        analysis = replace(analysis, posed=None)
-    if analysis.measured is not None:
-        files["events.csv"] = events_csv(analysis.measured.events)
-        files["strides.csv"] = strides_csv(analysis.measured.strides, analysis.measured.columns)
-        if analysis.measured.steps is not None:
-            files["steps.csv"] = steps_csv(analysis.measured.steps)
-    if analysis.squats is not None:
-        files["repetitions.csv"] = repetitions_csv(analysis.squats)
-    if analysis.angles is not None:
-        files["angles.parquet"] = angles_parquet(analysis.angles)
-    if analysis.tracks is not None:
-        files[tracks.NAME] = tracks.tracks_parquet(analysis.tracks)
+    # what is written is let go of, where the caller keeps no name for the analysis
+    recording, poses, angles = analysis.recording, analysis.poses, analysis.angles
+    measured, squats, held = analysis.measured, analysis.squats, analysis.tracks
+    del analysis
+    let_go()
+    if poses is not None:
+        files["poses.parquet"] = poses_parquet(poses)
+        del poses
+        let_go()
+    if measured is not None:
+        files["events.csv"] = events_csv(measured.events)
+        files["strides.csv"] = strides_csv(measured.strides, measured.columns)
+        if measured.steps is not None:
+            files["steps.csv"] = steps_csv(measured.steps)
+    if squats is not None:
+        files["repetitions.csv"] = repetitions_csv(squats)
+    if angles is not None:
+        held = None if held is None else replace(held, angles=None)
+        files["angles.parquet"] = angles_parquet(angles)
+        del angles
+        let_go()
+    if held is not None:
+        files[tracks.NAME] = tracks.tracks_parquet(held)
+        del held
     # also where a later stage stopped: who asks why looks at the signals
-    files[signals.NAME] = signals.signals_parquet(analysis.recording)
+    files[signals.NAME] = signals.signals_parquet(recording)
     return files
 
 
 def angles_parquet(angles: JointAngles) -> bytes:
     """Joint angles as Parquet: `t_s` (float64) and `<name>_deg` (float32); lost samples are null."""
-    columns = {f"{name}_deg": np.degrees(a).astype(np.float32) for name, a in angles.angles.items()}
-    columns |= {f"{s}_heading_deg": np.degrees(a).astype(np.float32) for s, a in angles.headings.items()}
+    columns: dict[str, ParquetColumn] = {f"{name}_deg": _degrees(a) for name, a in angles.angles.items()}
+    columns |= {f"{s}_heading_deg": _degrees(a) for s, a in angles.headings.items()}
     zero = {name: math.degrees(offset) for name, offset in angles.zero_offset.items()}
     meta: dict[str, object] = {"schema": SCHEMA, "angle_zero": angles.zero, "zero_offset_deg": zero}
     if angles.withheld:
@@ -98,6 +113,10 @@ def angles_parquet(angles: JointAngles) -> bytes:
     if angles.standing_deg:
         meta["standing_angles_deg"] = dict(angles.standing_deg)
     return parquet_file(angles.t_s, columns, meta)
+
+
+def _degrees(a: Floats) -> ParquetColumn:
+    return lambda rows: np.degrees(a[rows]).astype(np.float32)
 
 
 def poses_parquet(poses: Poses) -> bytes:

@@ -5,27 +5,33 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from core.recording import UniformRecording
-from server.report.columns import SCHEMA, parquet_file
+from core.recording import SensorSignals, UniformRecording
+from server.report.columns import SCHEMA, ParquetColumn, parquet_file
 
 NAME = "signals.parquet"
 
 
 def signals_parquet(recording: UniformRecording) -> bytes:
     """Write the signals as they entered calibration: nothing filtered, nothing turned."""
-    columns: dict[str, np.ndarray] = {}
+    columns: dict[str, ParquetColumn] = {}
     for segment, s in recording.sensors.items():
-        # one axis at a time: whole signals would be held twice, and once more by Arrow
-        for i, c in enumerate("xyz"):
-            columns[f"{segment}_acc_{c}"] = np.where(s.valid, s.acc[:, i], np.nan).astype(np.float32)
-        for i, c in enumerate("xyz"):
-            rate = np.where(s.valid, np.degrees(s.gyr[:, i]), np.nan)
-            columns[f"{segment}_gyr_{c}_dps"] = rate.astype(np.float32)
+        columns |= {f"{segment}_acc_{c}": partial(_force, s, i) for i, c in enumerate("xyz")}
+        columns |= {f"{segment}_gyr_{c}_dps": partial(_rate, s, i) for i, c in enumerate("xyz")}
     meta = {
         "schema": SCHEMA,
         "rate_hz": recording.rate_hz,
         "devices": {segment: s.device_id for segment, s in recording.sensors.items()},
     }
     return parquet_file(recording.t_s, columns, meta)
+
+
+def _force(s: SensorSignals, axis: int, rows: slice) -> np.ndarray:
+    return np.where(s.valid[rows], s.cut("acc", rows)[:, axis], np.nan).astype(np.float32)
+
+
+def _rate(s: SensorSignals, axis: int, rows: slice) -> np.ndarray:
+    return np.where(s.valid[rows], np.degrees(s.cut("gyr", rows)[:, axis]), np.nan).astype(np.float32)

@@ -31,7 +31,7 @@ def run(
     results = [analyse_files(files, manifest, config, progress, resumable=False)]
     setup = results[0].setup
     # by no name here: what is written is let go of
-    found = analysis_files(results.pop())
+    found = analysis_files(results.pop(), give_memory_back)
     if setup is not None and setup.can_be_applied:
         declared = read_json(manifest) if manifest is not None else {}
         assert isinstance(declared, dict)  # noqa: S101 - `parse_manifest` has read it

@@ -82,7 +82,7 @@ LAPS: Final = {1: 57.0, 14: 623.0} | ({84: 3668.0} if WRITES else {})
 SLOWER: Final = 1.6
 """A second of ten minutes may take so much longer than a second of one minute."""
 
-MOST_MB: Final = 435.0
+MOST_MB: Final = 360.0
 """Of the whole process, for ten minutes."""
 
 AT_ONCE: Final = (1, 10, 40) if WRITES else (1, 4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 from core.filtering import low_pass
 
@@ -25,3 +26,14 @@ def test_every_row_is_filtered_alone_and_a_short_signal_too() -> None:
     assert np.array_equal(both[1], low_pass(rows[1], 4.0, RATE, pad=30))
     assert np.isfinite(low_pass(rows[0, :5], 4.0, RATE)).all()
     np.testing.assert_allclose(low_pass(np.full(40, 2.0), 500.0, RATE), 2.0)
+
+
+@pytest.mark.parametrize("rate_hz", [60.0, 100.0, 148.148])
+@pytest.mark.parametrize("cutoff_hz", [0.05, 0.8, 4.0, 15.0, 200.0])
+def test_it_is_the_filter_of_scipy(cutoff_hz: float, rate_hz: float) -> None:
+    """Whose package is not loaded for it."""
+    rows = np.random.default_rng(1).normal(size=(3, 2, 700)).cumsum(axis=-1)
+    section = butter(2, min(0.99, cutoff_hz / (0.5 * rate_hz)), output="sos")
+    for pad in (0, 30, round(2.0 * rate_hz)):
+        expected = sosfiltfilt(section, rows, padlen=pad)
+        np.testing.assert_allclose(low_pass(rows, cutoff_hz, rate_hz, pad), expected, rtol=1e-12, atol=1e-12)

@@ -14,8 +14,9 @@ Jacobian (eq 27) is carried in the next step's transition. Equations: docs/scien
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,26 +107,54 @@ class ErkfTrack:
 
     Parameters
     ----------
-    nominal : (T, n, 16) as in `ErkfState`, of the smoother (T, n, 7) p (3) and q (4).
+    places, turns : of each sensor (T, 3) m and (T, 4), its position and orientation in W.
     heading_sd : (T, n) rad, of the filter, about the vertical.
     joint_residual : (T, joints) distance of the two ends of each joint, m.
     refused : (T, n) zero velocities that the gate refused.
+    nominal : (T, n, 16) as in `ErkfState`, of the filter; (0, n, 16) of the smoother.
     """
 
-    nominal: Floats
+    places: tuple[Floats, ...]
+    turns: tuple[Floats, ...]
     heading_sd: Floats
     joint_residual: Floats
     refused: Bools
+    nominal: Floats
 
     @property
     def p(self) -> Floats:
-        """Sensor positions (T, n, 3) in W, m."""
-        return self.nominal[..., 0:3]
+        """Sensor positions (T, n, 3) in W, m; a copy."""
+        return np.stack(self.places, axis=1)
 
     @property
     def q(self) -> Floats:
-        """Sensor orientations (T, n, 4)."""
-        return self.nominal[..., 6:10] if self.nominal.shape[-1] == 16 else self.nominal[..., 3:7]
+        """Sensor orientations (T, n, 4); a copy."""
+        return np.stack(self.turns, axis=1)
+
+
+class SampleSeries(Protocol):
+    """Samples (T, n, 3) that are laid out when a part (t, n, 3) is asked for."""
+
+    def __getitem__(self, part: slice, /) -> Floats: ...
+
+
+@dataclass(frozen=True, eq=False)
+class TakeInputs:
+    """Inputs of a take of which only parts are ever laid out: an hour of seven sensors has 123 MB.
+
+    Parameters
+    ----------
+    known : all but the signals.
+    """
+
+    known: ErkfInputs
+    acc: SampleSeries
+    gyr: SampleSeries
+
+    def part(self, start: int, stop: int) -> ErkfInputs:
+        """Samples start … stop − 1."""
+        k = slice(start, stop)
+        return replace(self.known.part(start, stop), acc=self.acc[k], gyr=self.gyr[k])
 
 
 def erkf_inputs(
@@ -144,19 +173,34 @@ def erkf_inputs(
     """
     acc, gyr = np.asarray(acc, np.float64), np.asarray(gyr, np.float64)
     valid = np.asarray(valid & np.isfinite(acc).all(axis=2) & np.isfinite(gyr).all(axis=2))
-    contact, still = np.zeros(valid.shape, bool), np.zeros(valid.shape, bool)
-    rolling = np.zeros(valid.shape)
     for i, name in enumerate(tree.imus):
         if not valid[:, i].any():
             raise SignalError("bad_signal", f"{name}: no valid sample; leave this sensor out.", sensor=name)
     acc, gyr = bridge_gaps(tree, acc, gyr, valid, rate_hz)
+    known = find_rests(tree, lambda i: (acc[:, i], gyr[:, i]), valid, rate_hz)
+    return replace(known, acc=acc, gyr=gyr, heading=heading)
+
+
+def find_rests(
+    tree: ImuTree, of_sensor: Callable[[int], tuple[Floats, Floats]], valid: Bools, rate_hz: float
+) -> ErkfInputs:
+    """Inputs of a take, but for their signals, which have no holes.
+
+    Parameters
+    ----------
+    of_sensor : index → acc, gyr (T, 3) of one sensor. valid : (T, n) measured.
+    """
+    contact, still = np.zeros(valid.shape, bool), np.zeros(valid.shape, bool)
+    rolling = np.zeros(valid.shape)
     for i in range(len(tree.imus)):
-        still[:, i] = still_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz, AT_REST)
+        force, rate = of_sensor(i)
+        still[:, i] = still_samples(force, rate, valid[:, i], rate_hz, AT_REST)
         if i in tree.feet:
-            contact[:, i], rolling[:, i] = contact_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz)
-    step = np.full(len(acc), 1.0 / rate_hz)
+            contact[:, i], rolling[:, i] = contact_samples(force, rate, valid[:, i], rate_hz)
+    step = np.full(len(valid), 1.0 / rate_hz)
     step[:1] = 0.0
-    return ErkfInputs(step, acc, gyr, valid, contact, still, heading, rolling)
+    none = np.empty((0, len(tree.imus), 3))
+    return ErkfInputs(step, none, none, valid, contact, still, None, rolling)
 
 
 def filter_block(
@@ -170,9 +214,11 @@ def filter_block(
     """
     run = prepare_run(state, inputs, tree, params)
     record = tuple(new_record(tree, params, 1))
-    broke = filter_segments(*run.arguments(), record, tuple(run.output), NONE_KEPT, 0, False)
-    output = run.output
-    return ErkfTrack(output.nominal, output.heading_sd, output.residual, output.refused), run.end(broke)
+    lam = np.zeros(len(run.memory.P))
+    broke = filter_segments(*run.arguments(), record, tuple(run.output), NONE_KEPT, 0, False, lam)
+    output, x = run.output, run.output.nominal
+    places, turns = (tuple(x[..., k].swapaxes(0, 1)) for k in (slice(3), slice(6, 10)))
+    return ErkfTrack(places, turns, output.heading_sd, output.residual, output.refused, x), run.end(broke)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,8 +235,8 @@ class ErkfPass:
         """The first arguments of every kernel."""
         return tuple(self.memory), tuple(self.samples), tuple(self.links), tuple(self.noise)
 
-    def end(self, broke: int) -> ErkfState:
-        """The state after the block.
+    def end(self, broke: int, before_s: float = 0.0) -> ErkfState:
+        """The state after the block, of which so much time was before.
 
         Raises
         ------
@@ -201,7 +247,7 @@ class ErkfPass:
             at = broke if broke >= 0 else len(step) - 1
             raise EstimationError(
                 "filter_diverged",
-                f"The covariance is no longer positive definite {step[: at + 1].sum():.2f} s into "
+                f"The covariance is no longer positive definite {before_s + step[: at + 1].sum():.2f} s into "
                 "this block; check units, sensor positions and which sensor is on which segment.",
             )
         N = len(self.memory.P)

@@ -139,7 +139,7 @@ def heading_errors(
         walking[index_window(window, rate)] = True
     change = []
     for i, segment in enumerate(segments):
-        was, now = orientations.q[segment][part], tree.segment(i, track.p, track.q)[0]
+        was, now = orientations.q[segment][part], tree.segment(i, track.places[i], track.turns[i])[0]
         seen = walking[part] & orientations.valid[segment][part]
         if not seen.any():
             return {}

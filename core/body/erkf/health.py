@@ -143,7 +143,7 @@ def erkf_notices(run: ErkfRun, findings: tuple[HealthFinding, ...]) -> tuple[Not
 
 def _start_heading(run: ErkfRun) -> HealthFinding:
     """How far the smoother turned the first heading of a sensor against its part's median, the largest."""
-    turn = yaw(multiply(run.track.q[0], conjugate(run.start.nominal[:, 6:10])))
+    turn = yaw(multiply(np.stack([q[0] for q in run.track.turns]), conjugate(run.start.nominal[:, 6:10])))
     part = find_parts(run.tree)
     off = np.zeros(len(turn))
     for root in set(part.tolist()):
@@ -157,6 +157,6 @@ def _start_heading(run: ErkfRun) -> HealthFinding:
 def _climb_pct(run: ErkfRun, foot: int) -> float:
     """How far the foot's last rest lies above or below its first, of the way between, %."""
     rests = run.inputs.contact[:, foot]
-    p: Floats = run.tree.segment(foot, run.track.p[rests], run.track.q[rests])[1]
+    p: Floats = run.tree.segment(foot, run.track.places[foot][rests], run.track.turns[foot][rests])[1]
     way = float(np.linalg.norm(np.diff(p[:, :2], axis=0), axis=1).sum())
     return 100.0 * float(abs(p[-1, 2] - p[0, 2])) / max(way, CLIMB_WAY_M)

@@ -382,7 +382,7 @@ def row_length(n: int, N: int) -> int:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def filter_segments(  # type: ignore[no-untyped-def]
-    memory, samples, links, noise, record, output, kept, segment, smoothing,
+    memory, samples, links, noise, record, output, kept, segment, smoothing, lam,
 ):  # fmt: skip
     """Filter a block, `memory` in place; sample at which the covariance broke, or −1.
 
@@ -396,6 +396,8 @@ def filter_segments(  # type: ignore[no-untyped-def]
         read. No rows: the block is one segment, and no state is kept.
     record : room for one sample, or with smoothing for a segment.
     smoothing : filter each segment again from its row, the last first, and smooth it.
+    lam : (N,) the adjoint λ after the block, zeros at the end of a take; with smoothing that before it is
+    written.
     """
     memory = ErkfMemory(*memory)
     samples = ErkfSamples(*samples)
@@ -410,7 +412,7 @@ def filter_segments(  # type: ignore[no-untyped-def]
     )  # fmt: skip
     keeps = kept.shape[0] > 0
     segments, length = (kept.shape[0], segment) if keeps else (1, T)
-    lam, d = np.zeros(N), np.empty(N)
+    d = np.empty(N)
     swept = np.empty((length if smoothing else 0, N))
     for i in range(segments):
         s = segments - 1 - i if smoothing else i

@@ -136,13 +136,14 @@ class LiveErkf:
         adrift = np.zeros((T, n), np.bool_)
         begins = list(self._settles(signals, adrift))
         memory, links, noise, record = self._given
+        lam = np.zeros(len(memory[1]))
         for first, past in pairwise(sorted({0, T, *(k for k, _ in begins)})):
             for _, i in (x for x in begins if x[0] == first):
                 self._settle(i, signals.acc[first, i], signals.gyr[first, i])
             k = slice(first, past)
             samples = (step[k], signals.acc[k], signals.gyr[k], flags[k], self._heading, self._rolling)
             part = tuple(output.part(first, past))
-            broke = filter_segments(memory, samples, links, noise, record, part, NONE_KEPT, 0, False)
+            broke = filter_segments(memory, samples, links, noise, record, part, NONE_KEPT, 0, False, lam)
             if broke >= 0:
                 states[first + broke :], residual[first + broke :], self.broken = np.nan, np.nan, True
                 break

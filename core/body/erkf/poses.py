@@ -9,8 +9,8 @@ from typing import cast
 import numpy as np
 
 from core.body.arms import MeasuredArms
-from core.body.corrected import correct_signals
-from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, erkf_inputs
+from core.body.corrected import SIGNALS, CorrectedSignals, correct_signals
+from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, TakeInputs, erkf_inputs, find_rests
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.smoother import smooth
 from core.body.erkf.start import start_state
@@ -18,7 +18,7 @@ from core.body.feet import FootTracks
 from core.body.kinematics import incomplete_legs
 from core.body.model import BodyModel
 from core.body.places import joint_places, sensor_place
-from core.body.poses import Poses
+from core.body.poses import Poses, figure_precision
 from core.body.tree import ImuTree, person_tree
 from core.calibration.result import CalibratedRecording
 from core.estimators import ERKF, LINKED_PATHS, SINGLE_PATHS
@@ -78,9 +78,7 @@ def run_erkf(
         body, mounts, segments, None if arms is None else arms.places, None if arms is None else arms.centres
     )
     rate = calibrated.recording.rate_hz
-    # not kept by a name: the inputs are copies, and ten minutes of them 20 MB
-    inputs = erkf_inputs(tree, *correct_signals(calibrated, segments), rate)
-    inputs = replace(inputs, patched=find_patches(calibrated.recording, segments, params.patch_s))
+    inputs = _find_inputs(tree, calibrated, segments, params)
     first = np.stack([multiply(orientations.q[s][0], from_matrix(mounts[s])) for s in segments])
     rest = next(
         (
@@ -92,11 +90,31 @@ def run_erkf(
     )
     # without a standing start the biases still come from the calibration's rest, wherever that is
     age_s = calibrated.calibration.zero[0] if calibrated.calibration.posture == "standing" else None
-    start = start_state(tree, inputs, params, rest, q=first, bias_age_s=age_s)
+    # orientations are known: of the signals it takes the first sample
+    start = start_state(tree, inputs.part(0, 1), params, rest, q=first, bias_age_s=age_s)
     track, final = smooth(start, inputs, tree, params)
-    none = np.empty((0, len(tree.imus), 3))
-    inputs = replace(inputs, acc=none, gyr=none)
-    return ErkfRun(tree, inputs, start, rest, track, final)
+    return ErkfRun(tree, inputs.known, start, rest, track, final)
+
+
+def _find_inputs(
+    tree: ImuTree, calibrated: CalibratedRecording, segments: Sequence[Segment], params: ErkfParams
+) -> TakeInputs:
+    """The filter's inputs of a take; what is bridged over lost samples is held, all else only laid out."""
+    recording = calibrated.recording
+    valid = np.stack([recording.sensors[s].valid for s in segments], axis=1)
+    patched = find_patches(recording, segments, params.patch_s)
+    if not valid.all():
+        whole = erkf_inputs(tree, *correct_signals(calibrated, segments), recording.rate_hz)
+        none = whole.acc[:0]
+        return TakeInputs(replace(whole, acc=none, gyr=none, patched=patched), whole.acc, whole.gyr)
+
+    def of_sensor(i: int) -> tuple[Floats, Floats]:
+        acc, gyr = (CorrectedSignals(calibrated, segments[i : i + 1], name)[:] for name in SIGNALS)
+        return acc[:, 0], gyr[:, 0]
+
+    acc, gyr = (CorrectedSignals(calibrated, segments, name) for name in SIGNALS)
+    known = find_rests(tree, of_sensor, valid, recording.rate_hz)
+    return TakeInputs(replace(known, patched=patched), acc, gyr)
 
 
 def find_patches(recording: UniformRecording, segments: Sequence[Segment], longest_s: float) -> Bools:
@@ -108,14 +126,45 @@ def find_patches(recording: UniformRecording, segments: Sequence[Segment], longe
     return patched
 
 
-def replace_orientations(run: ErkfRun, orientations: Orientations) -> Orientations:
+@dataclass(frozen=True, eq=False)
+class SegmentTracks:
+    """Where a run's segments are: q, p : segment → (T, 4) and origin (T, 3) m, in W."""
+
+    q: Mapping[Segment, Floats]
+    p: Mapping[Segment, Floats]
+
+
+def find_segment_tracks(run: ErkfRun, *, in_place: bool = False) -> SegmentTracks:
+    """Segments of a run's smoothed sensors.
+
+    Parameters
+    ----------
+    in_place : written over `run.track`, which nobody may read any more: 144 MB of an hour of seven sensors.
+    """
+    q, p = {}, {}
+    for i, segment in enumerate(run.segments):
+        place, turn = run.track.places[i], run.track.turns[i]
+        q[segment], p[segment] = run.tree.segment(i, place, turn)
+        if in_place:
+            turn[:], place[:] = q[segment], p[segment]
+            q[segment], p[segment] = turn, place
+    return SegmentTracks(q, p)
+
+
+def replace_orientations(
+    run: ErkfRun, orientations: Orientations, tracks: SegmentTracks | None = None
+) -> Orientations:
     """The given orientations with those of the run's segments in their place."""
-    found = {s: run.tree.segment(i, run.track.p, run.track.q)[0] for i, s in enumerate(run.segments)}
+    found = (tracks or find_segment_tracks(run)).q
     return replace(orientations, q={**orientations.q, **found}, engine=ERKF.method)
 
 
 def place_figure(
-    run: ErkfRun, orientations: Orientations, contacts: Mapping[Side, Bools], body: BodyModel
+    run: ErkfRun,
+    orientations: Orientations,
+    contacts: Mapping[Side, Bools],
+    body: BodyModel,
+    tracks: SegmentTracks,
 ) -> Poses:
     """The pelvis and every whole leg where they are in the room.
 
@@ -129,13 +178,15 @@ def place_figure(
     """
     legs = [s for s in SIDES if {THIGH[s], SHANK[s], FOOT[s]} <= set(run.segments)]
     shown: list[Segment] = ["pelvis", *(x for s in legs for x in (THIGH[s], SHANK[s], FOOT[s]))]
-    place = {s: run.tree.segment(run.segments.index(s), run.track.p, run.track.q)[1] for s in shown}
+    place = {s: tracks.p[s] for s in shown}
     still = {s: run.inputs.contact[:, run.segments.index(FOOT[s])] for s in legs}
     for side in legs:
         place |= _hang_together(run, orientations, place, side, body)
     floor = _floor({s: place[FOOT[s]][:, 2] - body.ankle_height for s in legs}, still)
-    for p in place.values():
-        p[:, 2] -= floor
+    for s, p in place.items():
+        level = p.astype(figure_precision(len(p)))
+        level[:, 2] = p[:, 2] - floor
+        place[s] = level
     return Poses(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
@@ -149,7 +200,9 @@ def place_figure(
     )
 
 
-def foot_tracks(run: ErkfRun, orientations: Orientations, body: BodyModel) -> FootTracks:
+def foot_tracks(
+    run: ErkfRun, orientations: Orientations, body: BodyModel, tracks: SegmentTracks | None = None
+) -> FootTracks:
     """Paths of the run's feet; linked when both hang on the same pelvis.
 
     Parameters
@@ -157,12 +210,12 @@ def foot_tracks(run: ErkfRun, orientations: Orientations, body: BodyModel) -> Fo
     orientations : refined by this run.
     """
     at: dict[Side, int] = {s: run.segments.index(FOOT[s]) for s in SIDES if FOOT[s] in run.segments}
-    patched = run.inputs.patched
+    patched, paths = run.inputs.patched, (tracks or find_segment_tracks(run)).p
     linked = len(at) == 2 and not ({FOOT[s] for s in at} & {run.segments[i] for i in run.tree.roots()})
     return FootTracks(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
-        p={s: run.tree.segment(i, run.track.p, run.track.q)[1] for s, i in at.items()},
+        p={s: paths[FOOT[s]] for s in at},
         q={s: orientations.q[FOOT[s]] for s in at},
         still={s: run.inputs.contact[:, i] for s, i in at.items()},
         valid={s: orientations.valid[FOOT[s]] for s in at},

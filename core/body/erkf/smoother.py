@@ -10,11 +10,11 @@ memory (docs/science/erkf.md, "Smoother").
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
-from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, memory_of, new_record, prepare_run
+from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, TakeInputs, new_record, prepare_run
 from core.body.erkf.kernel import filter_segments, row_length
 from core.body.erkf.params import ErkfParams
 from core.body.tree import ImuTree
@@ -24,9 +24,16 @@ SEGMENT = 128
 """Samples per segment, at least: 21 MB of kept states for ten minutes of seven sensors, and a record of 8 MB.
 Longer ones outgrow the processor's cache: with 256 a step takes 8 % longer."""
 
+AT_ONCE: Final = 1 << 12
+"""Samples, about, that are laid side by side for the filter: 1.4 MB of seven sensors."""
+
 
 def smooth(
-    state: ErkfState, inputs: ErkfInputs, tree: ImuTree, params: ErkfParams, segment: int | None = None
+    state: ErkfState,
+    inputs: ErkfInputs | TakeInputs,
+    tree: ImuTree,
+    params: ErkfParams,
+    segment: int | None = None,
 ) -> tuple[ErkfTrack, ErkfState]:
     """Filter a whole recording and smooth it.
 
@@ -44,19 +51,32 @@ def smooth(
     ------
     EstimationError `filter_diverged` as in `filter_block`.
     """
-    T, n = inputs.valid.shape
+    known = inputs.known if isinstance(inputs, TakeInputs) else inputs
+    T, n = known.valid.shape
     if segment is None:
         segment = max(SEGMENT, math.isqrt(T // 4))
     if segment < 2:
         raise ParameterError("segment_range", f"Segments of {segment} samples; at least 2.")
-    run = prepare_run(state, inputs, tree, params, segment)
-    kept = np.empty((-(-T // segment), row_length(n, n * params.states)))
-    output = tuple(run.output)
-    record = tuple(new_record(tree, params, 1))
-    broke = filter_segments(*run.arguments(), record, output, kept, segment, False)
-    final = run.end(broke)
-    again = replace(run, memory=memory_of(final))
+    whole, N = -(-T // segment), n * params.states
+    kept = np.empty((whole, row_length(n, N)))
+    at_once = max(1, AT_ONCE // segment)
+    blocks = [(first, min(first + at_once, whole)) for first in range(0, whole, at_once)]
+    record, lam, final = tuple(new_record(tree, params, 1)), np.zeros(N), state
+    for first, past in blocks:
+        run = prepare_run(final, inputs.part(first * segment, past * segment), tree, params, segment)
+        rows = kept[first:past]
+        broke = filter_segments(*run.arguments(), record, tuple(run.output), rows, segment, False, lam)
+        final = run.end(broke, float(known.step_s[: first * segment].sum()))
+    places, turns = (tuple(np.empty((T, k)) for _ in range(n)) for k in (3, 4))
+    heading_sd, residual = np.empty((T, n)), np.empty((T, len(tree.joints)))
+    refused = np.empty((T, n), np.bool_)
     record = tuple(new_record(tree, params, segment))
-    filter_segments(*again.arguments(), record, output, kept, segment, True)
-    found = run.output
-    return ErkfTrack(found.smoothed, found.heading_sd, found.residual, found.refused), final
+    for first, past in reversed(blocks):
+        part = slice(first * segment, past * segment)
+        run = prepare_run(final, inputs.part(part.start, part.stop), tree, params, segment)
+        rows, found = kept[first:past], run.output
+        filter_segments(*run.arguments(), record, tuple(found), rows, segment, True, lam)
+        for i in range(n):
+            places[i][part], turns[i][part] = found.smoothed[:, i, :3], found.smoothed[:, i, 3:]
+        heading_sd[part], residual[part], refused[part] = found.heading_sd, found.residual, found.refused
+    return ErkfTrack(places, turns, heading_sd, residual, refused, np.empty((0, n, 16))), final

@@ -133,7 +133,9 @@ class FreeAcceleration:
     mounted: SegmentCalibration
 
     def __getitem__(self, part: slice, /) -> Floats:
-        return remove_gravity(self.signals.acc[part], self.signals.valid[part], self.q[part], self.mounted)
+        return remove_gravity(
+            self.signals.cut("acc", part), self.signals.valid[part], self.q[part], self.mounted
+        )
 
 
 def free_acceleration(

@@ -18,9 +18,9 @@ from core.body.l7s.health import l7s_health, list_health_notices
 from core.body.l7s.inputs import KnownSamples, L7sTake, SampleSeries, bodies_of, take_of
 from core.body.l7s.legs import BODIES, FIGURE, LEGS, LegModel, solve_legs
 from core.body.l7s.smoother import smooth_track
-from core.body.l7s.windows import WHOLE, PlacedWindow, place_windows
+from core.body.l7s.windows import PlacedWindow, place_windows
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
-from core.body.poses import Poses
+from core.body.poses import Poses, figure_precision
 from core.errors import Notice
 from core.estimators import L7S_2I, L7S_3I
 from core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
@@ -112,13 +112,12 @@ def l7s_poses(
 class _Figure:
     """The seven segments of a take, window by window, and what is measured on them.
 
-    q, p : as in `Poses`; of a take of several windows in single precision, which is half of 850 MB for six
-    hours, and what its file has. seen : of each window.
+    q, p : as in `Poses`. seen : of each window.
     """
 
     def __init__(self, take: L7sTake) -> None:
         n = len(take.step)
-        kind = np.float64 if n <= WHOLE else np.float32
+        kind = figure_precision(n)
         self.q: dict[Segment, Floats] = {s: np.empty((n, 4), kind) for s in FIGURE}
         self.p: dict[Segment, Floats] = {s: np.empty((n, 3), kind) for s in FIGURE}
         self.seen: list[SeenWalk] = []

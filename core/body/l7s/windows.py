@@ -19,10 +19,11 @@ from core.body.l7s.foot_place import find_sensor_offsets
 from core.body.l7s.inputs import L7sTake
 from core.body.l7s.legs import LEGS
 from core.body.l7s.smoother import NODE_S, find_hop, smooth_track
+from core.body.poses import SHORT
 from core.frames import Bools, Floats
 
-WHOLE: Final = 1 << 16
-"""Samples up to which a take is one window: eleven minutes at 100 Hz, and 200 MB."""
+WHOLE: Final = SHORT
+"""Samples up to which a take is one window, and 200 MB."""
 
 LONG: Final = 1 << 15
 """Samples of a window of a longer take."""

@@ -19,7 +19,7 @@ PLACES = st.lists(st.tuples(st.floats(0.0, 4.0), st.floats(0.05, 0.99)), min_siz
 @given(PLACES, st.integers(2, 130))
 def test_pieces_are_interpolated_linearly(places: list[tuple[float, float]], points: int) -> None:
     bounds = np.array([(a, a + length) for a, length in places])
-    found = resample(SIGNALS, T, bounds, points)
+    found = np.stack(resample(SIGNALS, T, bounds, points))
     assert found.shape == (2, len(places), points)
     for i, (a, b) in enumerate(bounds):
         for k, signal in enumerate(SIGNALS):
@@ -29,14 +29,14 @@ def test_pieces_are_interpolated_linearly(places: list[tuple[float, float]], poi
 def test_a_piece_that_touches_a_gap_is_nowhere_known() -> None:
     torn = SIGNALS.copy()
     torn[0, 250] = np.nan
-    found = resample(torn, T, np.array([(1.0, 2.0), (2.0, 3.0)]))
+    found = np.stack(resample(torn, T, np.array([(1.0, 2.0), (2.0, 3.0)])))
     assert np.isfinite(found[0, 0]).all()
     assert np.isnan(found[0, 1]).all()
     assert np.isfinite(found[1]).all()
 
 
 def test_a_piece_without_an_end_is_not_known_and_the_others_are() -> None:
-    found = resample(SIGNALS, T, np.array([(1.0, np.nan), (2.0, 3.0)]))
+    found = np.stack(resample(SIGNALS, T, np.array([(1.0, np.nan), (2.0, 3.0)])))
     assert np.isnan(found[:, 0]).all()
     assert np.isfinite(found[:, 1]).all()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.body.l7s import poses as l7s
+from core.body import poses
 from core.body.l7s import windows
 from core.body.l7s.windows import cut_windows
 from core.body.poses import Poses
@@ -16,7 +16,7 @@ from tests.core.body.l7s.test_poses import poses_of
 @pytest.fixture
 def short_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(windows, "WHOLE", 1000)
-    monkeypatch.setattr(l7s, "WHOLE", 1000)
+    monkeypatch.setattr(poses, "SHORT", 1000)
     monkeypatch.setattr(windows, "LONG", 1000)
 
 
