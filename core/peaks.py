@@ -8,41 +8,30 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import Floats
+from core.frames import Bools, Floats
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _write_maxima(x, found):  # type: ignore[no-untyped-def]
-    """Write the samples of x that are above both sides, of a plateau the middle one; return how many."""
-    count, k, last = 0, 1, len(x) - 1
-    while k < last:
-        if x[k - 1] < x[k]:
-            ahead = k + 1
-            while ahead < last and x[ahead] == x[k]:
-                ahead += 1
-            if x[ahead] < x[k]:
-                found[count] = (k + ahead - 1) // 2
-                count += 1
-                k = ahead
-        k += 1
-    return count
+def _list_tops(x: Floats) -> NDArray[np.int64]:
+    """Samples above both sides; of several that are equal the middle one."""
+    if len(x) < 3:
+        return np.zeros(0, np.int64)
+    first = np.flatnonzero(np.concatenate(([True], x[1:] != x[:-1])))
+    last = np.append(first[1:], len(x)) - 1
+    level = x[first]
+    is_top = (level[1:-1] > level[:-2]) & (level[1:-1] > level[2:])
+    return ((first + last) // 2)[1:-1][is_top]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _keep_apart(peaks, by_height, distance, kept):  # type: ignore[no-untyped-def]
-    """Clear in `kept` what is nearer than `distance` to a higher peak that stays."""
-    for i in range(len(peaks) - 1, -1, -1):
-        j = by_height[i]
-        if not kept[j]:
-            continue
-        k = j - 1
-        while k >= 0 and peaks[j] - peaks[k] < distance:
-            kept[k] = False
-            k -= 1
-        k = j + 1
-        while k < len(peaks) and peaks[k] - peaks[j] < distance:
-            kept[k] = False
-            k += 1
+def _keep_apart(peaks: NDArray[np.int64], level: Floats, distance: int) -> Bools:
+    """Which stay where the highest first takes all nearer than `distance` away."""
+    stays = np.ones(len(peaks), np.bool_)
+    first = np.searchsorted(peaks, peaks - distance, "right")
+    end = np.searchsorted(peaks, peaks + distance, "left")
+    for k in np.argsort(level)[::-1]:
+        if stays[k]:
+            stays[first[k] : end[k]] = False
+            stays[k] = True
+    return stays
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
@@ -74,14 +63,11 @@ def find_peaks(
         other two leave.
     """
     x = np.ascontiguousarray(x, np.float64)
-    found = np.empty(len(x) // 2 + 1, np.int64)
-    peaks = found[: _write_maxima(x, found)].copy()
+    peaks = _list_tops(x)
     if height is not None:
         peaks = peaks[x[peaks] >= height]
     if distance is not None:
-        kept = np.ones(len(peaks), np.bool_)
-        _keep_apart(peaks, np.argsort(x[peaks]), ceil(distance), kept)
-        peaks = peaks[kept]
+        peaks = peaks[_keep_apart(peaks, x[peaks], ceil(distance))]
     if prominence is not None:
         above = np.empty(len(peaks))
         _write_prominences(x, peaks, above)
