@@ -13,31 +13,28 @@ PAD_S: Final = 2.0
 """Both ends of a signal are continued by their point reflection over so long, or its length."""
 
 
-AT_ONCE: Final = 1 << 19
-"""Numbers that are filtered together: SciPy copies them five times."""
-
-
 @lru_cache(maxsize=64)
-def _design(cutoff_hz: float, rate_hz: float) -> Floats:
-    """Second-order section (1, 6); a stream asks for the same ones again and again."""
-    from scipy.signal import butter
+def _design(cutoff_hz: float, rate_hz: float) -> tuple[Floats, Floats]:
+    """Second-order section (6,) and its state under a constant 1 (2,); a stream asks for the same ones again
+    and again."""
+    from scipy.signal import butter, sosfilt_zi
 
-    return np.asarray(butter(2, min(0.99, cutoff_hz / (0.5 * rate_hz)), output="sos"))
+    sections = butter(2, min(0.99, cutoff_hz / (0.5 * rate_hz)), output="sos")
+    return np.asarray(sections[0]), np.asarray(sosfilt_zi(sections)[0])
 
 
 def low_pass(x: Floats, cutoff_hz: float, rate_hz: float, pad: int | None = None) -> Floats:
-    """Butterworth of second order forwards and backwards along the last axis of x (..., n).
+    """Butterworth of second order forwards and backwards along the last axis of x (..., n), n ≥ 1.
 
     Parameters
     ----------
     pad : samples by which the ends are continued, None = `PAD_S`.
     """
-    if x.ndim > 1 and x.size > AT_ONCE:
-        slow = np.empty(x.shape)
-        for i in range(len(x)):
-            slow[i] = low_pass(x[i], cutoff_hz, rate_hz, pad)
-        return slow
-    from scipy.signal import sosfiltfilt
+    from core.filtering_kernel import filter_both_ways
 
-    reach = round(PAD_S * rate_hz) if pad is None else pad
-    return np.asarray(sosfiltfilt(_design(cutoff_hz, rate_hz), x, padlen=min(x.shape[-1] - 1, reach)))
+    n = x.shape[-1]
+    reach = min(n - 1, round(PAD_S * rate_hz) if pad is None else pad)
+    rows = np.ascontiguousarray(x.reshape(-1, n), np.float64)
+    found = np.empty(rows.shape)
+    filter_both_ways(rows, *_design(cutoff_hz, rate_hz), reach, np.empty(n + 2 * reach), found)
+    return found.reshape(x.shape)

@@ -95,7 +95,7 @@ def transpose_lanes(_: Any, rows: Any) -> Any:
                     found[i | s] = builder.shuffle_vector(a, b, high)
         return context.make_tuple(builder, signature.return_type, found)
 
-    kind = types.UniTuple(LANES, IN_LINE)
+    kind: Any = types.UniTuple(LANES, IN_LINE)  # type: ignore[attr-defined, unused-ignore]
     return kind(kind), make
 
 
