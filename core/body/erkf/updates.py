@@ -12,7 +12,7 @@ from math import atan2, sqrt
 
 import numba
 
-from core.body.erkf.lanes import IN_LINE, mix, read_lanes, write_lanes
+from core.body.erkf.lanes import IN_LINE, mix, read_lanes, spread, write_lanes
 from core.rotation.compiled import skew, times_cross, wrap_angle
 
 FIRST, SECOND, UNIT, TURNS = range(4)
@@ -232,26 +232,44 @@ def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyp
 
 @numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def subtract_blocks(P, V, blocks):  # type: ignore[no-untyped-def]
-    """P ← P − Σ VᵀV on and below the diagonal, four rows at a time; V (≥ blocks, 3, as P).
+    """P ← P − Σ VᵀV on and below the diagonal, four rows and two lines at a time; V (≥ blocks, 3, as P).
 
-    A row is run through up to a whole line of the cache; what is above the diagonal means nothing. P has rows
-    to spare (`memory_of`).
+    A row is run through up to two whole lines of the cache; what is above the diagonal means nothing. P has
+    rows to spare (`memory_of`).
     """
+    last = P.shape[1] - IN_LINE
     for r in range(0, P.shape[0], 4):
-        for c in range(0, r + 4, IN_LINE):
+        for c in range(0, r + 4, 2 * IN_LINE):
+            # in the last pair the second line may be the first again
+            e = min(c + IN_LINE, last)
             p0, p1 = read_lanes(P, r, c), read_lanes(P, r + 1, c)
             p2, p3 = read_lanes(P, r + 2, c), read_lanes(P, r + 3, c)
+            q0, q1 = read_lanes(P, r, e), read_lanes(P, r + 1, e)
+            q2, q3 = read_lanes(P, r + 2, e), read_lanes(P, r + 3, e)
             for a in range(blocks):
                 x, y, z = V[a, 0], V[a, 1], V[a, 2]
                 u, v, w = read_lanes(V[a], 0, c), read_lanes(V[a], 1, c), read_lanes(V[a], 2, c)
-                p0 = p0 - (x[r] * u + y[r] * v + z[r] * w)
-                p1 = p1 - (x[r + 1] * u + y[r + 1] * v + z[r + 1] * w)
-                p2 = p2 - (x[r + 2] * u + y[r + 2] * v + z[r + 2] * w)
-                p3 = p3 - (x[r + 3] * u + y[r + 3] * v + z[r + 3] * w)
+                f, g, h = read_lanes(V[a], 0, e), read_lanes(V[a], 1, e), read_lanes(V[a], 2, e)
+                i, j, k = spread(x[r]), spread(y[r]), spread(z[r])
+                p0 = p0 - (i * u + j * v + k * w)
+                q0 = q0 - (i * f + j * g + k * h)
+                i, j, k = spread(x[r + 1]), spread(y[r + 1]), spread(z[r + 1])
+                p1 = p1 - (i * u + j * v + k * w)
+                q1 = q1 - (i * f + j * g + k * h)
+                i, j, k = spread(x[r + 2]), spread(y[r + 2]), spread(z[r + 2])
+                p2 = p2 - (i * u + j * v + k * w)
+                q2 = q2 - (i * f + j * g + k * h)
+                i, j, k = spread(x[r + 3]), spread(y[r + 3]), spread(z[r + 3])
+                p3 = p3 - (i * u + j * v + k * w)
+                q3 = q3 - (i * f + j * g + k * h)
             write_lanes(P, r, c, p0)
             write_lanes(P, r + 1, c, p1)
             write_lanes(P, r + 2, c, p2)
             write_lanes(P, r + 3, c, p3)
+            write_lanes(P, r, e, q0)
+            write_lanes(P, r + 1, e, q1)
+            write_lanes(P, r + 2, e, q2)
+            write_lanes(P, r + 3, e, q3)
 
 
 @numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
