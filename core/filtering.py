@@ -10,7 +10,6 @@ from functools import lru_cache
 from math import pi
 from typing import Final
 
-import numba
 import numpy as np
 
 from core.frames import Floats
@@ -37,43 +36,18 @@ def _design(cutoff_hz: float, rate_hz: float) -> tuple[Floats, Floats]:
     return np.array([*b, *a[1:]]), steady
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _filter_both_ways(x, section, steady, reach, work, out):  # type: ignore[no-untyped-def]
-    """Write rows x (k, n) filtered forwards and backwards; `work` (n + 2 reach,)."""
-    b0, b1, b2, a1, a2 = section
-    n, m = x.shape[1], len(work)
-    for row in range(x.shape[0]):
-        first, last = 2.0 * x[row, 0], 2.0 * x[row, n - 1]
-        for k in range(reach):
-            work[k] = first - x[row, reach - k]
-            work[reach + n + k] = last - x[row, n - 2 - k]
-        for k in range(n):
-            work[reach + k] = x[row, k]
-        z0, z1 = steady[0] * work[0], steady[1] * work[0]
-        for k in range(m):
-            new = b0 * work[k] + z0
-            z0 = b1 * work[k] - a1 * new + z1
-            z1 = b2 * work[k] - a2 * new
-            work[k] = new
-        z0, z1 = steady[0] * work[m - 1], steady[1] * work[m - 1]
-        for k in range(m - 1, reach - 1, -1):
-            new = b0 * work[k] + z0
-            z0 = b1 * work[k] - a1 * new + z1
-            z1 = b2 * work[k] - a2 * new
-            if k < reach + n:
-                out[row, k - reach] = new
-
-
 def low_pass(x: Floats, cutoff_hz: float, rate_hz: float, pad: int | None = None) -> Floats:
-    """Butterworth of second order forwards and backwards along the last axis of x (..., n).
+    """Butterworth of second order forwards and backwards along the last axis of x (..., n), n ≥ 1.
 
     Parameters
     ----------
     pad : samples by which the ends are continued, None = `PAD_S`.
     """
+    from core.filtering_kernel import filter_both_ways
+
     n = x.shape[-1]
     reach = min(n - 1, round(PAD_S * rate_hz) if pad is None else pad)
     rows = np.ascontiguousarray(x, np.float64).reshape(-1, n)
-    out = np.empty(rows.shape)
-    _filter_both_ways(rows, *_design(cutoff_hz, rate_hz), reach, np.empty(n + 2 * reach), out)
-    return out.reshape(x.shape)
+    found = np.empty(rows.shape)
+    filter_both_ways(rows, *_design(cutoff_hz, rate_hz), reach, np.empty(n + 2 * reach), found)
+    return found.reshape(x.shape)

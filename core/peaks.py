@@ -4,22 +4,42 @@ from __future__ import annotations
 
 from math import ceil
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from core.frames import Bools, Floats
 
 
-def _list_tops(x: Floats) -> NDArray[np.int64]:
-    """Samples above both sides; of several that are equal the middle one."""
+def find_peaks(
+    x: Floats, height: float | None = None, distance: float | None = None, prominence: float | None = None
+) -> NDArray[np.int64]:
+    """Samples (k,) at which x (n,) is higher than on both sides, in order.
+
+    Parameters
+    ----------
+    height : least value. distance : least samples between two, ≥ 1; of nearer ones the higher stays.
+    prominence : least way down from a peak before something higher comes, on either side, of those that the
+        other two leave.
+    """
     if len(x) < 3:
         return np.zeros(0, np.int64)
+    tops = _list_tops(x)
+    stays = np.ones(len(tops), np.bool_) if height is None else x[tops] >= height
+    if distance is not None:
+        stays[stays] = _keep_apart(tops[stays], x[tops[stays]], ceil(distance))
+    if prominence is not None:
+        stays &= _measure_prominence(x, tops) >= prominence
+    return tops[stays]
+
+
+def _list_tops(x: Floats) -> NDArray[np.int64]:
+    """Samples above both sides; of several that are equal the middle one."""
     first = np.flatnonzero(np.concatenate(([True], x[1:] != x[:-1])))
     last = np.append(first[1:], len(x)) - 1
     level = x[first]
     is_top = (level[1:-1] > level[:-2]) & (level[1:-1] > level[2:])
-    return ((first + last) // 2)[1:-1][is_top]
+    middle: NDArray[np.int64] = (first + last) // 2
+    return middle[1:-1][is_top]
 
 
 def _keep_apart(peaks: NDArray[np.int64], level: Floats, distance: int) -> Bools:
@@ -34,42 +54,30 @@ def _keep_apart(peaks: NDArray[np.int64], level: Floats, distance: int) -> Bools
     return stays
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _write_prominences(x, peaks, out):  # type: ignore[no-untyped-def]
-    """Write how far each peak is above the higher of the lowest points between it and what is above it."""
-    for i in range(len(peaks)):
-        top = x[peaks[i]]
-        left = right = top
-        k = peaks[i]
-        while k >= 0 and x[k] <= top:
-            left = min(left, x[k])
-            k -= 1
-        k = peaks[i]
-        while k < len(x) and x[k] <= top:
-            right = min(right, x[k])
-            k += 1
-        out[i] = top - max(left, right)
+def _measure_prominence(x: Floats, tops: NDArray[np.int64]) -> Floats:
+    """How far each of all tops (k,) is above the higher of the lowest points before something higher."""
+    if not len(tops):
+        return np.zeros(0)
+    valleys = np.minimum.reduceat(x, np.concatenate(([0], tops)))
+    left = _find_lows(float(x[0]), x[tops], valleys[:-1])
+    right = _find_lows(float(x[-1]), x[tops[::-1]], valleys[:0:-1])[::-1]
+    found: Floats = x[tops] - np.maximum(left, right)
+    return found
 
 
-def find_peaks(
-    x: Floats, height: float | None = None, distance: float | None = None, prominence: float | None = None
-) -> NDArray[np.int64]:
-    """Samples (k,) at which x (n,) is higher than on both sides, in order.
+def _find_lows(end: float, level: Floats, valleys: Floats) -> Floats:
+    """Lowest point (k,) behind each top until something higher comes, or the end.
 
     Parameters
     ----------
-    height : least value. distance : least samples between two, ≥ 1; of nearer ones the higher stays.
-    prominence : least way down from a peak before something higher comes, on either side, of those that the
-        other two leave.
+    end : where the signal ends behind the first top. level : (k,) of the tops. valleys : (k,) lowest point
+        between each and the one behind it.
     """
-    x = np.ascontiguousarray(x, np.float64)
-    peaks = _list_tops(x)
-    if height is not None:
-        peaks = peaks[x[peaks] >= height]
-    if distance is not None:
-        peaks = peaks[_keep_apart(peaks, x[peaks], ceil(distance))]
-    if prominence is not None:
-        above = np.empty(len(peaks))
-        _write_prominences(x, peaks, above)
-        peaks = peaks[above >= prominence]
-    return peaks
+    lows = np.empty(len(level))
+    higher = [(end, end)]  # what has nothing higher before it, with its own lowest point
+    for k, (top, low) in enumerate(zip(level.tolist(), valleys.tolist(), strict=True)):
+        while higher and higher[-1][0] <= top:
+            low = min(low, higher.pop()[1])
+        lows[k] = low
+        higher.append((top, low))
+    return lows

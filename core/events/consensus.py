@@ -226,7 +226,7 @@ def _moved(votes: list[_Vote], lead: Sequence[float], params: ConsensusParams) -
     if len(off) < params.pairs:
         return votes
     apart = float(np.median(off))
-    return [replace(v, time_s=v.time_s - apart) for v in votes]
+    return [_Vote(v.detector, v.time_s - apart, v.detected_s, v.uncertainty_s) for v in votes]
 
 
 def _others(side: Side, voters: Mapping[str, GaitEvents]) -> Notice:

@@ -85,7 +85,8 @@ def flag_cycles(own: Sequence[Stride], params: StrideParams) -> list[Stride]:
 
 def add_flag(stride: Stride, *more: StrideFlag) -> Stride:
     """The cycle with these flags too, in their order."""
-    return replace(stride, flags=tuple(f for f in ORDER if f in more or f in stride.flags))
+    flags = tuple(f for f in ORDER if f in more or f in stride.flags)
+    return stride if flags == stride.flags else replace(stride, flags=flags)
 
 
 def decide_exclusions(strides: Sequence[Stride], params: StrideParams) -> tuple[list[Stride], bool]:

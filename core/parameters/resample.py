@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 
 import numpy as np
 
@@ -17,7 +18,7 @@ def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int
     bounds : (pieces, 2) s. A piece that touches NaN in a signal is NaN throughout.
     """
     place = (bounds - t_s[0]) * ((len(t_s) - 1) / (t_s[-1] - t_s[0]))
-    place = place[:, :1] + (place[:, 1:] - place[:, :1]) * np.linspace(0.0, 1.0, points)
+    place = place[:, :1] + (place[:, 1:] - place[:, :1]) * _shares(points)
     known = np.isfinite(place)
     low = np.clip(np.floor(np.where(known, place, 0.0)).astype(np.int64), 0, len(t_s) - 2)
     high, share = low + 1, place - low
@@ -31,6 +32,12 @@ def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int
         rows[~np.isfinite(rows.sum(axis=-1))] = np.nan
         found.append(rows)
     return found
+
+
+@lru_cache(maxsize=8)
+def _shares(points: int) -> Floats:
+    """So many (points,) from 0 to 1; every stride asks for the same ones."""
+    return np.linspace(0.0, 1.0, points)
 
 
 def first_crossing(pieces: Floats) -> Floats:

@@ -133,7 +133,7 @@ def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
 
 
 def _cell(value: object) -> object:
-    if isinstance(value, np.generic):
+    if type(value) is not float and isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float):
         return repr(round(value, 6) + 0.0) if math.isfinite(value) else ""

@@ -20,6 +20,16 @@ def test_slow_passes_in_place_and_fast_does_not(hz: float, share: float) -> None
     np.testing.assert_allclose(low_pass(wave, 3.0, RATE)[middle], share * wave[middle], atol=0.01)
 
 
+@pytest.mark.parametrize("shape", [(3, 700), (2, 3, 40), (60,), (1,)])
+@pytest.mark.parametrize("pad", [None, 0, 5])
+def test_it_has_the_bits_of_scipy(shape: tuple[int, ...], pad: int | None) -> None:
+    rows = np.random.default_rng(1).normal(size=shape)
+    reach = min(shape[-1] - 1, 200 if pad is None else pad)
+    for cutoff_hz in (0.5, 15.0):
+        expected = sosfiltfilt(butter(2, cutoff_hz / 50.0, output="sos"), rows, padlen=reach)
+        np.testing.assert_array_equal(low_pass(rows, cutoff_hz, RATE, pad), expected)
+
+
 def test_every_row_is_filtered_alone_and_a_short_signal_too() -> None:
     rows = np.random.default_rng(0).normal(size=(2, 60))
     both = low_pass(rows, 4.0, RATE, pad=30)

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,14 +36,12 @@ from core.body.erkf.kernel import (
     SmootherRecord,
     filter_segments,
 )
+from core.body.erkf.lanes import IN_LINE
 from core.body.erkf.params import ErkfParams
 from core.body.still import AT_REST, contact_samples, still_samples
 from core.body.tree import ImuTree
 from core.errors import EstimationError, ParameterError, SignalError
 from core.frames import Bools, Floats
-
-IN_LINE: Final = 8
-"""Numbers in one line of the processor's cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,7 +283,8 @@ def prepare_run(
 def memory_of(state: ErkfState) -> ErkfMemory:
     """A copy of the state for the kernels to advance."""
     N = len(state.P)
-    P = make_lines(N, N)
+    # the kernels take eight rows at a time
+    P = make_lines(N + IN_LINE - 1, N)[:N]
     P[:, :N] = state.P
     return ErkfMemory(
         state.nominal.copy(), P, state.before.copy(), state.injected.copy(), state.refused.copy()

@@ -58,7 +58,8 @@ class SmootherRecord(NamedTuple):
 class ErkfMemory(NamedTuple):
     """What passes from one sample to the next, advanced in place: `ErkfState` as the kernels take it.
 
-    x (n, 16) · P (N, ≥ N), the rest of each row 0 · before (n, 6) · dx (N,) injected last · refused (n,).
+    x (n, 16) · P (N, ≥ N), the rest of each row 0, and seven rows of 0 behind it (`memory_of`) ·
+    before (n, 6) · dx (N,) injected last · refused (n,).
     """
 
     x: Floats
@@ -97,7 +98,7 @@ class ErkfOutput(NamedTuple):
 
 
 class ErkfScratch(NamedTuple):
-    """R (n, 3, 3) of the IMUs · U (4, 3), y (3,), place (4,), H (2, 3, 3) of a block · vectors (10, 3) ·
+    """R (n, 3, 3) of the IMUs · U (blocks + 1, 3, 3), y (3,) of a block · vectors (10, 3) ·
     taken (n,) zero velocities, their σ (n,) · slack (J,) m of the joint centres."""
 
     R: Floats
@@ -107,8 +108,6 @@ class ErkfScratch(NamedTuple):
     taken: Bools
     zero_velocity: Floats
     slack: Floats
-    place: NDArray[np.int64]
-    H: Floats
 
 
 class Noise(NamedTuple):
@@ -146,7 +145,7 @@ class Links(NamedTuple):
     sd: Floats
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     """vᵀ S⁻¹ v ≤ gate for the zero velocity of the IMU whose errors begin at b."""
     S = P[b + 3 : b + 6, b + 3 : b + 6]
@@ -160,7 +159,7 @@ def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     return s <= gate * det
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
 def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-def]
     """Move every IMU and the covariance over the time before sample k; F (n, 5, 3, 3) is kept."""
     x, before, dx, acc, gyr = memory.x, memory.before, memory.dx, samples.acc, samples.gyr
@@ -171,7 +170,7 @@ def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-d
     propagate(memory.P, F, m, dt)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
 def add_noise(memory, samples, k, links, noise, Q):  # type: ignore[no-untyped-def]
     """Add the process noise of sample k, its diagonal into Q (N,), and make that the last sample."""
     P, before, dt = memory.P, memory.before, samples.step[k]
@@ -197,7 +196,7 @@ def add_noise(memory, samples, k, links, noise, Q):  # type: ignore[no-untyped-d
         P[r, r] += Q[r]
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
 def judge_contacts(memory, samples, k, noise, scratch, Q, refused):  # type: ignore[no-untyped-def]
     """Write for sample k how far each zero velocity is believed, which are taken and which the gate refuses.
 
@@ -228,7 +227,7 @@ def judge_contacts(memory, samples, k, noise, scratch, Q, refused):  # type: ign
                 Q[b + 3 + c] += speed2
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
 def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: ignore[no-untyped-def]
     """Take all blocks of sample k into the covariance and the correction; False if one is not positive."""
     x, P, dx, R, y, U = memory.x, memory.P, memory.dx, scratch.R, scratch.y, scratch.U
@@ -280,7 +279,7 @@ def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: i
     return good
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
 def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-untyped-def]
     """Move the correction into the state, and write that (n, 16) and its headings' deviations (n,)."""
     x, P, dx, R = memory.x, memory.P, memory.dx, scratch.R
@@ -302,7 +301,7 @@ def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-unty
         copy_row(x[i], nominal[i])
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def measure_joints(x, links, scratch, residual):  # type: ignore[no-untyped-def]
     """Write how far both ends of each joint are apart (J,), m, in states x (n, 16) turned by `scratch.R`."""
     y = scratch.y
@@ -314,7 +313,7 @@ def measure_joints(x, links, scratch, residual):  # type: ignore[no-untyped-def]
         residual[j] = np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
 def advance(  # type: ignore[no-untyped-def]
     memory, samples, k, links, noise, scratch, record, slot, output, row
 ):
@@ -332,14 +331,14 @@ def advance(  # type: ignore[no-untyped-def]
     return good
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def copy_row(source, target):  # type: ignore[no-untyped-def]
     """Write one row (k,) over another; numba compiles this in a tenth of the time of `target[:] = source`."""
     for c in range(len(target)):
         target[c] = source[c]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def keep_state(memory, row):  # type: ignore[no-untyped-def]
     """Write the state into one row (`row_length`,), of P what is on and below the diagonal."""
     x, before, P, at = memory.x, memory.before, memory.P, 0
@@ -357,7 +356,7 @@ def keep_state(memory, row):  # type: ignore[no-untyped-def]
         at += r + 2
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def restore_state(memory, row):  # type: ignore[no-untyped-def]
     """The way back of `keep_state`; above the diagonal P stays as it is."""
     x, before, P, at = memory.x, memory.before, memory.P, 0
@@ -407,13 +406,30 @@ def filter_segments(  # type: ignore[no-untyped-def]
     output = ErkfOutput(*output)
     n, J, N, T = memory.x.shape[0], links.ends.shape[0], memory.P.shape[0], samples.step.shape[0]
     scratch = ErkfScratch(
-        np.empty((n, 3, 3)), np.empty((4, 3)), np.empty(3), np.empty((10, 3)),
-        np.zeros(n, np.bool_), np.empty(n), np.empty(J), np.empty(4, np.int64), np.empty((2, 3, 3)),
+        np.empty((n, 3, 3)), np.empty((record.V.shape[1] + 1, 3, 3)), np.empty(3), np.empty((10, 3)),
+        np.zeros(n, np.bool_), np.empty(n), np.empty(J),
     )  # fmt: skip
+    length = segment if kept.shape[0] > 0 else T
+    adjoint = lam, np.empty(N), np.empty((length if smoothing else 0, N))
+    return run_segments(
+        memory, samples, links, noise, record, output, kept, length, smoothing, scratch, adjoint
+    )
+
+
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+def run_segments(  # type: ignore[no-untyped-def]
+    memory, samples, links, noise, record, output, kept, length, smoothing, scratch, adjoint,
+):  # fmt: skip
+    """What `filter_segments` does, in room that it gives.
+
+    Like all that runs for every sample compiled without numba's counting of references (`_nrt`), which can
+    make no arrays: every part of an array was counted, a fifth of the time of 15 states and a third of 9.
+    adjoint : λ (N,) as `filter_segments` takes it, d (N,), `swept` (K, N).
+    """
+    n, N, T = memory.x.shape[0], memory.P.shape[0], samples.step.shape[0]
     keeps = kept.shape[0] > 0
-    segments, length = (kept.shape[0], segment) if keeps else (1, T)
-    d = np.empty(N)
-    swept = np.empty((length if smoothing else 0, N))
+    segments = kept.shape[0] if keeps else 1
+    lam, d, swept = adjoint
     for i in range(segments):
         s = segments - 1 - i if smoothing else i
         a, b = s * length, min((s + 1) * length, T)
@@ -445,7 +461,7 @@ def filter_segments(  # type: ignore[no-untyped-def]
     return -1
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def sweep_back(lam, step, record, m, swept):  # type: ignore[no-untyped-def]
     """Sweep λ (N,) back over a recorded segment; `swept` (K, N): λ of each sample before its blocks."""
     for k in range(len(step) - 1, -1, -1):
@@ -455,7 +471,7 @@ def sweep_back(lam, step, record, m, swept):  # type: ignore[no-untyped-def]
         propagate_back(lam, record.F[k], m, step[k])
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def multiply_lower(P, lam, d):  # type: ignore[no-untyped-def]
     """d ← −P λ, of P only what is on and below the diagonal."""
     d[:] = 0.0
@@ -466,7 +482,7 @@ def multiply_lower(P, lam, d):  # type: ignore[no-untyped-def]
         d[r] -= P[r, r] * lam[r]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def move_smoothed(d, step, record, m, swept, out):  # type: ignore[no-untyped-def]
     """Turn a segment's filtered states `out` (K, n, 16) into smoothed ones.
 
@@ -492,7 +508,7 @@ def move_smoothed(d, step, record, m, swept, out):  # type: ignore[no-untyped-de
             turn(x[6:10], t0 - (a1 * t2 - a2 * t1), t1 - (a2 * t0 - a0 * t2), t2 - (a0 * t1 - a1 * t0))
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def measure_smoothed(states, links, scratch, residual):  # type: ignore[no-untyped-def]
     """Write how far the two ends of each joint are apart in states (K, n, 16), (K, J), m."""
     for k in range(states.shape[0]):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numba
 
+from core.body.erkf.lanes import IN_LINE, mix, read_columns, read_lanes, write_columns, write_lanes
 from core.frames import GRAVITY
 from core.rotation.compiled import (
     multiply3,
@@ -24,7 +25,7 @@ A, S, D, GAMMA, C = range(5)
 """Blocks of F per IMU, δv'=δv+A δθ+D δb_g+C δb_a, δp'=δp+Δt δv+½Δt(δv'−δv), δθ'=S δθ+Γ δb_g."""
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-untyped-def]
     """Advance one IMU's nominal state x (16,) and write its blocks F (5, 3, 3) and new matrix R (3, 3).
 
@@ -63,7 +64,7 @@ def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-unty
             F[C, i, j] = -dt * (first * start[i, j] + last * R[i, j])
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def reset_before(F, d):  # type: ignore[no-untyped-def]
     """Fold the reset Jacobian G = 1 − ½[δθ̂]× of the last correction (eq 27) into A and S: F ← F G."""
     a, b, c = 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]
@@ -75,66 +76,74 @@ def reset_before(F, d):  # type: ignore[no-untyped-def]
             F[k, i, 2] = z - (x * b - y * a)
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
-    """P ← F P Fᵀ, on and below the diagonal, for the blocks F (n, 5, 3, 3) of n IMUs with m errors each."""
+    """P ← F P Fᵀ, on and below the diagonal, for the blocks F (n, 5, 3, 3) of n IMUs with m errors each.
+
+    Rows, then columns, eight numbers at a time: P has whole lines and rows to spare (`memory_of`).
+    """
     N = P.shape[0]
     half = 0.5 * dt
-    biased = m == 15
     for j in range(N // m):
         b, end = j * m, (j + 1) * m
-        f = F[j]
         # the block on the diagonal is passed through whole
         for r in range(b + 1, end):
             for c in range(b, r):
                 P[c, r] = P[r, c]
-        for i in range(3):
-            a0, a1, a2 = f[A, i, 0], f[A, i, 1], f[A, i, 2]
-            if biased:
-                d0, d1, d2 = f[D, i, 0], f[D, i, 1], f[D, i, 2]
-                c0, c1, c2 = f[C, i, 0], f[C, i, 1], f[C, i, 2]
-                for c in range(end):
-                    dv = a0 * P[b + 6, c] + a1 * P[b + 7, c] + a2 * P[b + 8, c]
-                    dv += d0 * P[b + 9, c] + d1 * P[b + 10, c] + d2 * P[b + 11, c]
-                    dv += c0 * P[b + 12, c] + c1 * P[b + 13, c] + c2 * P[b + 14, c]
-                    P[b + i, c] += dt * P[b + 3 + i, c] + half * dv
-                    P[b + 3 + i, c] += dv
-            else:
-                for c in range(end):
-                    dv = a0 * P[b + 6, c] + a1 * P[b + 7, c] + a2 * P[b + 8, c]
-                    P[b + i, c] += dt * P[b + 3 + i, c] + half * dv
-                    P[b + 3 + i, c] += dv
-        s = f[S]
-        for c in range(end):
-            t0, t1, t2 = P[b + 6, c], P[b + 7, c], P[b + 8, c]
-            P[b + 6, c] = s[0, 0] * t0 + s[0, 1] * t1 + s[0, 2] * t2
-            P[b + 7, c] = s[1, 0] * t0 + s[1, 1] * t1 + s[1, 2] * t2
-            P[b + 8, c] = s[2, 0] * t0 + s[2, 1] * t1 + s[2, 2] * t2
-        if biased:
-            for i in range(3):
-                g0, g1, g2 = f[GAMMA, i, 0], f[GAMMA, i, 1], f[GAMMA, i, 2]
-                for c in range(end):
-                    P[b + 6 + i, c] += g0 * P[b + 9, c] + g1 * P[b + 10, c] + g2 * P[b + 11, c]
+        move_rows(P, F[j], b, m, dt, half)
     for j in range(N // m):
-        b = j * m
-        f = F[j]
-        for r in range(b, N):
-            t0, t1, t2 = P[r, b + 6], P[r, b + 7], P[r, b + 8]
-            for i in range(3):
-                dv = f[A, i, 0] * t0 + f[A, i, 1] * t1 + f[A, i, 2] * t2
-                turned = f[S, i, 0] * t0 + f[S, i, 1] * t1 + f[S, i, 2] * t2
-                if biased:
-                    g0, g1, g2 = P[r, b + 9], P[r, b + 10], P[r, b + 11]
-                    dv += f[D, i, 0] * g0 + f[D, i, 1] * g1 + f[D, i, 2] * g2
-                    dv += f[C, i, 0] * P[r, b + 12] + f[C, i, 1] * P[r, b + 13] + f[C, i, 2] * P[r, b + 14]
-                    turned += f[GAMMA, i, 0] * g0 + f[GAMMA, i, 1] * g1
-                    turned += f[GAMMA, i, 2] * g2
-                P[r, b + 6 + i] = turned
-                P[r, b + i] += dt * P[r, b + 3 + i] + half * dv
-                P[r, b + 3 + i] += dv
+        for r in range(j * m, N, IN_LINE):
+            move_columns(P, F[j], r, j * m, m, dt, half)
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
+def move_rows(P, f, b, m, dt, half):  # type: ignore[no-untyped-def]
+    """The rows of one IMU, whose errors begin at b, up to the end of its block."""
+    a, s, d, g, e = f[A], f[S], f[D], f[GAMMA], f[C]
+    for c in range(0, b + m, IN_LINE):
+        t0, t1, t2 = read_lanes(P, b + 6, c), read_lanes(P, b + 7, c), read_lanes(P, b + 8, c)
+        if m == 15:
+            g0, g1, g2 = read_lanes(P, b + 9, c), read_lanes(P, b + 10, c), read_lanes(P, b + 11, c)
+            e0, e1, e2 = read_lanes(P, b + 12, c), read_lanes(P, b + 13, c), read_lanes(P, b + 14, c)
+        for i in range(3):
+            dv = mix(a, i, t0, t1, t2)
+            turned = mix(s, i, t0, t1, t2)
+            if m == 15:
+                dv = dv + mix(d, i, g0, g1, g2) + mix(e, i, e0, e1, e2)
+                turned = turned + mix(g, i, g0, g1, g2)
+            p, v = read_lanes(P, b + i, c), read_lanes(P, b + 3 + i, c)
+            write_lanes(P, b + i, c, p + (dt * v + half * dv))
+            write_lanes(P, b + 3 + i, c, v + dv)
+            write_lanes(P, b + 6 + i, c, turned)
+
+
+@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
+def move_columns(P, f, r, b, m, dt, half):  # type: ignore[no-untyped-def]
+    """Eight rows from r on, in the columns of the IMU whose errors begin at b."""
+    a, s, d, g, e = f[A], f[S], f[D], f[GAMMA], f[C]
+    p0, p1, p2, v0, v1, v2, t0, t1 = read_columns(P, r, b)
+    # of 15 columns the second eight begin with t1, of 9 with p1
+    _, u1, u2, u3, u4, u5, u6, u7 = read_columns(P, r, b + m - IN_LINE)
+    t2 = u1 if m == 15 else u7
+    x0, x1, x2 = mix(a, 0, t0, t1, t2), mix(a, 1, t0, t1, t2), mix(a, 2, t0, t1, t2)
+    y0, y1, y2 = mix(s, 0, t0, t1, t2), mix(s, 1, t0, t1, t2), mix(s, 2, t0, t1, t2)
+    if m == 15:
+        x0 = x0 + mix(d, 0, u2, u3, u4) + mix(e, 0, u5, u6, u7)
+        x1 = x1 + mix(d, 1, u2, u3, u4) + mix(e, 1, u5, u6, u7)
+        x2 = x2 + mix(d, 2, u2, u3, u4) + mix(e, 2, u5, u6, u7)
+        y0 = y0 + (g[0, 0] * u2 + g[0, 1] * u3) + g[0, 2] * u4
+        y1 = y1 + (g[1, 0] * u2 + g[1, 1] * u3) + g[1, 2] * u4
+        y2 = y2 + (g[2, 0] * u2 + g[2, 1] * u3) + g[2, 2] * u4
+    p0, p1, p2 = p0 + (dt * v0 + half * x0), p1 + (dt * v1 + half * x1), p2 + (dt * v2 + half * x2)
+    v0, v1, v2 = v0 + x0, v1 + x1, v2 + x2
+    write_columns(P, r, b, (p0, p1, p2, v0, v1, v2, y0, y1))
+    if m == 15:
+        write_columns(P, r, b + 7, (y1, y2, u2, u3, u4, u5, u6, u7))
+    else:
+        write_columns(P, r, b + 1, (p1, p2, v0, v1, v2, y0, y1, y2))
+
+
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def propagate_error(d, F, m, dt):  # type: ignore[no-untyped-def]
     """δ ← F δ, the same step for one error (N,)."""
     for j in range(len(d) // m):
@@ -153,7 +162,7 @@ def propagate_error(d, F, m, dt):  # type: ignore[no-untyped-def]
             x[6 + i] = turned
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def propagate_back(lam, F, m, dt):  # type: ignore[no-untyped-def]
     """λ ← Fᵀ λ, the same step for the smoother."""
     for j in range(len(lam) // m):

@@ -12,6 +12,7 @@ from math import atan2, sqrt
 
 import numba
 
+from core.body.erkf.lanes import IN_LINE, mix, read_lanes, spread, write_lanes
 from core.rotation.compiled import skew, times_cross, wrap_angle
 
 FIRST, SECOND, UNIT, TURNS = range(4)
@@ -22,7 +23,7 @@ POSITION, VELOCITY = 0, 3
 """Offsets in an IMU's errors."""
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def turn_apart(R, i, j, ri, rj, y):  # type: ignore[no-untyped-def]
     """Write R_j r_j − R_i r_i (3,)."""
     for k in range(3):
@@ -30,7 +31,7 @@ def turn_apart(R, i, j, ri, rj, y):  # type: ignore[no-untyped-def]
         y[k] -= R[i, k, 0] * ri[0] + R[i, k, 1] * ri[1] + R[i, k, 2] * ri[2]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-untyped-def]
     """Joint centre p_i + R_i r_i = p_j + R_j r_j, or with centre False joint axis R_i e_i = R_j e_j."""
     place[FIRST], place[SECOND] = i * m, j * m
@@ -43,7 +44,7 @@ def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-u
             y[k] += x[j, k] - x[i, k]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
     """Variance of the joint centre's second-order term, ½ σ⁴ |r_xy|² of both levers, in m².
 
@@ -67,7 +68,7 @@ def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def
     return min(0.5 * var * var, 1.5) * reach
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def velocity_rows(v, m, i, place, y):  # type: ignore[no-untyped-def]
     """Zero velocity: the error of v (3,) itself is observed."""
     place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, VELOCITY, 0
@@ -75,7 +76,7 @@ def velocity_rows(v, m, i, place, y):  # type: ignore[no-untyped-def]
         y[k] = -v[k]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def tilt_rows(R, f, m, i, place, H, y):  # type: ignore[no-untyped-def]
     """Tilt: Rᵀẑ is the direction of the specific force at rest; δθ: [Rᵀẑ]×."""
     place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, -1, 1
@@ -85,7 +86,7 @@ def tilt_rows(R, f, m, i, place, H, y):  # type: ignore[no-untyped-def]
         y[k] = f[k] * norm - R[2, k]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-untyped-def]
     """Heading of the axis t = R f; two empty rows make it a block of three. False when t is near vertical."""
     tx = R[0, 0] * forward[0] + R[0, 1] * forward[1] + R[0, 2] * forward[2]
@@ -103,7 +104,7 @@ def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-un
     return True
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def complete_rows(P, first):  # type: ignore[no-untyped-def]
     """Copy what is below the diagonal of P into its rows first … first + 2, so that they are whole."""
     for q in range(3):
@@ -113,7 +114,39 @@ def complete_rows(P, first):  # type: ignore[no-untyped-def]
         P[first, c], P[first + 1, c], P[first + 2, c] = P[c, first], P[c, first + 1], P[c, first + 2]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
+def take_rows(P, place, H, V, U, taken):  # type: ignore[no-untyped-def]
+    """Write H (P − Σ VᵀV) of a block into V[taken], the sum over the blocks before it; U[a]: H V[a]ᵀ."""
+    b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
+    new = V[taken]
+    h, g = H[0], H[1]
+    for c in range(0, P.shape[1], IN_LINE):
+        if place[TURNS] == 1:
+            x, y, z = read_lanes(P, b + 6, c), read_lanes(P, b + 7, c), read_lanes(P, b + 8, c)
+            n0, n1, n2 = mix(h, 0, x, y, z), mix(h, 1, x, y, z), mix(h, 2, x, y, z)
+            if b2 >= 0:
+                x, y, z = read_lanes(P, b2 + 6, c), read_lanes(P, b2 + 7, c), read_lanes(P, b2 + 8, c)
+                n0 = n0 + g[0, 0] * x + g[0, 1] * y + g[0, 2] * z
+                n1 = n1 + g[1, 0] * x + g[1, 1] * y + g[1, 2] * z
+                n2 = n2 + g[2, 0] * x + g[2, 1] * y + g[2, 2] * z
+                if unit >= 0:
+                    n0 = n0 + (read_lanes(P, b + unit, c) - read_lanes(P, b2 + unit, c))
+                    n1 = n1 + (read_lanes(P, b + unit + 1, c) - read_lanes(P, b2 + unit + 1, c))
+                    n2 = n2 + (read_lanes(P, b + unit + 2, c) - read_lanes(P, b2 + unit + 2, c))
+        else:
+            i = b + unit
+            n0, n1, n2 = read_lanes(P, i, c), read_lanes(P, i + 1, c), read_lanes(P, i + 2, c)
+        for a in range(taken):
+            x, y, z = read_lanes(V[a], 0, c), read_lanes(V[a], 1, c), read_lanes(V[a], 2, c)
+            n0 = n0 - mix(U[a], 0, x, y, z)
+            n1 = n1 - mix(U[a], 1, x, y, z)
+            n2 = n2 - mix(U[a], 2, x, y, z)
+        write_lanes(new, 0, c, n0)
+        write_lanes(new, 1, c, n1)
+        write_lanes(new, 2, c, n2)
+
+
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyped-def]
     """Take one block into dx, but not yet into P; False if S is not positive.
 
@@ -124,30 +157,10 @@ def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyp
     ----------
     P : before all blocks, the rows that H asks for whole (`complete_rows`). taken : blocks before this.
     V (blocks, 3, as P) and E (9,) = (e, L) of this one are kept for the smoother.
+    U (> taken, 3, 3) : scratch. y (3,) becomes what is left of the block's own after dx.
     """
-    wide = P.shape[1]
     b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
     both, turns = b2 >= 0, place[TURNS] == 1
-    new = V[taken]
-    for r in range(3):
-        if turns:
-            h0, h1, h2 = H[0, r, 0], H[0, r, 1], H[0, r, 2]
-            if both:
-                g0, g1, g2 = H[1, r, 0], H[1, r, 1], H[1, r, 2]
-                for c in range(wide):
-                    new[r, c] = (
-                        h0 * P[b + 6, c] + h1 * P[b + 7, c] + h2 * P[b + 8, c]
-                        + g0 * P[b2 + 6, c] + g1 * P[b2 + 7, c] + g2 * P[b2 + 8, c]
-                    )  # fmt: skip
-                if unit >= 0:
-                    for c in range(wide):
-                        new[r, c] += P[b + unit + r, c] - P[b2 + unit + r, c]
-            else:
-                for c in range(wide):
-                    new[r, c] = h0 * P[b + 6, c] + h1 * P[b + 7, c] + h2 * P[b + 8, c]
-        else:
-            for c in range(wide):
-                new[r, c] = P[b + unit + r, c]
     for a in range(taken):
         old = V[a]
         for k in range(3):
@@ -162,60 +175,54 @@ def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyp
                     seen += old[k, b + unit + r]
                     if both:
                         seen -= old[k, b2 + unit + r]
-                U[r, k] = seen
-        u00, u01, u02 = U[0, 0], U[0, 1], U[0, 2]
-        u10, u11, u12 = U[1, 0], U[1, 1], U[1, 2]
-        u20, u21, u22 = U[2, 0], U[2, 1], U[2, 2]
-        for c in range(wide):
-            v0, v1, v2 = old[0, c], old[1, c], old[2, c]
-            new[0, c] -= u00 * v0 + u01 * v1 + u02 * v2
-            new[1, c] -= u10 * v0 + u11 * v1 + u12 * v2
-            new[2, c] -= u20 * v0 + u21 * v1 + u22 * v2
+                U[a, r, k] = seen
+    take_rows(P, place, H, V, U, taken)
+    new, S = V[taken], U[taken]
     for r in range(3):
-        U[3, r] = y[r]
         for k in range(3):
-            U[r, k] = 0.0
+            S[r, k] = 0.0
             if turns:
                 for i in range(3):
-                    U[r, k] += H[0, k, i] * new[r, b + 6 + i]
+                    S[r, k] += H[0, k, i] * new[r, b + 6 + i]
                     if both:
-                        U[r, k] += H[1, k, i] * new[r, b2 + 6 + i]
+                        S[r, k] += H[1, k, i] * new[r, b2 + 6 + i]
             if unit >= 0:
-                U[r, k] += new[r, b + unit + k]
+                S[r, k] += new[r, b + unit + k]
                 if both:
-                    U[r, k] -= new[r, b2 + unit + k]
+                    S[r, k] -= new[r, b2 + unit + k]
         if turns:
             for i in range(3):
-                U[3, r] -= H[0, r, i] * dx[b + 6 + i]
+                y[r] -= H[0, r, i] * dx[b + 6 + i]
                 if both:
-                    U[3, r] -= H[1, r, i] * dx[b2 + 6 + i]
+                    y[r] -= H[1, r, i] * dx[b2 + 6 + i]
         if unit >= 0:
-            U[3, r] -= dx[b + unit + r]
+            y[r] -= dx[b + unit + r]
             if both:
-                U[3, r] += dx[b2 + unit + r]
-        U[r, r] += sd * sd
-    if not (U[0, 0] > 0.0):
+                y[r] += dx[b2 + unit + r]
+        S[r, r] += sd * sd
+    if not (S[0, 0] > 0.0):
         return False
-    i0 = 1.0 / sqrt(U[0, 0])
-    l10, l20 = U[1, 0] * i0, U[2, 0] * i0
-    pivot = U[1, 1] - l10 * l10
+    i0 = 1.0 / sqrt(S[0, 0])
+    l10, l20 = S[1, 0] * i0, S[2, 0] * i0
+    pivot = S[1, 1] - l10 * l10
     if not (pivot > 0.0):
         return False
     i1 = 1.0 / sqrt(pivot)
-    l21 = (U[2, 1] - l20 * l10) * i1
-    pivot = U[2, 2] - l20 * l20 - l21 * l21
+    l21 = (S[2, 1] - l20 * l10) * i1
+    pivot = S[2, 2] - l20 * l20 - l21 * l21
     if not (pivot > 0.0):
         return False
     i2 = 1.0 / sqrt(pivot)
-    e0 = U[3, 0] * i0
-    e1 = (U[3, 1] - l10 * e0) * i1
-    e2 = (U[3, 2] - l20 * e0 - l21 * e1) * i2
-    for c in range(wide):
-        v0 = new[0, c] * i0
-        v1 = (new[1, c] - l10 * v0) * i1
-        new[0, c] = v0
-        new[1, c] = v1
-        new[2, c] = (new[2, c] - l20 * v0 - l21 * v1) * i2
+    e0 = y[0] * i0
+    e1 = (y[1] - l10 * e0) * i1
+    e2 = (y[2] - l20 * e0 - l21 * e1) * i2
+    for c in range(0, new.shape[1], IN_LINE):
+        v0 = i0 * read_lanes(new, 0, c)
+        v1 = i1 * (read_lanes(new, 1, c) - l10 * v0)
+        v2 = i2 * (read_lanes(new, 2, c) - l20 * v0 - l21 * v1)
+        write_lanes(new, 0, c, v0)
+        write_lanes(new, 1, c, v1)
+        write_lanes(new, 2, c, v2)
     for c in range(P.shape[0]):
         dx[c] += new[0, c] * e0 + new[1, c] * e1 + new[2, c] * e2
     E[0], E[1], E[2] = e0, e1, e2
@@ -223,38 +230,49 @@ def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyp
     return True
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def subtract_blocks(P, V, blocks):  # type: ignore[no-untyped-def]
-    """P ← P − Σ VᵀV on and below the diagonal, four rows at a time; V (≥ blocks, 3, as P).
+    """P ← P − Σ VᵀV on and below the diagonal, four rows and two lines at a time; V (≥ blocks, 3, as P).
 
-    A row is run through up to a whole line of the cache; what is above the diagonal means nothing. Two rows
-    at a time take 1.4 times as long, eight no less.
+    A row is run through up to two whole lines of the cache; what is above the diagonal means nothing. P has
+    rows to spare (`memory_of`).
     """
-    N, wide = P.shape
-    for r in range(0, N - 3, 4):
-        p0, p1, p2, p3 = P[r], P[r + 1], P[r + 2], P[r + 3]
-        for a in range(blocks):
-            x, y, z = V[a, 0], V[a, 1], V[a, 2]
-            x0, y0, z0 = x[r], y[r], z[r]
-            x1, y1, z1 = x[r + 1], y[r + 1], z[r + 1]
-            x2, y2, z2 = x[r + 2], y[r + 2], z[r + 2]
-            x3, y3, z3 = x[r + 3], y[r + 3], z[r + 3]
-            for c in range(min(wide, (r + 11) // 8 * 8)):
-                u, v, w = x[c], y[c], z[c]
-                p0[c] -= x0 * u + y0 * v + z0 * w
-                p1[c] -= x1 * u + y1 * v + z1 * w
-                p2[c] -= x2 * u + y2 * v + z2 * w
-                p3[c] -= x3 * u + y3 * v + z3 * w
-    for r in range(N // 4 * 4, N):
-        p0 = P[r]
-        for a in range(blocks):
-            x, y, z = V[a, 0], V[a, 1], V[a, 2]
-            x0, y0, z0 = x[r], y[r], z[r]
-            for c in range(wide):
-                p0[c] -= x0 * x[c] + y0 * y[c] + z0 * z[c]
+    last = P.shape[1] - IN_LINE
+    for r in range(0, P.shape[0], 4):
+        for c in range(0, r + 4, 2 * IN_LINE):
+            # in the last pair the second line may be the first again
+            e = min(c + IN_LINE, last)
+            p0, p1 = read_lanes(P, r, c), read_lanes(P, r + 1, c)
+            p2, p3 = read_lanes(P, r + 2, c), read_lanes(P, r + 3, c)
+            q0, q1 = read_lanes(P, r, e), read_lanes(P, r + 1, e)
+            q2, q3 = read_lanes(P, r + 2, e), read_lanes(P, r + 3, e)
+            for a in range(blocks):
+                x, y, z = V[a, 0], V[a, 1], V[a, 2]
+                u, v, w = read_lanes(V[a], 0, c), read_lanes(V[a], 1, c), read_lanes(V[a], 2, c)
+                f, g, h = read_lanes(V[a], 0, e), read_lanes(V[a], 1, e), read_lanes(V[a], 2, e)
+                i, j, k = spread(x[r]), spread(y[r]), spread(z[r])
+                p0 = p0 - (i * u + j * v + k * w)
+                q0 = q0 - (i * f + j * g + k * h)
+                i, j, k = spread(x[r + 1]), spread(y[r + 1]), spread(z[r + 1])
+                p1 = p1 - (i * u + j * v + k * w)
+                q1 = q1 - (i * f + j * g + k * h)
+                i, j, k = spread(x[r + 2]), spread(y[r + 2]), spread(z[r + 2])
+                p2 = p2 - (i * u + j * v + k * w)
+                q2 = q2 - (i * f + j * g + k * h)
+                i, j, k = spread(x[r + 3]), spread(y[r + 3]), spread(z[r + 3])
+                p3 = p3 - (i * u + j * v + k * w)
+                q3 = q3 - (i * f + j * g + k * h)
+            write_lanes(P, r, c, p0)
+            write_lanes(P, r + 1, c, p1)
+            write_lanes(P, r + 2, c, p2)
+            write_lanes(P, r + 3, c, p3)
+            write_lanes(P, r, e, q0)
+            write_lanes(P, r + 1, e, q1)
+            write_lanes(P, r + 2, e, q2)
+            write_lanes(P, r + 3, e, q3)
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def back_correct(lam, place, H, V, E):  # type: ignore[no-untyped-def]
     """λ ← λ − Hᵀ L⁻ᵀ (V λ + e): one block of the modified Bryson–Frazier smoother
     (docs/science/erkf.md, "Smoother")."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.body.erkf.filter import filter_block
+from core.body.erkf.filter import ErkfState, filter_block, make_lines, memory_of
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.predict import GAMMA, A, C, D, S, move, propagate, propagate_back, propagate_error
 from core.body.erkf.smoother import smooth
@@ -134,6 +134,12 @@ def random_covariance(rng: np.random.Generator, size: int) -> Floats:
     return M @ M.T / size + 0.1 * np.eye(size)
 
 
+def with_spare_rows(P: Floats) -> Floats:
+    """A covariance as the kernels take it."""
+    n, N = 1, len(P)
+    return memory_of(ErkfState(np.empty((n, 16)), P, np.empty((n, 6)), np.empty(N), np.zeros(n, np.int64))).P
+
+
 def test_propagation_and_correction_equal_the_textbook() -> None:
     rng = np.random.default_rng(3)
     n, m, dt = 3, 15, 0.01
@@ -141,10 +147,15 @@ def test_propagation_and_correction_equal_the_textbook() -> None:
     full = np.zeros((n * m, n * m))
     for i in range(n):
         full[i * m : (i + 1) * m, i * m : (i + 1) * m] = dense_transition(blocks[i], dt)
-    here = P.copy()
+    here = with_spare_rows(P)
     propagate(here, blocks, m, dt)
     # on and below the diagonal
-    np.testing.assert_allclose(np.tril(here), np.tril(full @ P @ full.T), atol=1e-12)
+    np.testing.assert_allclose(np.tril(here[:, : n * m]), np.tril(full @ P @ full.T), atol=1e-12)
+    unbiased = [e for e in range(n * m) if e % m < 9]
+    P9, F9 = P[np.ix_(unbiased, unbiased)], full[np.ix_(unbiased, unbiased)]
+    here = with_spare_rows(P9)
+    propagate(here, blocks, 9, dt)
+    np.testing.assert_allclose(np.tril(here[:, : n * 9]), np.tril(F9 @ P9 @ F9.T), atol=1e-12)
     lam = rng.normal(0.0, 1.0, n * m)
     swept = lam.copy()
     propagate_back(swept, blocks, m, dt)
@@ -156,7 +167,7 @@ def test_propagation_and_correction_equal_the_textbook() -> None:
     x = np.stack([random_nominal(rng) for _ in range(n)])
     R = np.stack([to_matrix(q) for q in x[:, 6:10]])
     place, H, y, sd = np.zeros(4, np.int64), np.zeros((2, 3, 3)), np.zeros(3), 0.03
-    updated, dx, V = P.copy(), np.zeros(n * m), np.empty((2, 3, n * m))
+    updated, dx, V = with_spare_rows(P), np.zeros(n * m), make_lines(2, 3, n * m)
     expected, expected_dx = P, np.zeros(n * m)
     # the second block must see what the first did to P, which is not in P yet
     for taken, (i, j) in enumerate(((0, 2), (1, 2))):
@@ -167,10 +178,10 @@ def test_propagation_and_correction_equal_the_textbook() -> None:
         gain = expected @ dense.T @ np.linalg.inv(dense @ expected @ dense.T + sd**2 * np.eye(3))
         expected_dx = expected_dx + gain @ (y - dense @ expected_dx)
         expected = expected - gain @ dense @ expected
-        assert take_block(updated, dx, place, H, y, sd, V, taken, np.empty(9), np.empty((4, 3)))
+        assert take_block(updated, dx, place, H, y, sd, V, taken, np.empty(9), np.empty((3, 3, 3)))
     subtract_blocks(updated, V, 2)
     np.testing.assert_allclose(dx, expected_dx, atol=1e-11)
-    np.testing.assert_allclose(np.tril(updated), np.tril(expected), atol=1e-11)
+    np.testing.assert_allclose(np.tril(updated[:, : n * m]), np.tril(expected), atol=1e-11)
 
 
 def test_rows_are_completed_from_below_the_diagonal() -> None:
