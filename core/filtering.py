@@ -43,7 +43,7 @@ def low_pass(x: Floats, cutoff_hz: float, rate_hz: float, pad: int | None = None
     ----------
     pad : samples by which the ends are continued, None = `PAD_S`.
     """
-    from core.filtering_kernel import filter_both_ways
+    from core.signal_kernel import filter_both_ways
 
     n = x.shape[-1]
     reach = min(n - 1, round(PAD_S * rate_hz) if pad is None else pad)

@@ -56,28 +56,12 @@ def _keep_apart(peaks: NDArray[np.int64], level: Floats, distance: int) -> Bools
 
 def _measure_prominence(x: Floats, tops: NDArray[np.int64]) -> Floats:
     """How far each of all tops (k,) is above the higher of the lowest points before something higher."""
-    if not len(tops):
-        return np.zeros(0)
-    valleys = np.minimum.reduceat(x, np.concatenate(([0], tops)))
-    left = _find_lows(float(x[0]), x[tops], valleys[:-1])
-    right = _find_lows(float(x[-1]), x[tops[::-1]], valleys[:0:-1])[::-1]
-    found: Floats = x[tops] - np.maximum(left, right)
+    from core.signal_kernel import find_lows
+
+    level, higher = x[tops].astype(np.float64), np.empty((len(tops) + 1, 2))
+    left, right = np.empty(len(tops)), np.empty(len(tops))
+    valleys = np.minimum.reduceat(x, np.concatenate(([0], tops))).astype(np.float64)
+    find_lows(float(x[0]), level, valleys[:-1].copy(), higher, left)
+    find_lows(float(x[-1]), level[::-1].copy(), valleys[:0:-1].copy(), higher, right)
+    found: Floats = level - np.maximum(left, right[::-1])
     return found
-
-
-def _find_lows(end: float, level: Floats, valleys: Floats) -> Floats:
-    """Lowest point (k,) behind each top until something higher comes, or the end.
-
-    Parameters
-    ----------
-    end : where the signal ends behind the first top. level : (k,) of the tops. valleys : (k,) lowest point
-        between each and the one behind it.
-    """
-    lows = np.empty(len(level))
-    higher = [(end, end)]  # what has nothing higher before it, with its own lowest point
-    for k, (top, low) in enumerate(zip(level.tolist(), valleys.tolist(), strict=True)):
-        while higher and higher[-1][0] <= top:
-            low = min(low, higher.pop()[1])
-        lows[k] = low
-        higher.append((top, low))
-    return lows
