@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, ClassVar, Final, Self, TypeVar
+from typing import Any, ClassVar, Final, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,12 @@ Held = TypeVar("Held", bound="HoldsSamples")
 
 SOME_ROWS: Final = 1 << 12
 """Rows that are looked at together: the first that need double precision end the search."""
+
+
+class SampleSeries(Protocol):
+    """Samples (T, …, 3) of which a part is asked for: an array, or what is computed when it is."""
+
+    def __getitem__(self, part: slice, /) -> Floats: ...
 
 
 class HoldsSamples:

@@ -19,7 +19,7 @@ from core.agreement.labels import sort_by_joints
 from core.agreement.mirrored import find_mirrored
 from core.agreement.params import ExchangeParams, JointParams
 from core.agreement.strides import find_swings
-from core.agreement.terms import Motion, SensorTerms, cut_terms
+from core.agreement.terms import SensorMotion, SensorTerms, cut_terms
 from core.agreement.windows import JointWindows, compare_at_joint
 from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
 from core.rotation import rotate
@@ -184,7 +184,7 @@ def _simplify(swap: Swap) -> Swap:
 
 
 def compare_hips(
-    motions: Mapping[Segment, Motion],
+    motions: Mapping[Segment, SensorMotion],
     joints: Mapping[tuple[Segment, Segment], JointWindows],
     rate_hz: float,
     params: ExchangeParams,
@@ -216,7 +216,7 @@ def compare_hips(
 
 
 def _cosines(
-    motions: Mapping[Segment, Motion],
+    motions: Mapping[Segment, SensorMotion],
     chain: Sequence[JointWindows],
     line: Floats,
     rate_hz: float,

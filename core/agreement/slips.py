@@ -18,7 +18,7 @@ import numpy as np
 from core.agreement.lags import MAD
 from core.agreement.params import JointParams, SlipParams
 from core.agreement.strides import choose_leg, find_main_axis, find_stride_turns, find_swings
-from core.agreement.terms import Motion, SensorTerms, find_terms
+from core.agreement.terms import SensorMotion, SensorTerms, find_terms
 from core.agreement.windows import JointWindows, compare_at_joint
 from core.frames import Bools, Floats, Segment
 from core.recording import SensorSignals, UniformRecording
@@ -348,7 +348,7 @@ def question_strides(
     segment: Segment,
     step: PlaceStep,
     axis: Floats,
-    motions: Mapping[Segment, Motion],
+    motions: Mapping[Segment, SensorMotion],
     valid: Bools,
     rate_hz: float,
     half: float,

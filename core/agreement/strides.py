@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.agreement.params import SlipParams
-from core.agreement.terms import Motion
+from core.agreement.terms import SensorMotion
 from core.filtering import low_pass
 from core.frames import Bools, Floats, Segment
 from core.peaks import find_peaks
@@ -68,7 +68,7 @@ def choose_leg(segment: Segment) -> tuple[Segment, ...]:
 
 
 def find_stride_turns(
-    motion: Motion, valid: Bools, borders: NDArray[np.int64], rate_hz: float, params: SlipParams
+    motion: SensorMotion, valid: Bools, borders: NDArray[np.int64], rate_hz: float, params: SlipParams
 ) -> StrideTurns:
     """Fit each stride's curve of vertical and rate to the typical one by a rotation.
 

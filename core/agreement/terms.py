@@ -24,7 +24,7 @@ TERMS: Final = 4
 """Columns of a sensor's terms: three for the place, one for its own specific force."""
 
 
-class Motion(Protocol):
+class SensorMotion(Protocol):
     """How one sensor moves: of the arrays, or worked out each time it is asked for; see `LevelMotion`."""
 
     @property

@@ -15,7 +15,7 @@ import numpy as np
 
 from core.angles.measure import measure_angles
 from core.body.l7s.filter import Adjoint, L7sParams, Worn
-from core.body.l7s.inputs import SampleSeries, free_acceleration
+from core.body.l7s.inputs import free_acceleration
 from core.body.l7s.poses import l7s_poses
 from core.body.model import BodyModel
 from core.body.poses import Poses
@@ -25,6 +25,7 @@ from core.calibration.result import CalibratedRecording
 from core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
+from core.held_samples import SampleSeries
 from core.recording import UniformRecording
 from core.rotation import about, angle_between, multiply, rotate, to_matrix
 from core.simulate import SCRIPTS, WalkTruth, simulate

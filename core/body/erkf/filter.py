@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +41,7 @@ from core.body.still import AT_REST, contact_samples, still_samples
 from core.body.tree import ImuTree
 from core.errors import EstimationError, ParameterError, SignalError
 from core.frames import Bools, Floats
+from core.held_samples import SampleSeries
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,12 +128,6 @@ class ErkfTrack:
     def q(self) -> Floats:
         """Sensor orientations (T, n, 4); a copy."""
         return np.stack(self.turns, axis=1)
-
-
-class SampleSeries(Protocol):
-    """Samples (T, n, 3) that are laid out when a part (t, n, 3) is asked for."""
-
-    def __getitem__(self, part: slice, /) -> Floats: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,9 +237,10 @@ class ErkfPass:
         if broke >= 0 or not _positive(self.memory.P[:, : len(self.memory.P)]):
             step = self.samples.step
             at = broke if broke >= 0 else len(step) - 1
+            at_s = before_s + step[: at + 1].sum()
             raise EstimationError(
                 "filter_diverged",
-                f"The covariance is no longer positive definite {before_s + step[: at + 1].sum():.2f} s into "
+                f"The covariance is no longer positive definite {at_s:.2f} s into "
                 "this block; check units, sensor positions and which sensor is on which segment.",
             )
         N = len(self.memory.P)

@@ -13,11 +13,11 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.erkf.predict import move, propagate, propagate_back, propagate_error, reset_before
+from core.body.erkf.predict import move, propagate, reset_before
+from core.body.erkf.sweep import copy_row, move_smoothed, multiply_lower, sweep_back
 from core.body.erkf.updates import (
     POSITION,
     VELOCITY,
-    back_correct,
     complete_rows,
     heading_rows,
     joint_rows,
@@ -332,13 +332,6 @@ def advance(  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
-def copy_row(source, target):  # type: ignore[no-untyped-def]
-    """Write one row (k,) over another; numba compiles this in a tenth of the time of `target[:] = source`."""
-    for c in range(len(target)):
-        target[c] = source[c]
-
-
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
 def keep_state(memory, row):  # type: ignore[no-untyped-def]
     """Write the state into one row (`row_length`,), of P what is on and below the diagonal."""
     x, before, P, at = memory.x, memory.before, memory.P, 0
@@ -459,53 +452,6 @@ def run_segments(  # type: ignore[no-untyped-def]
         for c in range(r):
             memory.P[c, r] = memory.P[r, c]
     return -1
-
-
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
-def sweep_back(lam, step, record, m, swept):  # type: ignore[no-untyped-def]
-    """Sweep λ (N,) back over a recorded segment; `swept` (K, N): λ of each sample before its blocks."""
-    for k in range(len(step) - 1, -1, -1):
-        for B in range(record.blocks[k] - 1, -1, -1):
-            back_correct(lam, record.place[k, B], record.H[k, B], record.V[k, B], record.E[k, B])
-        copy_row(lam, swept[k])
-        propagate_back(lam, record.F[k], m, step[k])
-
-
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
-def multiply_lower(P, lam, d):  # type: ignore[no-untyped-def]
-    """d ← −P λ, of P only what is on and below the diagonal."""
-    d[:] = 0.0
-    for r in range(len(lam)):
-        for c in range(r):
-            d[r] -= P[r, c] * lam[c]
-            d[c] -= P[r, c] * lam[r]
-        d[r] -= P[r, r] * lam[r]
-
-
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
-def move_smoothed(d, step, record, m, swept, out):  # type: ignore[no-untyped-def]
-    """Turn a segment's filtered states `out` (K, n, 16) into smoothed ones.
-
-    d (N,) is −P λ before the segment. From sample to sample d ← F d − Q λ − d̂x, which is −P λ again without a
-    P (the forward form of the disturbance smoother: Koopman 1993; docs/science/erkf.md, "Smoother").
-    """
-    for k in range(len(step)):
-        dx, Q = record.dx[k], record.Q[k]
-        propagate_error(d, record.F[k], m, step[k])
-        for r in range(len(d)):
-            d[r] -= Q[r] * swept[k, r] + dx[r]
-        for i in range(out.shape[1]):
-            b, x = i * m, out[k, i]
-            for c in range(3):
-                x[c] += d[b + c]
-                x[3 + c] += d[b + 3 + c]
-                if m == 15:
-                    x[10 + c] += d[b + 9 + c]
-                    x[13 + c] += d[b + 12 + c]
-            # P and λ are those before the reset; the state is the one after it: δθ ← G δθ
-            a0, a1, a2 = 0.5 * dx[b + 6], 0.5 * dx[b + 7], 0.5 * dx[b + 8]
-            t0, t1, t2 = d[b + 6], d[b + 7], d[b + 8]
-            turn(x[6:10], t0 - (a1 * t2 - a2 * t1), t1 - (a2 * t0 - a0 * t2), t2 - (a0 * t1 - a1 * t0))
 
 
 @numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]

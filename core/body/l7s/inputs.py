@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numba
 import numpy as np
@@ -18,6 +17,7 @@ from core.calibration.result import CalibratedRecording, SegmentCalibration
 from core.errors import EstimationError
 from core.frames import FOOT, GRAVITY, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
+from core.held_samples import SampleSeries
 from core.recording import SensorSignals
 from core.rotation.compiled import multiply3, to_matrix, transform
 
@@ -111,12 +111,6 @@ def remove_gravity(acc: Floats, valid: Bools, q: Floats, mounted: SegmentCalibra
         out,
     )
     return out
-
-
-class SampleSeries(Protocol):
-    """Samples (n, 3) of which a part is asked for: an array, or what is computed when it is."""
-
-    def __getitem__(self, part: slice, /) -> Floats: ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ import numpy as np
 from core.body.l7s.checks import SeenWalk, longest_gaps, walking_checks
 from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
 from core.body.l7s.health import l7s_health, list_health_notices
-from core.body.l7s.inputs import KnownSamples, L7sTake, SampleSeries, bodies_of, take_of
+from core.body.l7s.inputs import KnownSamples, L7sTake, bodies_of, take_of
 from core.body.l7s.legs import BODIES, FIGURE, LEGS, LegModel, solve_legs
 from core.body.l7s.smoother import smooth_track
 from core.body.l7s.windows import PlacedWindow, place_windows
@@ -25,6 +25,7 @@ from core.errors import Notice
 from core.estimators import L7S_2I, L7S_3I
 from core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
+from core.held_samples import SampleSeries
 from core.rotation import angle_between, from_matrix
 
 STRETCHED_M: Final = 1e-6

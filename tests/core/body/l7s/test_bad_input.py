@@ -13,7 +13,7 @@ from core.body.estimate import PoseEstimate
 from core.body.health import HealthFinding, Verdict
 from core.body.l7s.filter import filter_block, start_l7s_state
 from core.body.l7s.health import INNER_M, list_health_notices
-from core.body.l7s.inputs import SampleSeries, free_acceleration, take_of
+from core.body.l7s.inputs import free_acceleration, take_of
 from core.body.l7s.legs import LegModel
 from core.body.l7s.poses import l7s_poses
 from core.body.model import BodyModel
@@ -23,6 +23,7 @@ from core.errors import EstimationError, SagittalError
 from core.estimators import Estimator
 from core.frames import FOOT, SIDES, Floats, Segment
 from core.fusion.mahony import estimate_orientations
+from core.held_samples import SampleSeries
 from core.pipeline import PipelineConfig, analyse
 from core.recording import Recording, SensorSignals, UniformRecording
 from core.rotation import about, multiply, rotate
