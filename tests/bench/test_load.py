@@ -64,6 +64,14 @@ def recordings(request: pytest.FixtureRequest) -> int:
 
 
 @pytest.fixture
+def queued(recordings: int) -> int:
+    """The same, for what queues them; before a server is started."""
+    if not recordings:
+        pytest.skip("half a minute of processors and more: run with --recordings 40, or 1000")
+    return recordings
+
+
+@pytest.fixture
 def service(source: Source, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
     """A server without workers of its own, on either engine."""
     settings = settings_of(tmp_path, source)
@@ -86,11 +94,9 @@ def settings_of(folder: Path, source: Source, workers: int = 0) -> Settings:
 
 
 def test_each_recording_is_analysed_once_and_pages_come_meanwhile(
-    service: Service, source: Source, tmp_path: Path, recordings: int
+    queued: int, service: Service, source: Source, tmp_path: Path
 ) -> None:
-    is_whole = recordings >= WHOLE
-    if not recordings:
-        pytest.skip("half a minute of processors and more: run with --recordings 40, or 1000")
+    recordings, is_whole = queued, queued >= WHOLE
     sessions, submit_s = queue_recordings(service.client, recordings)
     workers = Workers(settings_of(tmp_path, source, WORKERS if is_whole else 2))
     db = Database(source)

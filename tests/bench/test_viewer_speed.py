@@ -109,7 +109,6 @@ def replay(server: viser.ViserServer) -> Callable[[int], object]:
     return lambda i: figure.pose(i / RATE_HZ)
 
 
-@pytest.mark.pace
 @pytest.mark.parametrize("viewers", [1, 4])
 def test_a_live_figure_costs_little_more_than_a_replayed_one(
     viewers: int,
