@@ -77,7 +77,7 @@ def _report(database: Source) -> None:
 
     began, told = time.monotonic(), ""
     if is_compiling() or not has_compiled_filters():
-        say("Compiling the filters (once for you and this version, about half a minute) …")
+        say("Compiling the filters (once for you and this version, up to a minute) …")
     pause = threading.Event()
     with closing(Database(database)) as db:
         while True:
