@@ -33,7 +33,10 @@ def identity_key(data_dir: Path | None, what: str, really: bool, without_key: bo
                 gone = identities.discard_unreadable(db, file, really=really, without_key=without_key)
                 said = "".join(f"patient {one}\n" for one in gone)
                 said += f"{len(gone)} patients' names cannot be read with {file}"
-                said += " and were removed.\n" if really else "; --really removes them for good.\n"
+                if not gone:
+                    said += ".\n"
+                else:
+                    said += " and were removed.\n" if really else "; --really removes them for good.\n"
     except (MigrationError, SagittalError) as error:
         sys.stderr.write(f"{error}\n")
         return 1

@@ -157,7 +157,9 @@ def _strangers_if_known(settings: Settings, erased: set[str]) -> str | None:
 def _strangers(settings: Settings, erased: set[str]) -> str | None:
     spaces, takes = erasure.list_unfinished(settings)
     leaving = erased | spaces | {INCOMING}
-    files = sum(1 for f in open_blobs(settings).files() if f.space not in leaving)
+    # a folder that was never a clinic's is left as it is: opening would make one
+    stored = open_blobs(settings).files() if settings.bucket or settings.blobs.exists() else ()
+    files = sum(1 for f in stored if f.space not in leaving)
     found = (path for folder in settings.live_folders for path in folder.glob("*.log"))
     logs = sum(1 for path in found if path.stem not in takes)
     if not files and not logs:

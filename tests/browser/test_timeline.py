@@ -195,7 +195,11 @@ def test_a_second_click_leaves_a_stride_out_with_its_reason_and_the_overview_fol
     used = int(words.split()[0])
     expect(timeline.locator("[data-counts=left]")).to_have_text(words.replace(str(used), str(used - 1), 1))
     expect(timeline.locator("[data-verdict]")).to_have_text("left out")
-    expect(timeline.locator("[data-list] tr.on")).to_contain_text("no: looked at the dog")
+    row = timeline.locator("[data-list] tr.on")
+    expect(row).to_contain_text("no: looked at the dog")
+    # kept by its middle, named by its contact as in the list
+    contact = row.locator("td.n").first.inner_text()
+    expect(timeline.locator("[data-edits] li").first).to_contain_text(f"stride at {contact} s left out")
     overview = opened(f"/sessions/{walked}")
     expect(overview.locator("#warnings")).to_contain_text("1 stride left out")
     timeline.locator("[data-count]").click()
@@ -267,7 +271,7 @@ def test_the_value_beside_a_lane_is_the_signals_own(
 def test_a_raw_signal_shows_its_three_axes(timeline: Page) -> None:
     timeline.locator("#lane-1").select_option("shank_l_acc")
     expect(timeline.locator("[data-lane='1'] path")).to_have_count(3)
-    expect(timeline.locator("[data-values]").nth(1)).to_contain_text(re.compile(r"x .*y .*z "))
+    expect(timeline.locator("[data-values]").nth(1)).to_contain_text(re.compile(r"x .*y .*z .*(m/s²|°/s)"))
 
 
 def test_the_figure_comes_when_asked_for_and_stands_where_the_event_is(

@@ -332,4 +332,7 @@ def test_the_command_makes_changes_and_discards(
     assert main(["identity-key", "discard", "--really", *home]) == 1
     assert "add --without-key" in capsys.readouterr().err
     assert main(["identity-key", "discard", "--really", "--without-key", *home]) == 0
+    capsys.readouterr()
+    assert main(["identity-key", "discard", *home]) == 0
+    assert capsys.readouterr().out == f"0 patients' names cannot be read with {tmp_path / 'identity.key'}.\n"
     assert main(["check", *home]) == 0

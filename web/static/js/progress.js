@@ -4,6 +4,7 @@ import { speak, translate } from "./common/words.js";
 
 const ENDS = new Set(["done", "failed", "cancelled"]);
 
+const PREPARED_MS = 5000;
 const TYPING = "textarea, input:not([type=checkbox], [type=radio], [type=range], [type=file])";
 
 // Nobody loses the field or the dialog that is in use: the page waits for it.
@@ -59,7 +60,13 @@ class JobProgress extends HTMLElement {
     const percent = this.querySelector("[data-percent]");
     if (percent) percent.textContent = `${Math.round(100 * fraction)} %`;
     const step = this.markStages(job);
-    this.say(job.state === "queued" ? speak`Waiting for the worker` : step || translate(job.message) || speak`Working`);
+    this.say(job.state === "queued" ? this.waiting() : step || translate(job.message) || speak`Working`);
+  }
+
+  // A server that has just started still loads, at its first start compiles, the filters.
+  waiting() {
+    const long = this.querySelector("[data-clock]") && Date.now() - this.started > PREPARED_MS;
+    return long ? speak`Waiting for the worker. After a start of the server that takes up to a minute.` : speak`Waiting for the worker`;
   }
 
   // Stages before the current one are done, it runs, the rest wait; returns its name.

@@ -179,7 +179,7 @@ class TakeTimeline extends HTMLElement {
     }
     const undo = this.find("undo");
     if (undo) undo.disabled = !review.edits.length;
-    this.find("edits").replaceChildren(...editRows(review.edits));
+    this.find("edits").replaceChildren(...editRows(review));
     this.find("edit-count").textContent = review.edits.length ? String(review.edits.length) : "";
     this.picked = null;
     this.ticked();

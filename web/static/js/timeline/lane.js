@@ -61,7 +61,7 @@ export class SignalLane {
     const room = Math.max((most - least) * 0.08, 1e-6);
     [this.bottom, this.top] = [least - room, most + room];
     const digits = most - least < 5 ? 2 : 0;
-    const text = (v) => `${localise(v.toFixed(digits)).replace(/^-(?=[0.,]*$)/, "").replace("-", "−")}${this.lane.unit === "°" ? "°" : ` ${this.lane.unit}`}`;
+    const text = (v) => `${localise(v.toFixed(digits)).replace(/^-(?=[0.,]*$)/, "").replace("-", "−")}${this.unit}`;
     this.digits = digits;
     this.high.textContent = text(most);
     this.low.textContent = text(least);
@@ -69,6 +69,10 @@ export class SignalLane {
     const zero = this.y(0) / 10;
     this.zero.hidden = zero < 0 || zero > 100;
     this.zero.style.top = `${zero}%`;
+  }
+
+  get unit() {
+    return this.lane.unit === "°" ? "°" : ` ${this.lane.unit}`;
   }
 
   y(v) {
@@ -144,6 +148,6 @@ export class SignalLane {
       const text = v === null || v === undefined ? "–" : seconds(v, this.digits + (this.digits ? 0 : 1));
       return h("span", { class: SIDE_KEY[line] ? `leg ${SIDE_KEY[line]}` : "" }, `${SHORT[line] ?? line} ${text}`);
     });
-    this.values.replaceChildren(...parts);
+    this.values.replaceChildren(...parts, h("span", { class: "dim" }, this.unit.trim()));
   }
 }

@@ -69,16 +69,18 @@ export function strideRows(review, win, picked, onPick) {
 }
 
 // Changes that count, the newest first.
-export function editRows(edits) {
-  if (!edits.length) return [h("li", { class: "mut" }, speak`None. Everything is as it was detected.`)];
-  return edits.toReversed().map((e) => {
+export function editRows(review) {
+  if (!review.edits.length) return [h("li", { class: "mut" }, speak`None. Everything is as it was detected.`)];
+  return review.edits.toReversed().map((e) => {
     const day = new Date(e.at).toLocaleString(document.documentElement.lang === "de" ? "de-DE" : "en-GB", { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" });
-    return h("li", {}, chip(e.side), h("span", {}, what(e), h("span", { class: "xs dim block" }, `${e.by ?? speak`unknown`}, ${day}`)));
+    return h("li", {}, chip(e.side), h("span", {}, what(e, review), h("span", { class: "xs dim block" }, `${e.by ?? speak`unknown`}, ${day}`)));
   });
 }
 
-function what(e) {
-  const at = `${seconds(e.time_s, 2)} s`;
+// A stride is kept by its middle, so that moved events lose none, and named by its contact as everywhere else.
+function what(e, review) {
+  const stride = e.event ? undefined : review.strides.find((s) => s.side === e.side && s.start_s <= e.time_s && e.time_s < s.end_s);
+  const at = `${seconds(stride?.start_s ?? e.time_s, 2)} s`;
   if (e.kind === "move_event") return speak`${WORD[e.event]} moved from ${at} to ${seconds(e.to_s, 2)} s`;
   if (e.kind === "add_event") return speak`${WORD[e.event]} added at ${at}`;
   if (e.kind === "delete_event") return speak`${WORD[e.event]} at ${at} deleted`;
