@@ -14,13 +14,15 @@ from core.errors import FormatError
 from core.events.edits import Edit
 from core.frames import Protocol, Side
 from core.measure import measure_gait
+from core.parameters.kinematic import cycle_curves
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
 from server.report import signals, tracks
 from server.report.analysis_json import parameter_row
 from server.report.bundle import Bundle, apply_review, load_bundle, read_columns, read_poses
 from server.report.columns import read_table
-from server.report.estimator import list_estimated_angles
+from server.report.estimator import list_estimated_angles, list_estimated_variables
+from server.report.level import level_column, level_parameters
 from server.report.numbers import numbers_of
 
 POSES = "poses.parquet"
@@ -146,6 +148,20 @@ class ExportContent:
         return read_table(self.read_needed(signals.NAME))
 
     @cached_property
+    def levels(self) -> tuple[Parameter, ...]:
+        """Figures from the anatomical zero, where a goniometer's angles were entered."""
+        angles = self.bundle.angles
+        if angles is None or not angles.standing_deg:
+            return ()
+        curves = cycle_curves(angles, self.bundle.strides)
+        return level_parameters(curves, angles.standing_deg, list_estimated_variables(self.bundle.estimator))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Figures of the take over the strides that count, those from the anatomical zero last."""
+        return (*self.bundle.parameters, *self.levels)
+
+    @cached_property
     def cycles(self) -> tuple[CycleRow, ...]:
         """Every stride of the list, or every squat, counted or not."""
         if self.bundle.repetitions is not None:
@@ -153,6 +169,13 @@ class ExportContent:
                 CycleRow(i + 1, r.side, r.start_s, r.end_s, None, r.values, (), r.excluded)
                 for i, r in enumerate(self.bundle.repetitions)
             )
+        strides, angles = self.bundle.strides, self.bundle.angles
+        standing = {} if angles is None else angles.standing_deg
+        columns = dict(self.columns)
+        for name in dict.fromkeys(p.name for p in self.levels):
+            column = level_column(name, strides, self.columns, standing)
+            if column is not None:
+                columns[name] = column
         return tuple(
             CycleRow(
                 i + 1,
@@ -160,11 +183,11 @@ class ExportContent:
                 s.start_s,
                 s.end_s,
                 s.tc_s,
-                {name: column[i] for name, column in self.columns.items()},
+                {name: column[i] for name, column in columns.items()},
                 s.flags,
                 s.excluded_reason,
             )
-            for i, s in enumerate(self.bundle.strides.strides)
+            for i, s in enumerate(strides.strides)
         )
 
     def read_needed(self, name: str) -> bytes:

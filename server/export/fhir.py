@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from core.frames import Side
-from core.parameters.catalogue import CATALOGUE
 from core.parameters.result import Parameter
 from server.export.content import ExportContent, SignedForm
+from server.report.level import define_parameter, label_parameter
 from server.report.wording import reason_words
 
 CODES: Final = "urn:sagittal:gait-parameters"
@@ -73,7 +73,7 @@ def write_fhir(content: ExportContent) -> bytes:
         "subject": {"reference": patient},
         **({} if v.day is None else {"effectiveDateTime": v.day}),
     }
-    values = content.bundle.parameters
+    values = content.parameters
     observations = {
         _address(content, f"{p.name} {p.side}"): _observe(p) | shared | {"device": {"reference": device}}
         for p in values
@@ -177,10 +177,9 @@ def _absent(why: str) -> dict[str, Any]:
 
 def _observe(p: Parameter) -> dict[str, Any]:
     """One value with its spread, or the reason why there is none."""
-    entry = CATALOGUE.get(p.name)
     found: dict[str, Any] = {
         "resourceType": "Observation",
-        "code": _code(p.name, p.name if entry is None else entry.label),
+        "code": _code(p.name, label_parameter(p.name)),
     }
     if p.side is not None:
         found["bodySite"] = {"text": SIDE_WORDS[p.side]}
@@ -216,8 +215,8 @@ def _define_codes(values: Sequence[Parameter]) -> dict[str, Any]:
     words = dict((REPORT, PANEL)) | {name: text for name, (text, _) in SPREAD.items()}
     concepts: list[dict[str, str]] = [{"code": code, "display": text} for code, text in words.items()]
     for name in dict.fromkeys(p.name for p in values):
-        entry = CATALOGUE.get(name)
-        more = {} if entry is None else {"display": entry.label, "definition": entry.definition}
+        definition = define_parameter(name)
+        more = {"display": label_parameter(name), "definition": definition} if definition else {}
         concepts.append({"code": name, **more})
     return {
         "resourceType": "CodeSystem",

@@ -15,6 +15,7 @@ from core.parameters.catalogue import CATALOGUE, name_counted, unit_of
 from core.parameters.kinematic import POINTS, MeanCurve, cycle_curves, mean_curve
 from core.parameters.uncertainty import is_estimated
 from server.export.content import ExportContent
+from server.report.level import GROUP, define_parameter, from_standing, label_parameter
 
 Row = tuple[object, ...]
 
@@ -97,7 +98,7 @@ def list_parameters(content: ExportContent) -> TableSheet:
             *(p.name, p.side, p.n, p.mean, p.sd, p.unit, p.cv_pct, p.ci_low, p.ci_high),
             *(p.uncertainty, int(p.estimated), p.reason, p.note),
         )
-        for p in content.bundle.parameters
+        for p in content.parameters
     )
     return TableSheet("Parameters", (*header, "uncertainty", "estimated", "reason", "note"), rows)
 
@@ -179,7 +180,7 @@ def list_notices(content: ExportContent) -> TableSheet:
 
 def list_dictionary(content: ExportContent) -> TableSheet:
     """What every column and every parameter of these tables is."""
-    used = {p.name for p in content.bundle.parameters} | {n for c in content.cycles for n in c.values}
+    used = {p.name for p in content.parameters} | {n for c in content.cycles for n in c.values}
     header = ("name", "label", "unit", "group", "of", "mean_of", "definition")
     columns = [(name, None, unit_of(name), "columns", None, None, s) for name, s in TABLE_COLUMNS.items()]
     entries = [
@@ -187,4 +188,8 @@ def list_dictionary(content: ExportContent) -> TableSheet:
         for name, e in CATALOGUE.items()
         if name in used
     ]
+    for name in dict.fromkeys(p.name for p in content.levels):
+        e = CATALOGUE[from_standing(name) or name]
+        words = label_parameter(name), define_parameter(name)
+        entries.append((name, words[0], unit_of(name), GROUP, e.of, name_counted(name), words[1]))
     return TableSheet("Dictionary", header, (*columns, *entries))

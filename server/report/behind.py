@@ -12,7 +12,7 @@ from core.frames import SIDES, Side
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.rows import Column
 from server.report.columns import reduce_to_plain
-from server.report.level import from_standing
+from server.report.level import define_parameter
 from server.report.svg import KEY, make_label, make_time_labels
 from server.report.table import ParameterRow
 from server.report.wording import explain_exclusion, format_number
@@ -20,9 +20,6 @@ from server.report.wording import explain_exclusion, format_number
 HEIGHT: Final = 220
 TOP, BOTTOM = 12, 24
 """Chart and its margins, px."""
-
-STANDING: Final = "from the person's own standing"
-"""Words of definitions that do not hold for an anatomical angle."""
 
 TICKS: Final = 5
 CSS: Final[dict[Side, tuple[str, float]]] = {"left": ("dl", 5.2), "right": ("dr", 4.6)}
@@ -91,11 +88,7 @@ def open_row(
         )
         for i, (s, v) in enumerate(zip(strides.strides, column, strict=True))
     )  # fmt: skip
-    entry = CATALOGUE.get(from_standing(row.name) or row.name)
-    definition = "" if entry is None else entry.definition
-    if from_standing(row.name) is not None:
-        definition = definition.replace(STANDING, "from the anatomical zero")
-    return ParameterStrides(row, definition, values, _chart(row, values, duration_s))
+    return ParameterStrides(row, define_parameter(row.name), values, _chart(row, values, duration_s))
 
 
 def _chart(row: ParameterRow, values: Sequence[StrideValue], duration_s: float) -> str:

@@ -9,14 +9,18 @@ from typing import Final
 from core.events.result import Strides
 from core.frames import SIDES
 from core.norms import Norms
-from core.parameters.anatomical_zero import anatomical_parameters, standing_name
-from core.parameters.result import CycleCurves
+from core.parameters.anatomical_zero import anatomical_parameters, standing_name, standing_offset_deg
+from core.parameters.catalogue import CATALOGUE
+from core.parameters.result import CycleCurves, Parameter
 from core.parameters.rows import Column
 from core.standing_angles import JOINTS, PELVIS
 from server.report.table import ParameterRow, parameter_rows
+from server.report.wording import ZERO_WORDS
 
 GROUP = "Angles from the anatomical zero"
 
+STANDING: Final = "from the person's own standing"
+"""Words of definitions that do not hold for an anatomical angle."""
 
 _SUFFIX: Final = "_anatomical_deg"
 
@@ -24,6 +28,22 @@ _SUFFIX: Final = "_anatomical_deg"
 def from_standing(name: str) -> str | None:
     """Name of the same figure from standing; None for any other row."""
     return f"{name.removesuffix(_SUFFIX)}_deg" if name.endswith(_SUFFIX) else None
+
+
+def define_parameter(name: str) -> str:
+    """What a figure is, in a sentence, "" where the catalogue has none; from the anatomical zero too."""
+    entry = CATALOGUE.get(from_standing(name) or name)
+    if entry is None or from_standing(name) is None:
+        return "" if entry is None else entry.definition
+    return entry.definition.replace(STANDING, "from the anatomical zero")
+
+
+def label_parameter(name: str) -> str:
+    """What a figure is called, the name itself where the catalogue has none; a level says its zero."""
+    entry = CATALOGUE.get(from_standing(name) or name)
+    if entry is None:
+        return name
+    return entry.label if from_standing(name) is None else f"{entry.label}, {ZERO_WORDS['anatomical']}"
 
 
 def level_column(
@@ -34,11 +54,28 @@ def level_column(
     if column is None:
         return None
     variable = next((v for v in (*PELVIS, *JOINTS) if name.startswith(f"{v}_")), "")
-    read = {s: standing_deg.get(standing_name(variable, s)) for s in SIDES}
+    read = {
+        s: standing_offset_deg(variable, s, standing_deg)
+        for s in SIDES
+        if standing_name(variable, s) in standing_deg
+    }
     return tuple(
-        None if v is None or (zero := read[s.side]) is None else v + zero
+        None if v is None or (zero := read.get(s.side)) is None else v + zero
         for s, v in zip(strides.strides, column, strict=True)
     )
+
+
+def level_parameters(
+    curves: CycleCurves, standing_deg: Mapping[str, float], estimated: Collection[str] = ()
+) -> tuple[Parameter, ...]:
+    """Figures of the variables and sides whose standing angle was entered, named "…_anatomical_deg".
+
+    Parameters
+    ----------
+    estimated : variables that no two sensors measure; a goniometer does not help them.
+    """
+    found = _measured_parameters(curves, standing_deg, estimated)
+    return tuple(replace(p, name=_level_name(p.name)) for p in found)
 
 
 def level_rows(
@@ -47,13 +84,23 @@ def level_rows(
     norms: Norms,
     estimated: Collection[str] = (),
 ) -> tuple[ParameterRow, ...]:
-    """Rows of the variables and sides whose standing angle was entered, named "…_anatomical_deg".
+    """Rows of `level_parameters`.
 
     Parameters
     ----------
     norms : of this person, looked up with `anatomical` = the variables of `anatomical_variables`.
-    estimated : variables that no two sensors measure; a goniometer does not help them.
     """
+    found = _measured_parameters(curves, standing_deg, estimated)
+    rows = parameter_rows(found, norms, zero="anatomical")
+    return tuple(replace(row, name=_level_name(row.name), group=GROUP) for row in rows)
+
+
+def _measured_parameters(
+    curves: CycleCurves, standing_deg: Mapping[str, float], estimated: Collection[str]
+) -> tuple[Parameter, ...]:
     measured = replace(curves, curves={v: c for v, c in curves.curves.items() if v not in estimated})
-    rows = parameter_rows(anatomical_parameters(measured, standing_deg), norms, zero="anatomical")
-    return tuple(replace(row, name=f"{row.name.removesuffix('_deg')}{_SUFFIX}", group=GROUP) for row in rows)
+    return anatomical_parameters(measured, standing_deg)
+
+
+def _level_name(name: str) -> str:
+    return f"{name.removesuffix('_deg')}{_SUFFIX}"

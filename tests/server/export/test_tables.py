@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import zipfile
 from dataclasses import replace
 from functools import cache
@@ -88,6 +89,50 @@ def test_an_angle_that_a_model_gives_is_told_beside_every_value() -> None:
     about = {r["what"]: r["value"] for r in found["about.csv"]}
     assert about["estimated_angles"] == "knee_flexion_l"
     assert about["verdict"] == numbers_of(walk.bundle).verdict[1]
+
+
+def test_levels_from_the_anatomical_zero_are_those_from_standing_plus_what_was_read() -> None:
+    walk = open_walk()
+    assert not walk.levels
+    assert walk.bundle.angles is not None
+    read = {"knee_flexion_l": 4.0, "knee_flexion_r": 3.0}
+    entered = replace(walk.bundle.angles, standing_deg=read)
+    content = replace(walk, bundle=replace(walk.bundle, angles=entered))
+    found = tables(content)
+    standing, level = "knee_flexion_max_swing_deg", "knee_flexion_max_swing_anatomical_deg"
+    for side, zero in (("left", 4.0), ("right", 3.0)):
+        for table, value in (("parameters.csv", "mean"), ("strides_long.csv", "value")):
+            of = {
+                name: [r[value] for r in found[table] if (r["parameter"], r["side"]) == (name, side)]
+                for name in (standing, level)
+            }
+            assert len(of[standing]) == len(of[level]) > 0
+            for one, other in zip(of[standing], of[level], strict=True):
+                assert (one == "") == (other == "")
+                assert one == "" or abs(float(other) - float(one) - zero) < 1e-5
+    words = {r["name"]: r for r in found["data_dictionary.csv"]}[level]
+    assert words["unit"] == "deg"
+    assert words["label"].endswith(", anatomical")
+    assert "from the anatomical zero" in words["definition"]
+    fhir = json.loads(write_export("fhir", content))
+    codes = [e["resource"].get("code", {}).get("coding", [{}])[0].get("code") for e in fhir["entry"]]
+    assert codes.count(level) == 2
+
+
+def test_levels_of_strides_have_the_mean_of_the_take() -> None:
+    walk = open_walk()
+    assert walk.bundle.angles is not None
+    entered = replace(walk.bundle.angles, standing_deg={"knee_flexion_l": 3.0, "hip_flexion_r": -5.0})
+    content = replace(walk, bundle=replace(walk.bundle, angles=entered))
+    assert {(p.name.split("_")[0], p.side) for p in content.levels} == {("knee", "left"), ("hip", "right")}
+    compared = 0
+    for p in content.levels:
+        own = [c.values.get(p.name) for c in content.cycles if c.side == p.side and c.excluded is None]
+        measured = [v for v in own if v is not None]
+        if p.mean is not None and len(measured) == p.n:
+            assert abs(sum(measured) / len(measured) - p.mean) < 1e-5
+            compared += 1
+    assert compared >= 3
 
 
 def test_nothing_that_a_person_typed_becomes_a_formula() -> None:
