@@ -83,7 +83,7 @@ def record(
 
 
 def _choose_rows(printed: str, measured: str) -> str:
-    """Lines of a printed table whose first cell one of the measured table has; an empty one is the one above."""
+    """Lines of a printed table whose first cell the measured one has; an empty cell is as the one above."""
     names, chosen, cell = {line.split(" | ")[0] for line in measured.splitlines()}, [], ""
     for line in printed.splitlines():
         cell = line.split(" | ")[0] if line.split(" | ")[0].strip("| ") else cell
