@@ -33,4 +33,4 @@ def compile_one_at_a_time() -> None:
             finally:
                 held.remove(name)
 
-    Dispatcher.compile = compile_alone
+    Dispatcher.compile = compile_alone  # type: ignore[method-assign]
