@@ -49,7 +49,7 @@ PAGE_S: Final = 0.3
 """A page must be there by then."""
 MANY: Final = (2, 8, 32, 64)
 """Simulated workers."""
-JOB_S: Final = 1.0
+JOB_S: Final = 0.5
 PER_WORKER: Final = 3
 GROWS: Final = 2.0
 """Times as much four times as many do at least; without waiting for each other it would be four."""

@@ -63,6 +63,7 @@ def signals_at(chain: RevoluteChain, i: int, x: Floats, derive: bool = False) ->
     return s.h.copy(), s.H[:, :n].copy()
 
 
+@pytest.mark.slow  # compiles for seconds a function by itself, of which a squat runs the whole
 @pytest.mark.parametrize("i", [0, 1, 2])
 def test_derivatives_are_those_of_differences(i: int) -> None:
     rng = np.random.default_rng(i)
