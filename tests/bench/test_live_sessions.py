@@ -48,7 +48,7 @@ ASKED: Final = os.environ.get("SAGITTAL_LIVE_SESSIONS")
 LOOP_S: Final = 0.015
 """Time of a loop in Python there."""
 SECONDS = float(os.environ.get("SAGITTAL_LIVE_SECONDS", "6"))
-"""Five strides of each person: a hundred cues of twenty, and thousands of batches."""
+"""Five strides of each foot: two hundred cues of twenty people, and thousands of batches."""
 PER_BATCH = int(os.environ.get("SAGITTAL_LIVE_BATCH", "4"))
 """Samples of a batch: the first of them waits for the last, so 4 take 30 ms of the 60 a cue may take."""
 RATE_HZ = 100.0
