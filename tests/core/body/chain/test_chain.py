@@ -79,6 +79,7 @@ def test_derivatives_are_those_of_differences(i: int) -> None:
         assert H[:, k] == pytest.approx(slope, abs=2e-8 * max(1.0, np.abs(slope).max()))
 
 
+@pytest.mark.slow  # as above
 @pytest.mark.parametrize("i", [0, 1, 2])
 def test_signals_are_those_of_the_differentiated_way(i: int) -> None:
     """By differences of the sensor's orientation and place, which know nothing of recursion."""
