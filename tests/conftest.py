@@ -130,6 +130,10 @@ def pytest_collection() -> Generator[None, object, object]:
     try:
         return (yield)
     finally:
+        if "numba" in sys.modules:
+            from tests.compiling import compile_one_at_a_time
+
+            compile_one_at_a_time()
         gc.freeze()
         gc.enable()
 

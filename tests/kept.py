@@ -67,7 +67,7 @@ def _keep(make: Callable[P, R], depends_on: str) -> Callable[P, R]:
     def kept(*args: P.args, **kwargs: P.kwargs) -> R:
         said = f"{make.__module__}.{make.__qualname__}{args}{sorted(kwargs.items())}{depends_on}"
         path = folder() / hashlib.sha256(said.encode()).hexdigest()[:32]
-        with _locked(path.with_suffix(".lock")):
+        with locked(path.with_suffix(".lock")):
             if not path.exists():
                 made = make(*args, **kwargs)
                 part = path.with_suffix(".part")
@@ -106,7 +106,8 @@ def hash_sources(folders: tuple[str, ...]) -> str:
 
 
 @contextlib.contextmanager
-def _locked(path: Path) -> Iterator[None]:
+def locked(path: Path) -> Iterator[None]:
+    """Be the only process in the block of this path."""
     with path.open("w") as f:
         fcntl.flock(f, fcntl.LOCK_EX)
         yield

@@ -83,9 +83,13 @@ def record(
 
 
 def _choose_rows(printed: str, measured: str) -> str:
-    """Lines of a printed table whose first cell one of the measured table has."""
-    names = {line.split(" | ")[0] for line in measured.splitlines()}
-    return "\n".join(line for line in printed.splitlines() if line.split(" | ")[0] in names)
+    """Lines of a printed table whose first cell the measured one has; an empty cell is as the one above."""
+    names, chosen, cell = {line.split(" | ")[0] for line in measured.splitlines()}, [], ""
+    for line in printed.splitlines():
+        cell = line.split(" | ")[0] if line.split(" | ")[0].strip("| ") else cell
+        if cell in names:
+            chosen.append(line)
+    return "\n".join(chosen)
 
 
 def record_speed(section: str, header: Sequence[str], rows: Sequence[Sequence[str]], note: str = "") -> None:

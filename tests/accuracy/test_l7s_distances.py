@@ -32,9 +32,11 @@ from tests.accuracy.l7s_walks import steps_of
 from tests.accuracy.neura import BODY, TURNING, take
 from tests.accuracy.report import record
 from tests.data import data_folder
+from tests.marks import WRITES, sample
 from tests.walks import simulated
 
-WALKS: Final = ("comfortable", "fast_with_turns", "slow", "hemiparetic", "step_asym", "elderly")
+WALKS: Final = sample(("comfortable", "fast_with_turns", "slow", "hemiparetic", "step_asym", "elderly"), 2)
+"""Three of the six, with unequal steps among them; all where figures are written."""
 SEEDS: Final = (1, 2, 3)
 OWN: Final = "ErKF of each foot"
 
@@ -249,6 +251,7 @@ def test_write_down_the_figures() -> None:
         "in simulation, but on the one real walk the difference of the steps is 6 cm off; feet "
         "alone overlook unequal steps. Its width follows where the feet's headings point. So step length "
         "and width stay withheld (feet_not_linked) where only feet and pelvis are worn.",
+        whole=WRITES,
     )
 
 

@@ -49,6 +49,12 @@ def test_some_rows_are_held_against_their_own_and_the_rest_left_out(monkeypatch:
     for wrong in (["three", "3.2"], ["four", "4.0"]):
         with pytest.raises(AssertionError, match=wrong[1]):
             record("Some", ["a", "b"], [["one", "1.0"], wrong], whole=False)
+    # a row without a first cell is one more of the row above
+    printed = "| a | b |\n| --- | --- |\n| one | 1.0 |\n|  | 1.5 |\n| two | 2.0 |\n|  | 2.5 |"
+    record("Some", ["a", "b"], [["two", "2.0"], ["", "2.5"]], whole=False)
+    for some in ([["two", "2.0"], ["", "2.8"]], [["two", "2.0"]], [["one", "1.0"], ["", "2.5"]]):
+        with pytest.raises(AssertionError, match="Some"):
+            record("Some", ["a", "b"], some, whole=False)
     monkeypatch.setenv(report.WRITE, "1")
     with pytest.raises(AssertionError, match="would lose"):
         record("Some", ["a", "b"], [["one", "1.0"]], whole=False)

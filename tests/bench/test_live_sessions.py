@@ -47,7 +47,8 @@ ASKED: Final = os.environ.get("SAGITTAL_LIVE_SESSIONS")
 """So many instead, whatever the machine: 40 are the goal of two processors."""
 LOOP_S: Final = 0.015
 """Time of a loop in Python there."""
-SECONDS = float(os.environ.get("SAGITTAL_LIVE_SECONDS", "10"))
+SECONDS = float(os.environ.get("SAGITTAL_LIVE_SECONDS", "6"))
+"""Five strides of each foot: two hundred cues of twenty people, and thousands of batches."""
 PER_BATCH = int(os.environ.get("SAGITTAL_LIVE_BATCH", "4"))
 """Samples of a batch: the first of them waits for the last, so 4 take 30 ms of the 60 a cue may take."""
 RATE_HZ = 100.0

@@ -35,7 +35,7 @@ from server.storage.db import Database, Source
 from server.storage.tables import analysis, job
 from tests.service import Service, new_session, served
 
-pytestmark = [pytest.mark.bench, pytest.mark.pace, pytest.mark.timeout(3600)]
+pytestmark = [pytest.mark.bench, pytest.mark.timeout(3600)]
 
 WHOLE: Final = 200
 """Recordings from which on there are four workers, and more simulated ones."""
@@ -49,7 +49,7 @@ PAGE_S: Final = 0.3
 """A page must be there by then."""
 MANY: Final = (2, 8, 32, 64)
 """Simulated workers."""
-JOB_S: Final = 1.0
+JOB_S: Final = 0.5
 PER_WORKER: Final = 3
 GROWS: Final = 2.0
 """Times as much four times as many do at least; without waiting for each other it would be four."""
@@ -93,6 +93,7 @@ def settings_of(folder: Path, source: Source, workers: int = 0) -> Settings:
     )
 
 
+@pytest.mark.pace
 def test_each_recording_is_analysed_once_and_pages_come_meanwhile(
     queued: int, service: Service, source: Source, tmp_path: Path
 ) -> None:

@@ -35,7 +35,7 @@ from tests.faults.clinic import Clinic, find_room
 from tests.faults.failing import Dying, FailingSystem, PowerError
 
 BESIDE = {"erased.json"}
-STEP = {"sqlite": 1, "postgresql": 7}
+STEP = {"sqlite": 1, "postgresql": 13}
 """It dies at every so many of the calls: a copy of a server's database is migrated, in a second."""
 
 

@@ -63,6 +63,7 @@ def signals_at(chain: RevoluteChain, i: int, x: Floats, derive: bool = False) ->
     return s.h.copy(), s.H[:, :n].copy()
 
 
+@pytest.mark.slow  # compiles for seconds a function by itself, of which a squat runs the whole
 @pytest.mark.parametrize("i", [0, 1, 2])
 def test_derivatives_are_those_of_differences(i: int) -> None:
     rng = np.random.default_rng(i)
@@ -78,6 +79,7 @@ def test_derivatives_are_those_of_differences(i: int) -> None:
         assert H[:, k] == pytest.approx(slope, abs=2e-8 * max(1.0, np.abs(slope).max()))
 
 
+@pytest.mark.slow  # as above
 @pytest.mark.parametrize("i", [0, 1, 2])
 def test_signals_are_those_of_the_differentiated_way(i: int) -> None:
     """By differences of the sensor's orientation and place, which know nothing of recursion."""
