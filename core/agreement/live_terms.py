@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -36,8 +36,7 @@ MOTION_SECONDS: Final = 50
 """So much of how the sensors move is kept for the strides."""
 
 
-@dataclass(frozen=True, eq=False)
-class RawSecond:
+class RawSecond(NamedTuple):
     """Samples of one second: acc, gyr (n, k, 3) m/s², rad/s; valid (n, k)."""
 
     acc: Floats

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from core.errors import Notice
 from core.estimators import LiveMethod
 from core.frames import FOOT, SIDES, Bools, Floats, Segment
 
 
-@dataclass(frozen=True, eq=False)
-class MeasuredBlock:
+class MeasuredBlock(NamedTuple):
     """A block as measured: acc, gyr (T, n, 3), valid (T, n) of the chain's sensors.
 
     Parameters
@@ -27,8 +25,7 @@ class MeasuredBlock:
     turned: Mapping[Segment, Floats]
 
 
-@dataclass(frozen=True, eq=False)
-class FootBlock:
+class FootBlock(NamedTuple):
     """A block of the feet: p (T, F, 3), q (T, F, 4), still, valid (T, F), as `FootTracks`."""
 
     p: Floats
@@ -37,8 +34,7 @@ class FootBlock:
     valid: Bools
 
 
-@dataclass(frozen=True, eq=False)
-class BodyBlock:
+class BodyBlock(NamedTuple):
     """A block of the body.
 
     Parameters

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import median
 from typing import Final, get_args
 
 import numpy as np
@@ -66,6 +67,11 @@ class StrideParams:
 
 def flag_cycles(own: Sequence[Stride], params: StrideParams) -> list[Stride]:
     """The cycles of one foot in order of time with the flags their neighbours give them added."""
+    return [add_flag(s, *more) for s, more in zip(own, find_flags(own, params), strict=True)]
+
+
+def find_flags(own: Sequence[Stride], params: StrideParams) -> list[set[StrideFlag]]:
+    """Flags of each cycle of one foot in order of time, its own and those its neighbours give it."""
     more: list[set[StrideFlag]] = [set(s.flags) for s in own]
     for run in _runs(own, params):
         for i in run[: params.edge_strides]:
@@ -80,7 +86,7 @@ def flag_cycles(own: Sequence[Stride], params: StrideParams) -> list[Stride]:
                 more[i].add("near_turn")
     for i in _outliers(own, params):
         more[i].add("outlier")
-    return [add_flag(s, *m) for s, m in zip(own, more, strict=True)]
+    return more
 
 
 def add_flag(stride: Stride, *more: StrideFlag) -> Stride:
@@ -118,7 +124,8 @@ def _outliers(own: Sequence[Stride], params: StrideParams) -> list[int]:
     whole = [i for i, s in enumerate(own) if not {"gap", "incomplete", "implausible_time"} & set(s.flags)]
     if len(whole) < params.outlier_from:
         return []
-    times = np.array([own[i].duration_s for i in whole])
-    off = np.abs(times - np.median(times))
-    limit = max(params.outlier_sd * 1.4826 * np.median(off), params.outlier_share * np.median(times))
+    times = [own[i].duration_s for i in whole]
+    middle = median(times)
+    off = [abs(t - middle) for t in times]
+    limit = max(params.outlier_sd * 1.4826 * median(off), params.outlier_share * middle)
     return [i for i, o in zip(whole, off, strict=True) if o > limit]

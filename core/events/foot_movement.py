@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,8 +14,7 @@ if TYPE_CHECKING:
     from core.calibration.result import CalibratedRecording, SegmentCalibration
 
 
-@dataclass(frozen=True, eq=False)
-class FootMovement:
+class FootMovement(NamedTuple):
     """Motion of one foot.
 
     Parameters

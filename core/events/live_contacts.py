@@ -72,6 +72,8 @@ class ContactDetector:
         found = []
         for i, (side, foot) in enumerate(zip(self.sides, self._feet, strict=True)):
             told = advance_foot_contacts(foot, q[:, i], valid[:, i], motions[i].speed, motions[i].acc)
+            if not len(told.kind):
+                continue
             start_s = first / self._rate_hz
             for known, final, event in read_reports(told, side, start_s, self._rate_hz, self._latest[i]):
                 found.append(KnownContact(known, event, final))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -66,8 +66,7 @@ class ChainParams:
     strides: StrideParams = field(default_factory=StrideParams)
 
 
-@dataclass(frozen=True, eq=False)
-class ChainOutput:
+class ChainOutput(NamedTuple):
     """What a block gave: the body, angles (T, names) in rad, the rest in order of being known."""
 
     placed: BodyBlock
@@ -221,7 +220,8 @@ class LiveChain:
             FootMovement.of_signals(acc[:, k], gyr[:, k], mount)
             for k, mount in zip(self._feet, self._foot_mounts, strict=True)
         ]
-        known = self._contacts.push(q[:, : len(self._feet)], valid[:, self._feet], motions, self.first)
+        feet_valid = valid.take(self._feet, axis=1)
+        known = self._contacts.push(q[:, : len(self._feet)], feet_valid, motions, self.first)
         self._remember(placed, turned, valid, angles)
         self._count += len(acc)
         for x in known:
@@ -260,6 +260,9 @@ class LiveChain:
             "angles": angles, "course": course, "course_valid": course_valid, "feet_p": placed.paths.p,
             "feet_q": placed.paths.q, "feet_still": placed.paths.still, "feet_valid": placed.paths.valid,
         }  # fmt: skip
+        if len(angles) <= MOST:
+            self.history.append(rows)
+            return
         for start in range(0, len(angles), MOST):
             self.history.append({name: x[start : start + MOST] for name, x in rows.items()})
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numba
 import numpy as np
@@ -22,8 +21,7 @@ FULL: Final = 0.995
 """A component beyond this share of its range is at its end."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Piece:
+class _Piece(NamedTuple):
     """A batch: device times it begins and ends at, counts (k, 2) of what was measured and at its end."""
 
     start_us: int
@@ -57,6 +55,8 @@ class _StreamHealth:
         self._pieces: deque[_Piece] = deque()
         self._total = np.zeros((len(info.sensors), 2), np.int64)
         self._told: list[tuple[object, SensorHealth] | None] = [None] * len(info.sensors)
+        self._said: tuple[object, ...] = ()
+        self._found: list[SensorHealth] = []
         self.sent_us: int | None = None
 
     def push(self, batch: SampleBatch) -> None:
@@ -82,9 +82,13 @@ class _StreamHealth:
     ) -> list[SensorHealth]:
         """Health of its sensors."""
         span_s = 1e-6 * (self._pieces[-1].end_us - self._pieces[0].start_us) if self._pieces else 1.0
+        totals = self._total.tolist()
+        said = span_s, totals, silent_s, list(still), list(stuck), dict(doubts)
+        if said == self._said:
+            return self._found
         expected = max(1.0, span_s * self.info.rate_hz)
         found = []
-        for i, (measured, full) in enumerate(self._total.tolist()):
+        for i, (measured, full) in enumerate(totals):
             sensor = self.info.sensors[i]
             segment = sensor.segment
             doubt = None if segment is None else doubts.get(segment)
@@ -104,6 +108,7 @@ class _StreamHealth:
                 )
                 self._told[i] = before = now, health
             found.append(before[1])
+        self._said, self._found = said, found
         return found
 
 

@@ -175,12 +175,14 @@ def _tell(block: UniformBlock, chain: LiveChain, outcomes: Sequence[ChainOutput]
     """What a frame has of the chain after the block's last sample."""
     placed, angles = outcomes[-1].placed, outcomes[-1].angles
     here = min(len(angles), len(block))
-    q, p = placed.q[-1], placed.p[-1]
-    known = [(i, s) for i, s in enumerate(chain.estimator.segments) if placed.known[-1, i]]
+    p = placed.p[-1]
+    told = zip(chain.estimator.segments, placed.known[-1].tolist(), strict=True)
+    known = [s if k else None for s, k in told]
+    there = zip(known, p, p[:, 0].tolist(), strict=True)
     return {
         "method": chain.estimator.method,
-        "q": {s: q[i] for i, s in known},
-        "p": {s: p[i] for i, s in known if isfinite(p[i, 0])},
+        "q": {s: x for s, x in zip(known, placed.q[-1], strict=True) if s is not None},
+        "p": {s: x for s, x, first in there if s is not None and isfinite(first)},
         "valid": bool(placed.whole[-1]),
         "contact": dict(chain.contact),
         "angles": dict(zip(chain.names, angles[-1].tolist(), strict=True)),

@@ -95,14 +95,18 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
                 names[name] = base
             elif suffix not in SUFFIX.values():
                 names[name] = name
-        for segment, variable in (("pelvis", "pelvis_rotation"), (FOOT[side], "foot_progression")):
-            if segment in angles.headings:
-                (row,) = resample([angles.headings[segment]], angles.t_s, bounds, POINTS)
-                turned = row - row[:, :-1].mean(axis=1, keepdims=True)
-                curves.setdefault(variable, {})[side] = -turned if side == "left" else turned
-        if not names:
+        courses = {
+            variable: angles.headings[segment]
+            for segment, variable in (("pelvis", "pelvis_rotation"), (FOOT[side], "foot_progression"))
+            if segment in angles.headings
+        }
+        signals = [*courses.values(), *(angles.angles[name] for name in names)]
+        if not signals:
             continue
-        rows = resample((angles.angles[name] for name in names), angles.t_s, bounds, POINTS)
+        rows = iter(resample(signals, angles.t_s, bounds, POINTS))
+        for variable, row in zip(courses, rows):  # noqa: B905 - the angles follow
+            row -= row[:, :-1].mean(axis=1, keepdims=True)
+            curves.setdefault(variable, {})[side] = np.negative(row, out=row) if side == "left" else row
         for (name, base), row in zip(names.items(), rows, strict=True):
             sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
             # from the mean of walking nobody knows where straight is
@@ -169,17 +173,20 @@ def stride_figures(
     values: dict[str, dict[Side, Floats]] = {}
     for name, figure in (list_curve_figures() if figures is None else figures).items():
         for side, rows in curves.curves.get(figure.variable, {}).items():
-            part = np.degrees(rows[:, figure.start_pct : figure.end_pct + 1])
-            if figure.statistic == "at":
-                value = part[:, 0]
-            elif figure.statistic == "max":
-                value = part.max(axis=1)
-            elif figure.statistic == "min":
-                value = part.min(axis=1)
-            else:
-                value = np.ptp(part, axis=1)
-            values.setdefault(name, {})[side] = np.asarray(value)
+            values.setdefault(name, {})[side] = _read_figure(figure, rows)
     return values
+
+
+def _read_figure(figure: CurveFigure, rows: Floats) -> Floats:
+    """A figure (strides,) in degrees of curves (strides, 101) in rad."""
+    if not len(rows):
+        return np.empty(0)
+    part = rows[:, figure.start_pct : figure.end_pct + 1]
+    if figure.statistic == "at":
+        return np.asarray(np.degrees(part[:, 0]))
+    # the largest of the radians is the largest of the degrees
+    least, most = np.degrees(part.min(axis=1)), np.degrees(part.max(axis=1))
+    return np.asarray({"min": least, "max": most}.get(figure.statistic, most - least))
 
 
 def foot_pitch(
@@ -195,13 +202,14 @@ def foot_pitch(
     for foot, angle in (foot_pitches(orientations) if pitch is None else pitch).items():
         side: Side = "left" if foot == FOOT["left"] else "right"
         own = [s for s in strides.strides if s.side == side]
+        degrees = np.degrees(angle)
         moments = {
             "foot_pitch_ic_deg": [s.start_s for s in own],
             "foot_pitch_tc_deg": [np.nan if s.tc_s is None else s.tc_s for s in own],
         }
         for name, times in moments.items():
             at = np.asarray(times, np.float64)
-            values[name][side] = np.interp(at, orientations.t_s, np.degrees(angle))
+            values[name][side] = np.interp(at, orientations.t_s, degrees)
     return values
 
 

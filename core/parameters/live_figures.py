@@ -16,6 +16,7 @@ from core.frames import Bools, Floats, Segment
 from core.parameters.catalogue import list_curve_figures
 from core.parameters.kinematic import (
     FOOT_PITCH,
+    MEAN_ZERO,
     cycle_curves,
     foot_pitch,
     stride_figures,
@@ -70,7 +71,7 @@ def early_figures(stride: Stride, span: StrideSpan, surface: Surface) -> Figures
     read_from = list_curve_figures()
     worn = dict.fromkeys(read_from, "joint_missing") | dict.fromkeys(FOOT_PITCH, "no_foot_sensor")
     found |= worn | {"turning_angle_deg": "gap"}
-    read = {**stride_figures(curves), **turning_angle(one), **foot_pitch(span, one, pitch)}
+    read = {**stride_figures(curves, read_from), **turning_angle(one), **foot_pitch(span, one, pitch)}
     for name, sides in read.items():
         values = sides.get(stride.side)
         if values is not None and len(values):
@@ -83,7 +84,9 @@ def early_figures(stride: Stride, span: StrideSpan, surface: Surface) -> Figures
         found |= spatial_row(stride, one, span.feet, surface)
     else:
         found |= dict.fromkeys(SPATIAL, NOT_YET)
-    rows = {name: sides[stride.side][0] for name, sides in curves.curves.items() if stride.side in sides}
+    # courses first, as in a take with both feet
+    order = sorted(curves.curves.items(), key=lambda x: x[0] not in MEAN_ZERO)
+    rows = {name: of[stride.side][0] for name, of in order if stride.side in of}
     return found, {name: row for name, row in rows.items() if bool(np.isfinite(row).all())}
 
 

@@ -20,11 +20,11 @@ import numpy as np
 from core.angles import JointAngles, compute_headings
 from core.body.feet import FootTracks
 from core.body.model import BodyModel
-from core.events.flags import StrideParams, add_flag, flag_cycles
+from core.events.flags import StrideParams, add_flag, find_flags
 from core.events.live_contacts import KnownContact
 from core.events.result import GaitEvent, GaitEvents, Stride, StrideFlag
 from core.events.strides import side_strides
-from core.frames import Floats, Segment, Side
+from core.frames import FOOT, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.parameters.flats import OTHER
 from core.parameters.live_figures import StrideSpan, early_figures, measure_distances
@@ -122,14 +122,15 @@ class LiveStrides:
         first, past = self._sample(own[-2]) - 1, at + 1
         if not history.reaches(first, past):
             return []
-        span = self._span(first, past, history)
+        span = self._span(first, past, history, event.side)
         inside = tuple(e for e in self._events if e.time_s >= own[-2] or e.side != event.side)
         stride = side_strides(event.side, GaitEvents(inside), span, None, self._params)[-1]
         recent = self._recent[event.side]
         if recent and recent[-1].end_s != stride.start_s:
             recent.clear()
         recent.append(stride)
-        flags = tuple(f for f in flag_cycles(tuple(recent), self._params)[-1].flags if f not in LATER)
+        near = find_flags(tuple(recent), self._params)[-1]
+        flags = tuple(f for f in add_flag(stride, *near).flags if f not in LATER)
         found, curves = early_figures(stride, span, self._setup.surface)
         values, reasons = _split(found)
         final = self._setup.surface.protocol == "treadmill" or event.side not in self._setup.feet
@@ -176,7 +177,7 @@ class LiveStrides:
         first = self._sample(pending.stride.start_s) - 1
         found: dict[str, Value] = dict.fromkeys(SPATIAL, "gap")
         if history.reaches(first, at + 1):
-            span = self._span(first, at + 1, history, whole=False)
+            span = self._span(first, at + 1, history)
             found = measure_distances(pending.stride, context, span, self._setup.surface)
         told, (values, reasons) = pending.told, _split(found)
         if found["stride_length_m"] == "in_place":
@@ -228,17 +229,25 @@ class LiveStrides:
     def _sample(self, time_s: float) -> int:
         return floor(time_s * self._setup.rate_hz + 1e-6) - self._setup.first
 
-    def _span(self, first: int, past: int, history: SampleHistory, whole: bool = True) -> StrideSpan:
-        """Samples first … past − 1 as the functions of a whole take want them; not `whole`: no angles."""
+    def _span(self, first: int, past: int, history: SampleHistory, side: Side | None = None) -> StrideSpan:
+        """Samples first … past − 1 as the functions of a whole take want them.
+
+        Parameters
+        ----------
+        side : of the foot whose orientation and the pelvis's are wanted, and all angles; None = no angles.
+        """
         x = self._setup
         t_s = np.arange(x.first + first, x.first + past) / x.rate_hz
         q, valid = history.floats("course", first, past), history.bools("course_valid", first, past)
-        by_segment: Mapping[Segment, Floats] = {s: q[:, i] for i, s in enumerate(x.courses)}
+        turned_by = {
+            s: i for i, s in enumerate(x.courses) if side is not None and s in ("pelvis", FOOT[side])
+        }
+        by_segment: Mapping[Segment, Floats] = {s: q[:, i] for s, i in turned_by.items()}
         take = Orientations(
-            t_s, x.rate_hz, by_segment, {s: valid[:, i] for i, s in enumerate(x.courses)}, "live"
+            t_s, x.rate_hz, by_segment, {s: valid[:, i] for s, i in turned_by.items()}, "live"
         )
         angles = None
-        if whole:
+        if side is not None:
             columns = history.floats("angles", first, past)
             named = {name: columns[:, i] for i, name in enumerate(x.angles)}
             angles = JointAngles(t_s, named, {}, headings=compute_headings(take))

@@ -35,7 +35,9 @@ class StuckSensors:
         found = self._watch.push(block.acc, block.gyr, block.valid)
         if found is None:
             self.now = ()
-            return replace(block, out=np.zeros(block.valid.shape, np.bool_)), []
+            none = np.zeros(block.valid.shape, np.bool_)
+            x = block  # `replace` looks at every field, in every push
+            return UniformBlock(x.first, x.t_s, x.acc, x.gyr, x.valid, x.interpolated, none), []
         bad, back = found
         self.now = tuple(s for s, x in zip(self._segments, bad[-1], strict=True) if x)
         notices = []

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import floor
 
 import numpy as np
 
@@ -164,13 +165,14 @@ class LiveAxis:
         assert self._sent is not None  # noqa: S101
         p, last_s = self.params, self._buffer.last_s
         furthest = last_s.max()
-        due = [x.overdue_s(self._sent[1]) <= p.silent_s for x in self._queues.values()]
-        live = np.array(due) & (last_s >= furthest - p.behind_s)
-        if not live.any():
-            live = last_s == furthest  # the senders' clocks are of no use
+        live = last_s == furthest  # of a single stream, and where the senders' clocks are of no use
+        if len(last_s) > 1:
+            due = [x.overdue_s(self._sent[1]) <= p.silent_s for x in self._queues.values()]
+            wanted = np.array(due) & (last_s >= furthest - p.behind_s)
+            live = wanted if wanted.any() else live
         until = self._buffer.until(live)
         # a little less than `on_grid`, so that rounding never gives out a point that its sample is not on
-        past = int(np.floor((until - self._start_s) * self.rate_hz + 0.9 * p.timeline.on_grid)) + 1
+        past = floor((until - self._start_s) * self.rate_hz + 0.9 * p.timeline.on_grid) + 1
         if past <= self._next:
             return None
         first, self._next = self._next, past

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Request
+from starlette.routing import Match
+from starlette.types import Scope
 
 from server.api import (
     analyses,
@@ -56,9 +58,17 @@ BESIDE: tuple[APIRouter, ...] = (sign_in.address_router, health.router, metrics.
 """Routes outside /api/v1."""
 
 
+class ApiRouter(APIRouter):
+    """Routes of an API, none of which is looked at for an address that is not below its prefix."""
+
+    def matches(self, scope: Scope) -> tuple[Match, Scope]:
+        """Find the route of a request."""
+        return super().matches(scope) if f"{self.prefix}/" in scope["path"] else (Match.NONE, {})
+
+
 def build_api() -> APIRouter:
     """Return everything under /api/v1, with the document that describes it."""
-    api = APIRouter(prefix="/api/v1")
+    api = ApiRouter(prefix="/api/v1")
     for part in (
         sign_in,
         tokens,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, MutableMapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -40,12 +40,24 @@ class SpokenLoader(FlushLeftLoader):
         return speak_template(source), name, is_newest
 
 
+class SettledEnvironment(Environment):
+    """An environment whose globals all stand before the first template is loaded.
+
+    Jinja keeps those of a template and of the environment apart, and finds in every import of a page anew,
+    name by name, that they are the same: a fifteenth of a page.
+    """
+
+    def make_globals(self, d: MutableMapping[str, Any] | None) -> MutableMapping[str, Any]:
+        """Return the globals of a template: those of all and its own."""
+        return {**self.globals, **(d or {})}
+
+
 def load_templates(language: str) -> Jinja2Templates:
     """Return the environment in which every page of a language is rendered."""
     folder = Path(web.__file__).parent / "templates"
     is_source = language == SOURCE
     loader = FlushLeftLoader(folder) if is_source else SpokenLoader(folder)
-    templates = Jinja2Templates(env=Environment(loader=loader, autoescape=True))
+    templates = Jinja2Templates(env=SettledEnvironment(loader=loader, autoescape=True))
     templates.env.filters.update(FILTERS)
     templates.env.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
     if not is_source:

@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, Final, cast
 
+import msgspec
+
 from core.errors import InputError, Notice, SagittalError
 from core.events.result import GaitEvent
 from core.feedback import Baseline, Prescription
@@ -20,7 +22,7 @@ from core.formats.live_log import Hello, LogRecord, SampleBatch, decode_batch, p
 from core.frames import SIDES, Protocol, Side
 from core.functional_tests.result import GuidedTestView
 from core.online import OnlineSession
-from core.online.frame import AngleTrail, LiveFrame
+from core.online.frame import AngleTrail, CalibrationView, LiveFrame
 from core.parameters.live_stride import LiveStride
 from core.recording import Subject
 from server.live import wire
@@ -87,6 +89,7 @@ class Follower:
         self._sent_at = self._slow_at = -1.0
         self._slow: Mapping[str, Any] = {}
         self._slow_stage = ""
+        self._described: tuple[CalibrationView | None, msgspec.Raw] | None = None
 
     @property
     def has_work(self) -> bool:
@@ -137,7 +140,7 @@ class Follower:
         frame = self._last
         if now >= self._slow_at + SLOW_S or frame.stage != self._slow_stage:
             self._slow, self._slow_at, self._slow_stage = (
-                wire.slow_part(frame, self._battery, self._guided),
+                wire.slow_part(frame, self._battery, self._guided, self._describe(frame.calibration)),
                 now,
                 frame.stage,
             )
@@ -150,6 +153,12 @@ class Follower:
         self._last = None
         self._trail.clear()
         self._sent_at = now
+
+    def _describe(self, view: CalibrationView | None) -> msgspec.Raw:
+        """Where calibration stands, put into words once while nothing of it is new."""
+        if self._described is None or self._described[0] is not view:
+            self._described = view, wire.describe_calibration(view)
+        return self._described[1]
 
     def close(self) -> None:
         """Let go of the file."""

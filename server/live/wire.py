@@ -77,15 +77,28 @@ def frame(
 
 
 def slow_part(
-    shown: LiveFrame, battery: Mapping[str, float], guided: GuidedTestView | None = None
+    shown: LiveFrame,
+    battery: Mapping[str, float],
+    guided: GuidedTestView | None = None,
+    calibration: msgspec.Raw | None = None,
 ) -> dict[str, Any]:
-    """What of a frame is for reading and need not be made anew for every one: calibration, sensors, test."""
+    """What of a frame is for reading and need not be made anew for every one: calibration, sensors, test.
+
+    Parameters
+    ----------
+    calibration : its `describe_calibration`, where that has been made.
+    """
     health = [_health(row, battery.get(row.id)) for row in shown.health]
     return {
         "test": msgspec.Raw(encode(None if guided is None else tell_test(guided))),
-        "calibration": msgspec.Raw(encode(_calibration(shown.calibration))),
+        "calibration": calibration or describe_calibration(shown.calibration),
         "health": msgspec.Raw(encode(health)),
     }
+
+
+def describe_calibration(view: CalibrationView | None) -> msgspec.Raw:
+    """Where calibration stands."""
+    return msgspec.Raw(encode(_calibration(view)))
 
 
 def tell_test(view: GuidedTestView) -> dict[str, Any]:
@@ -152,7 +165,7 @@ def stride(told: LiveStride) -> dict[str, Any]:
         "foot_off_pct": _number(off, 2),
         "values": {name: _number(value, 5) for name, value in told.values.items()},
         "reasons": dict(told.reasons),
-        "curves_deg": {name: _curve(values) for name, values in told.curves.items()},
+        "curves_deg": _curves(told.curves),
         "flags": list(told.flags),
         "counted": told.counted,
         "complete": told.complete,
@@ -279,9 +292,12 @@ def _trace(trail: Iterable[AngleTrail]) -> dict[str, list[float | None]]:
     return {"t": _numbers(np.concatenate([piece.t_s for piece in pieces]), 3), **columns}
 
 
-def _curve(values: Any) -> list[float | None]:
-    step = (len(values) - 1) // (CURVE_POINTS - 1)
-    return _numbers(np.asarray(values)[::step] * _DEGREES, 2)
+def _curves(curves: Mapping[str, Floats]) -> dict[str, list[float | None]]:
+    if not curves:
+        return {}
+    whole = np.stack(tuple(curves.values()))
+    step = (whole.shape[1] - 1) // (CURVE_POINTS - 1)
+    return dict(zip(curves, _rows(whole[:, ::step] * _DEGREES, 2), strict=True))
 
 
 def _numbers(values: Any, digits: int) -> list[float | None]:

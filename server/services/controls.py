@@ -86,7 +86,7 @@ def make_group(
 
 def _session(reviewed: ReviewedAnalyses, visit: ControlVisit) -> ControlSession:
     def read() -> ControlSession:
-        bundle = reviewed.read_bundle(visit.found, visit.edits)
+        bundle = reviewed.read_without_tracks(visit.found, visit.edits)
         # of somebody who never stood still the curves have no level
         stood = bundle.angles is not None and bundle.angles.zero == "standing"
         angles = bundle.angles if stood else None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar, cast
 
@@ -89,8 +89,7 @@ class ReviewedAnalyses:
         """Return an analysis as it is stored, read once while it is at work; raises IntegrityError."""
 
         def read() -> StoredAnalysis:
-            names = [n for n in found.files if n not in NOT_READ and not n.startswith(EXPORTED)]
-            files = {name: analyses.file_bytes(self.blobs, found, name) for name in names}
+            files = self._read_files(found, NOT_READ)
             stored = load_bundle(files)
             if tracks.NAME not in files:
                 return StoredAnalysis(stored, None)
@@ -135,6 +134,21 @@ class ReviewedAnalyses:
         """Return the analysis with what its live edits give; raises IntegrityError."""
         stored, result = self.open(found).bundle, self.measure(found, edits)
         return stored if result is None else apply_review(stored, result, edits.edits)
+
+    def read_without_tracks(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
+        """Return the same of one that nobody works on: without an edit its tracks are not read, nor kept.
+
+        Raises
+        ------
+        IntegrityError, FormatError as `read_bundle`.
+        """
+        if edits.made:
+            return self.read_bundle(found, edits)
+        return load_bundle(self._read_files(found, {*NOT_READ, tracks.NAME}))
+
+    def _read_files(self, found: analyses.AnalysisRecord, left_out: Collection[str]) -> dict[str, bytes]:
+        names = [n for n in found.files if n not in left_out and not n.startswith(EXPORTED)]
+        return {name: analyses.file_bytes(self.blobs, found, name) for name in names}
 
     def read_numbers(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Numbers:
         """Return parameters and scores as they count; without an edit no signal is read.

@@ -29,8 +29,15 @@ PERFORMANCE: Final = ROOT / "docs" / "performance.md"
 PERFORMANCE_HEAD: Final = """# Performance
 
 Measured by `tests/bench` on two cores that others use, too, as CPU time. Do not edit: run
-`pytest -n 0 -m bench --write-figures tests/bench/test_growth.py`. Figures of another machine are others:
+`pytest -n 0 -m bench --write-figures tests/bench`, or a file of it. Figures of another machine are others:
 nothing is compared with this page; what the tests ask for are ratios and limits."""
+
+GOALS: Final = "Goals"
+"""The section of docs/performance.md that has one row a goal."""
+GOALS_NOTE: Final = (
+    "Goals are those of a quiet machine; on one that others use, CPU time is up to a quarter longer. Every "
+    "bench writes its own rows; one that was not run keeps what stood there."
+)
 
 IN_SHORT: Final = "In short"
 """The first section: one row a figure."""
@@ -97,6 +104,37 @@ def record_speed(section: str, header: Sequence[str], rows: Sequence[Sequence[st
     if os.environ.get(WRITE):
         text = _table(header, rows, note)
         _replace(section, lambda _: text, PERFORMANCE, PERFORMANCE_HEAD)
+
+
+def record_goal(what: str, goal: float, ours: float, unit: str, *, at_least: bool = False) -> None:
+    """Put a goal and what was measured into docs/performance.md, where figures are written.
+
+    Parameters
+    ----------
+    at_least : more is better; otherwise less.
+    """
+    if os.environ.get(WRITE):
+        row = tell_goal(what, goal, ours, unit, at_least=at_least)
+        _replace(GOALS, lambda text: put_goal(text, row), PERFORMANCE, PERFORMANCE_HEAD)
+
+
+def tell_goal(what: str, goal: float, ours: float, unit: str, *, at_least: bool = False) -> str:
+    """Row of a goal: what, how much, what was measured, whether it is met."""
+    met = ours >= goal if at_least else ours <= goal
+    shown = f"{ours:.0f}" if ours >= 100.0 else f"{ours:.3g}"
+    sign = "≥" if at_least else "≤"
+    return _line((what, f"{sign} {goal:g} {unit}", f"{shown} {unit}", "yes" if met else "no"))
+
+
+def put_goal(text: str, row: str) -> str:
+    """A section of goals with this row in the place of that name's, or behind all; the rest stays."""
+    if not text:
+        text = _table(("what", "goal", "ours", "met"), [], GOALS_NOTE)
+    lines = text.splitlines()
+    table = [line for line in lines if line.startswith("|")]
+    rows = {line.split(" | ")[0]: line for line in table[2:]} | {row.split(" | ")[0]: row}
+    rest = "\n".join(line for line in lines if not line.startswith("|")).strip()
+    return "\n".join([*table[:2], *rows.values()]) + f"\n\n{rest}"
 
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[str]], note: str) -> str:

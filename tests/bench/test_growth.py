@@ -19,9 +19,7 @@ import numpy as np
 import pytest
 
 from core.online import OnlineSession, compile_live_kernels
-from tests.accuracy.report import record_speed
-from tests.bench.test_erkf import FIFTEEN, best, smoothed
-from tests.core.body.erkf.walks import mixed_walk
+from tests.accuracy.report import record_goal, record_speed
 from tests.data import ROOT
 from tests.live_walks import batches, hello_of
 from tests.marks import WRITES, where_figures_are_written
@@ -37,16 +35,22 @@ pytestmark = [
 
 MAKE = """
 import sys
+from dataclasses import replace
 from math import pi
 from pathlib import Path
 from core.formats import write_recording
 from core.simulate import Arc, Stand, Straight, simulate
 
 lap = (Straight(20.0, 0.64, 0.54), Arc(1.5, pi, 0.52, 0.56)) * 2
-for laps in map(int, sys.argv[2:]):
-    made = simulate((Stand(8.0), *lap * laps, Stand(5.0)), seed=3)
-    Path(sys.argv[1], f"{laps}.parquet").write_bytes(write_recording(made.recording))
+for word in sys.argv[2:]:
+    laps, _, worn = word.partition(":")
+    take = simulate((Stand(8.0), *lap * int(laps), Stand(5.0)), seed=3).recording
+    if worn:
+        kept = {i: s for i, s in take.segments.items() if s in worn.split(",")}
+        take = replace(take, segments=kept, streams={i: take.streams[i] for i in kept})
+    Path(sys.argv[1], f"{word}.parquet").write_bytes(write_recording(take))
 """
+"""Walks of so many laps, all seven sensors or `laps:segment,segment`."""
 
 ANALYSE = """
 import json, sys, time
@@ -79,6 +83,12 @@ print(json.dumps({
 LAPS: Final = {1: 57.0, 14: 623.0} | ({84: 3668.0} if WRITES else {})
 """Laps of 43.5 s → about the take's length in s: 1, 10 and 60 min."""
 
+FEW: Final = {
+    "foot_l,foot_r": ("analysis of 10 min of two feet, CPU", 1.5),
+    "pelvis": ("analysis of 10 min of a pelvis, CPU", 0.3),
+}
+"""Segments with a sensor → name of the goal, s."""
+
 SLOWER: Final = 1.6
 """A second of ten minutes may take so much longer than a second of one minute."""
 
@@ -96,9 +106,6 @@ PUSHES: Final = 100
 DEARER: Final = 3.0
 """A push may take so much longer among many sessions, and the list of 500 patients than that of one, × 10:
 on a machine that others use 1.7 among 40, and .4 × 10."""
-
-reached: dict[str, tuple[float, float, str]] = {}
-"""What was measured here → goal, ours, unit."""
 
 
 def run(script: str, *words: str) -> str:
@@ -137,10 +144,10 @@ def test_time_and_memory_grow_with_the_length_and_no_faster(tmp_path: Path) -> N
         "minute; the process itself with all libraries is most of what one minute takes.",
     )
     ten = found[14]
-    reached["analysis of 10 min of seven sensors, CPU"] = (4.0, ten["cpu_s"], "s")
-    reached["the same, peak memory"] = (350.0, ten["peak_mb"], "MB")
+    record_goal("analysis of 10 min of seven sensors, CPU", 4.0, ten["cpu_s"], "s")
+    record_goal("the same, peak memory", 350.0, ten["peak_mb"], "MB")
     if 84 in found:
-        reached["analysis of 60 min of seven sensors, peak memory"] = (600.0, found[84]["peak_mb"], "MB")
+        record_goal("analysis of 60 min of seven sensors, peak memory", 600.0, found[84]["peak_mb"], "MB")
     assert all(x["parameters"] > 50 for x in found.values())
     assert found[14]["cpu_s"] / LAPS[14] <= SLOWER * found[1]["cpu_s"] / LAPS[1]
     assert found[14]["peak_mb"] <= MOST_MB
@@ -181,7 +188,7 @@ def test_a_live_session_costs_no_more_among_others() -> None:
         "median, the mean has the pushes that tell a stride. Ten come every second: a mean of a millisecond "
         "is 1 % of a core.",
     )
-    reached["push of 10 live samples"] = (0.3, ms[1], "ms")
+    record_goal("push of 10 live samples", 0.3, ms[1], "ms")
     assert ms[AT_ONCE[-1]] <= DEARER * ms[1]
 
 
@@ -211,17 +218,22 @@ async def test_the_list_of_patients_grows_slower_than_their_number(tmp_path: Pat
         rows,
         "CPU time of a page in the web process, the network not counted; memory with what wrote the rows.",
     )
-    reached["list of 500 patients, CPU"] = (40.0, ms[500], "ms")
+    record_goal("list of 500 patients, CPU", 40.0, ms[500], "ms")
     assert asked[500] == asked[1]
     assert ms[500] <= 10.0 * DEARER * ms[1]
 
 
 @where_figures_are_written
-def test_goals_are_written(tmp_path: Path) -> None:
-    inputs = mixed_walk().inputs
-    smoothed(inputs.part(0, 300), FIFTEEN)
-    us = best(lambda: smoothed(inputs, FIFTEEN), 7) / len(inputs.step_s) * 1e6
-    reached["ErKF with smoother, 15 states, seven sensors, a step"] = (50.0, us, "µs")
+@pytest.mark.parametrize("worn", FEW)
+def test_few_sensors_are_measured(worn: str, tmp_path: Path) -> None:
+    run(MAKE, str(tmp_path), f"1:{worn}", f"14:{worn}")
+    warm, path = (str(tmp_path / f"{laps}:{worn}.parquet") for laps in (1, 14))
+    name, goal = FEW[worn]
+    record_goal(name, goal, json.loads(run(ANALYSE, warm, path))["cpu_s"], "s")
+
+
+@where_figures_are_written
+def test_commands_are_measured(tmp_path: Path) -> None:
     run(MAKE, str(tmp_path), "1")
     commands = {
         "`sagittal --help`, CPU": (0.15, ["--help"]),
@@ -231,23 +243,7 @@ def test_goals_are_written(tmp_path: Path) -> None:
         ),
     }
     for name, (goal, words) in commands.items():
-        reached[name] = (goal, min(command_s(words, tmp_path) for _ in range(3)), "s")
-    rows = [
-        [
-            name,
-            f"≤ {goal:g} {unit}",
-            f"{ours:.0f} {unit}" if ours >= 100 else f"{ours:.3g} {unit}",
-            "yes" if ours <= goal else "no",
-        ]
-        for name, (goal, ours, unit) in reached.items()
-    ]
-    record_speed(
-        "Goals",
-        ("what", "goal", "ours", "met"),
-        rows,
-        "Goals are those of a quiet machine; on one that others use, CPU time is up to a quarter longer. "
-        "Pages, imports and the figure have theirs in `tests/bench`.",
-    )
+        record_goal(name, goal, min(command_s(words, tmp_path) for _ in range(3)), "s")
 
 
 def command_s(words: list[str], scratch: Path) -> float:

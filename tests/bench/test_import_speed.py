@@ -14,6 +14,7 @@ from pyarrow import csv
 from core.formats import SourceFile, cwa, device_motion, read_recording, write_recording
 from core.formats.text import to_utf8
 from core.formats.vendors import find_vendor
+from tests.accuracy.report import record_goal
 from tests.bench.long_cwa import write_long_cwa
 from tests.bench.pairs import in_pairs
 from tests.core.formats.making import mt_text
@@ -56,6 +57,7 @@ def test_ten_minutes_of_seven_sensors_cost_at_most_twice_what_parsing_them_does(
         f"\nMT text: {size:.1f} MB at {size / ours:.0f} MB/s of CPU, pyarrow's tables alone at "
         f"{size / theirs:.0f} MB/s: {ratio:.2f} times its CPU\n"
     )
+    record_goal("import of MT text, of a core", 200.0, size / ours, "MB/s", at_least=True)
     assert ratio <= 2.0
 
 
@@ -78,7 +80,9 @@ def test_other_text_formats_cost_at_most_three_times_what_parsing_them_does(labe
 
     data = head + rows
     ours, _, ratio = in_pairs(lambda: vendor.read(to_utf8(data), name, None), parse)
-    sys.stdout.write(f"\n{label}: {len(data) / 1e6 / ours:.0f} MB/s of CPU, {ratio:.2f} times pyarrow's\n")
+    speed = len(data) / 1e6 / ours
+    sys.stdout.write(f"\n{label}: {speed:.0f} MB/s of CPU, {ratio:.2f} times pyarrow's\n")
+    record_goal(f"import of {label}, of a core", 200.0, speed, "MB/s", at_least=True)
     assert ratio <= 3.0
 
 
@@ -92,6 +96,7 @@ def test_a_stored_take_is_smaller_and_faster_than_its_text(files: list[SourceFil
     sys.stdout.write(
         f"\nParquet: {packed:.1f} MB in {from_store:.2f} s, text {plain:.1f} MB in {from_text:.2f} s of CPU\n"
     )
+    record_goal("import of Parquet, of a core", 400.0, packed / from_store, "MB/s", at_least=True)
     assert packed < 0.5 * plain
     assert ratio < 1.0
 

@@ -18,6 +18,7 @@ from core.body.still import FOOT_STILL, still_samples
 from core.calibration import calibrate
 from core.frames import FOOT, SIDES
 from core.fusion.mahony import estimate_orientations
+from tests.accuracy.report import record_goal
 from tests.bench.pairs import in_pairs
 from tests.l7s_textbook import textbook
 from tests.walks import simulated
@@ -87,6 +88,7 @@ def test_a_step_takes_at_most_fifty_microseconds_and_a_twentieth_of_the_form_wit
         theirs.append(best(lambda: textbook(few, model, L7sParams(), RATE), 1))
     step, matrices = min(ours) / len(inputs.step) * 1e6, min(theirs) / len(few.step) * 1e6
     print(f"\nL7S-{worn} {step:.1f} µs/step, with matrices {matrices:.0f}, ratio {matrices / step:.0f}")
+    record_goal(f"L7S-{worn}, a step", 10.0, step, "µs")
     assert step <= STEP_US
     assert matrices / step >= RATIO
 

@@ -8,17 +8,18 @@ and stride lengths within 1 % of it; with joint centres of 1 cm the flexions are
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from math import radians
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from core.body.erkf.filter import ErkfInputs, links_of, memory_of, new_output, new_record, noise_of
 from core.body.erkf.gaps import HOLD_S
-from core.body.erkf.kernel import CONTACT, INVALID, NONE_KEPT, STILL, filter_segments
+from core.body.erkf.kernel import CONTACT, INVALID, NONE_KEPT, STILL, ErkfOutput, filter_segments
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.start import start_state
 from core.body.live_still import ROLLING_MPS
@@ -54,8 +55,7 @@ def live_params() -> ErkfParams:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class SignalBlock:
+class SignalBlock(NamedTuple):
     """A block as the filters take it: acc, gyr (T, n, 3) corrected and bridged, valid (T, n), still (T, n, 2)
     as `StillnessDetector` tells."""
 
@@ -103,13 +103,14 @@ class LiveErkf:
         self._foot[list(tree.feet)] = True
         self._noise = noise_of(params, rate_hz)
         none = np.zeros((T, n), np.bool_)
-        step = np.full(T, self._dt)
+        step = self._step = np.full(T, self._dt)
         state = start_state(
             tree, ErkfInputs(step, standing.acc, standing.gyr, standing.valid, none, none), params, (0, T), q
         )
         self._memory = memory_of(state)
         record = new_record(tree, params, 1)
         self._given = tuple(self._memory), tuple(links_of(tree, params)), tuple(self._noise), tuple(record)
+        self._lam = np.zeros(len(self._memory.P))
         self._heading, self._rolling = np.empty((0, n)), np.empty((0, n))
         self._gone, self._adrift = np.zeros(n, np.int64), np.zeros(n, np.bool_)
         linked = {i for j in tree.joints for i in (j.proximal, j.distal)}
@@ -128,28 +129,39 @@ class LiveErkf:
         if self.broken:
             states[:], residual[:] = np.nan, np.nan
             return states, residual
-        step = np.full(T, self._dt)
+        if len(self._step) != T:
+            self._step = np.full(T, self._dt)
+        step = self._step
         if self._first and T:
-            step[0], self._first = 0.0, False
+            step, self._first = step.copy(), False
+            step[0] = 0.0
         flags = np.empty((T, n), np.uint8)
         _flag(signals.valid, signals.still, self._foot, flags)
+        samples = (step, signals.acc, signals.gyr, flags, self._heading, self._rolling)
+        if signals.valid.all() and not self._gone.any() and not self._adrift.any():
+            self._filter(samples, output)
+            return states, residual
         adrift = np.zeros((T, n), np.bool_)
         begins = list(self._settles(signals, adrift))
-        memory, links, noise, record = self._given
-        lam = np.zeros(len(memory[1]))
         for first, past in pairwise(sorted({0, T, *(k for k, _ in begins)})):
             for _, i in (x for x in begins if x[0] == first):
                 self._settle(i, signals.acc[first, i], signals.gyr[first, i])
-            k = slice(first, past)
-            samples = (step[k], signals.acc[k], signals.gyr[k], flags[k], self._heading, self._rolling)
-            part = tuple(output.part(first, past))
-            broke = filter_segments(memory, samples, links, noise, record, part, NONE_KEPT, 0, False, lam)
-            if broke >= 0:
-                states[first + broke :], residual[first + broke :], self.broken = np.nan, np.nan, True
+            part = (*(x[first:past] for x in samples[:4]), *samples[4:])
+            self._filter(part, output.part(first, past))
+            if self.broken:
+                states[past:], residual[past:] = np.nan, np.nan
                 break
-        if adrift.any():
-            states[adrift] = np.nan
+        states[adrift] = np.nan
         return states, residual
+
+    def _filter(self, samples: tuple[NDArray[Any], ...], output: ErkfOutput) -> None:
+        """Filter some samples; NaN from where the covariance breaks."""
+        memory, links, noise, record = self._given
+        broke = filter_segments(
+            memory, samples, links, noise, record, tuple(output), NONE_KEPT, 0, False, self._lam
+        )
+        if broke >= 0:
+            output.nominal[broke:], output.residual[broke:], self.broken = np.nan, np.nan, True
 
     def _settles(self, signals: SignalBlock, adrift: Bools) -> Iterator[tuple[int, int]]:
         """Sample and foot where one that hangs on nothing rests again after a loss; marks all until they do.
@@ -158,8 +170,6 @@ class LiveErkf:
         bring it back within a second, up to 50° off until then; for one by itself only its next rest says
         where it is, and the filter alone took half a minute.
         """
-        if not self._gone.any() and not self._adrift.any() and bool(signals.valid.all()):
-            return
         for k in range(len(adrift)):
             for i in self.tree.feet:
                 self._gone[i] = 0 if signals.valid[k, i] else self._gone[i] + 1

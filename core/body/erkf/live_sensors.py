@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,7 @@ from core.rotation import from_matrix, multiply
 from core.timeline.columns import find_columns, take_columns
 
 
-@dataclass(frozen=True, eq=False)
-class FilteredBlock:
+class FilteredBlock(NamedTuple):
     """Signals as filtered; q (T, n, 4), p (T, n, 3) origins of segments; (T, joints) their ends apart, m."""
 
     signals: SignalBlock
