@@ -166,7 +166,7 @@ def _mean_values(sessions: Sequence[ControlSession]) -> Values:
         for p in s.parameters:
             if p.mean is not None and has_enough_values(p) and not p.estimated:
                 found.setdefault((p.name, p.side), []).append(p.mean)
-    return {key: float(np.mean(v)) for key, v in found.items()}
+    return {key: v[0] if len(v) == 1 else float(np.mean(v)) for key, v in found.items()}
 
 
 def _mean_curves(sessions: Sequence[ControlSession]) -> MeanCurves:
@@ -175,7 +175,10 @@ def _mean_curves(sessions: Sequence[ControlSession]) -> MeanCurves:
         for side, curves in s.curves.items():
             for variable, curve in curves.items():
                 found.setdefault(side, {}).setdefault(variable, []).append(curve)
-    return {side: {v: np.mean(c, axis=0) for v, c in own.items()} for side, own in found.items()}
+    return {
+        side: {v: c[0] if len(c) == 1 else np.mean(c, axis=0) for v, c in own.items()}
+        for side, own in found.items()
+    }
 
 
 def _values(people: Sequence[Values], group: str, source: str) -> dict[str, NormValue]:

@@ -107,21 +107,19 @@ def leave_one_out(people: Sequence[MeanCurves]) -> dict[Mode, dict[str, ScoreSpr
 
     A side counts by itself; percentiles are linear between order statistics, sd with n − 1.
     """
-    means = {v: [m for p in people if (m := person_mean(p, v)) is not None] for v in NINE}
+    own = [{v: m for v in NINE if (m := person_mean(p, v)) is not None} for p in people]
+    means = {v: [m[v] for m in own if v in m] for v in NINE}
     totals = {v: (np.sum(rows, axis=0), len(rows)) for v, rows in means.items() if len(rows) > 1}
+    others = [{v: (t - m[v]) / (n - 1) for v, (t, n) in totals.items() if v in m} for m in own]
     spreads: dict[Mode, dict[str, ScoreSpread]] = {}
     for mode in MODES:
         values: dict[str, list[float]] = {}
-        for person in people:
+        for person, rest in zip(people, others, strict=True):
             found: dict[Side, dict[str, float]] = {}
-            for variable, (total, n) in totals.items():
-                own = person_mean(person, variable)
-                if own is None:
-                    continue
-                others = (total - own) / (n - 1)
+            for variable, reference in rest.items():
                 for side in SIDES:
                     if variable in person.get(side, {}):
-                        score = float(gvs(person[side][variable], others, mode))
+                        score = float(gvs(person[side][variable], reference, mode))
                         found.setdefault(side, {})[variable] = score
                         values.setdefault(variable, []).append(score)
             for name, variables in PROFILES.items():

@@ -12,7 +12,8 @@ import numpy as np
 from core.angles import JointAngles
 from core.body.health import find_worst_verdict
 from core.body.model import LENGTHS
-from core.frames import SEGMENTS
+from core.frames import SEGMENTS, Side
+from core.norms.controls import mean_curves
 from core.parameters import cycle_curves
 from core.parameters.result import Parameter
 from core.quality import concern_paths_alone, find_shown_level
@@ -43,6 +44,7 @@ def summarise_analysis(analysis: TakeAnalysis) -> dict[str, object]:
         "parameters": [parameter_row(p) for p in analysis.parameters],
         "functional": _functional(analysis),
         "scores": _scores(analysis),
+        "mean_curves": _mean_curves(analysis),
         "walking": _walking(analysis),
         "warnings": [n.to_json() for n in analysis.notices],
         "provenance": reduce_to_plain(analysis.provenance),
@@ -144,6 +146,18 @@ def _scores(analysis: TakeAnalysis) -> list[dict[str, object]]:
     curves = cycle_curves(analysis.angles, analysis.measured.strides)
     unsure = list_estimated_variables(_estimator(analysis))
     return score_rows(score_curves(curves, analysis.angles.standing_deg, estimated=unsure))
+
+
+def _mean_curves(analysis: TakeAnalysis) -> dict[Side, dict[str, object]]:
+    """Side → variable → 101 degrees from standing, so that many controls are read without their angles.
+
+    Decimals are those of angles.parquet's single precision.
+    """
+    if analysis.angles is None or analysis.measured is None or analysis.angles.zero != "standing":
+        return {}
+    curves = cycle_curves(analysis.angles, analysis.measured.strides)
+    found = mean_curves(curves, list_estimated_variables(_estimator(analysis)))
+    return {side: {v: reduce_to_plain(np.round(c, 5)) for v, c in own.items()} for side, own in found.items()}
 
 
 def score_rows(found: Scores) -> list[dict[str, object]]:

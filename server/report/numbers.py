@@ -7,7 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from core.norms.profile import ScoreSpread
+import numpy as np
+
+from core.norms.controls import mean_curves
+from core.norms.profile import MeanCurves, ScoreSpread
 from core.parameters import cycle_curves
 from core.parameters.result import Parameter
 from core.parameters.uncertainty import mark_estimated
@@ -32,14 +35,44 @@ class Numbers:
     contacts_s: float | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class WalkMeans:
+    """What a control's walk gives to a reference: parameters, and mean curves in degrees from standing."""
+
+    parameters: tuple[Parameter, ...]
+    curves: MeanCurves
+
+
+def read_means(content: bytes) -> WalkMeans | None:
+    """The means in analysis.json; None if it is of a version that wrote no mean curves."""
+    data = json.loads(content)
+    if "mean_curves" not in data:
+        return None
+    return WalkMeans(
+        _mark_parameters(data),
+        {
+            side: {v: np.array(c, dtype=np.float64) for v, c in own.items()}
+            for side, own in data["mean_curves"].items()
+        },
+    )
+
+
+def means_of(bundle: Bundle) -> WalkMeans:
+    """The means of an analysis that was read with its curves."""
+    parameters = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
+    # of somebody who never stood still the curves have no level
+    if bundle.angles is None or bundle.angles.zero != "standing":
+        return WalkMeans(parameters, {})
+    curves = cycle_curves(bundle.angles, bundle.strides)
+    return WalkMeans(parameters, mean_curves(curves, list_estimated_variables(bundle.estimator)))
+
+
 def read_numbers(content: bytes) -> Numbers | None:
     """The numbers in analysis.json; None if it is of a version that wrote no scores."""
     data = json.loads(content)
     if "scores" not in data:
         return None
-    # the files of earlier versions say only of the angles which are estimated
-    unsure = list_estimated_angles(data.get("estimator"))
-    parameters = mark_estimated([Parameter(**row) for row in data["parameters"]], unsure)
+    parameters = _mark_parameters(data)
     judged = data_verdict(
         data["quality"], data.get("estimator"), {n.severity for n in read_warnings(data)}, parameters
     )
@@ -61,6 +94,12 @@ def numbers_of(bundle: Bundle) -> Numbers:
     found = score_curves(curves, bundle.angles.standing_deg, estimated=unsure)
     scores = tuple(s for s in found.scores if s.variable is None)
     return Numbers(parameters, scores, judged, contacts_s)
+
+
+def _mark_parameters(data: Mapping[str, Any]) -> tuple[Parameter, ...]:
+    """Parameters of analysis.json; files of earlier versions say only of the angles which are estimated."""
+    unsure = list_estimated_angles(data.get("estimator"))
+    return mark_estimated([Parameter(**row) for row in data["parameters"]], unsure)
 
 
 def _score(row: Mapping[str, Any]) -> Score:

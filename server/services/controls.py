@@ -10,10 +10,7 @@ from typing import Final
 from sqlalchemy import Connection, bindparam, select
 
 from core.condition import WalkingCondition
-from core.norms.controls import ControlGroup, ControlSession, control_group, mean_curves
-from core.parameters import cycle_curves
-from core.parameters.uncertainty import mark_estimated
-from server.report.estimator import list_estimated_angles, list_estimated_variables
+from core.norms.controls import ControlGroup, ControlSession, control_group
 from server.services import analyses, edit_log
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
@@ -86,14 +83,8 @@ def make_group(
 
 def _session(reviewed: ReviewedAnalyses, visit: ControlVisit) -> ControlSession:
     def read() -> ControlSession:
-        bundle = reviewed.read_without_tracks(visit.found, visit.edits)
-        # of somebody who never stood still the curves have no level
-        stood = bundle.angles is not None and bundle.angles.zero == "standing"
-        angles = bundle.angles if stood else None
-        unsure = list_estimated_variables(bundle.estimator)
-        curves = {} if angles is None else mean_curves(cycle_curves(angles, bundle.strides), unsure)
-        parameters = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
+        means = reviewed.read_means(visit.found, visit.edits)
         age = None if visit.birth_year is None else float(visit.performed_on.year - visit.birth_year)
-        return ControlSession(visit.person, age, visit.sex, parameters, curves)  # type: ignore[arg-type]
+        return ControlSession(visit.person, age, visit.sex, means.parameters, means.curves)  # type: ignore[arg-type]
 
     return reviewed.keep_control(visit.found, visit.edits, read)

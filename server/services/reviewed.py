@@ -21,7 +21,7 @@ from core.parameters.rows import Column
 from server.export.kinds import EXPORTED
 from server.report import signals, tracks
 from server.report.bundle import Bundle, apply_review, load_bundle, read_columns
-from server.report.numbers import Numbers, numbers_of, read_numbers
+from server.report.numbers import Numbers, WalkMeans, means_of, numbers_of, read_means, read_numbers
 from server.report.wording import speak_places
 from server.services import analyses
 from server.services.edit_log import EditHistory
@@ -167,6 +167,19 @@ class ReviewedAnalyses:
             return numbers_of(self.read_bundle(found, edits))
 
         return self._numbers.get((found.id, edits.key), read)
+
+    def read_means(self, found: analyses.AnalysisRecord, edits: EditHistory) -> WalkMeans:
+        """Return what a control's walk gives to a reference; without an edit no angles are read.
+
+        Raises
+        ------
+        IntegrityError, FormatError as `read_bundle`.
+        """
+        if not edits.made:
+            stored = read_means(analyses.file_bytes(self.blobs, found, "analysis.json"))
+            if stored is not None:
+                return stored
+        return means_of(self.read_without_tracks(found, edits))
 
     def read_verdict(self, found: analyses.AnalysisRecord, edits: EditHistory) -> tuple[str, str]:
         """Return shape and word for the data of an analysis, as lists show it; raises IntegrityError."""

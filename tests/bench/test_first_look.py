@@ -23,9 +23,8 @@ CONTROLS: Final = 200
 FIRST_S: Final = 0.3
 TABLE_MB: Final = 100.0
 PREVIEW_S: Final = 0.5
-BUSY: Final = 8.0
-"""The aims are those of a quiet machine of today; elsewhere only gross losses fail. That of the controls is
-not met there either: most of the page is reading the angles of all 200 visits, each some 4 ms."""
+BUSY: Final = 6.0
+"""The aims are those of a quiet machine of today; elsewhere only gross losses fail."""
 
 
 async def test_a_page_beside_two_hundred_controls_asks_no_more_and_reads_them_once(tmp_path: Path) -> None:

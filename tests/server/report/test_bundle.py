@@ -53,6 +53,7 @@ def test_analysis_json_is_strict_json_of_schema_1(files: Mapping[str, bytes]) ->
         "estimator",
         "parameters",
         "scores",
+        "mean_curves",
         "walking",
         "warnings",
         "provenance",
