@@ -34,7 +34,7 @@ from core.events.result import GaitEvents
 from core.events.turns import body_yaw_rate, find_turns
 from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
 from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
+from core.fusion.orientations import LastReading, Orientations
 from core.measure import Tracks, measure_gait
 from core.parameters.spatial import surface_of
 from core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
@@ -217,10 +217,13 @@ def build_figure(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
     return replace(analysis, posed=withhold_distances(estimate_poses(mounted, contacts, config.poses)))
 
 
-def keep_feet_alone(analysis: TakeAnalysis) -> TakeAnalysis:
-    """Of the orientations before mounting only the feet's, which `measure_walk` falls back on."""
-    fused = require_stage(analysis.fused, "orientation")
-    return replace(analysis, fused=replace(fused, q={s: q for s, q in fused.q.items() if s in FOOT.values()}))
+def keep_what_poses_read(analysis: TakeAnalysis) -> TakeAnalysis:
+    """Of the orientations before mounting only the feet's, which `measure_walk` falls back on; those behind
+    it for the estimator alone, which lets go of what it refines while it runs."""
+    fused, mounted = require_stage(analysis.fused, "orientation"), require_stage(analysis.mounted, "mounting")
+    fused = replace(fused, q={s: q for s, q in fused.q.items() if s in FOOT.values()})
+    passed = replace(mounted.orientations, q=LastReading(mounted.orientations.q))
+    return replace(analysis, fused=fused, mounted=replace(mounted, orientations=passed))
 
 
 def keep_refined_alone(analysis: TakeAnalysis) -> TakeAnalysis:
@@ -390,7 +393,7 @@ EVENTS: Final = PipelineStage(
 )
 TRUNK_EVENTS: Final = PipelineStage("events", 0.14, detect_trunk_steps, ("contacts",), ("lumbar", "turns"))
 MOUNTING: Final = PipelineStage(
-    "mounting", 0.15, mount_on_segments, ("mounted",), ("poses", "calibration"), let_go=keep_feet_alone
+    "mounting", 0.15, mount_on_segments, ("mounted",), ("poses", "calibration"), let_go=keep_what_poses_read
 )
 POSES: Final = PipelineStage("poses", 0.4, build_figure, ("posed",), ("poses",), let_go=keep_refined_alone)
 ANGLES: Final = PipelineStage("angles", 0.95, compute_angles, ("angles",), let_go=keep_what_is_measured)

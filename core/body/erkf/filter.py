@@ -106,7 +106,7 @@ class ErkfTrack:
     Parameters
     ----------
     places, turns : of each sensor (T, 3) m and (T, 4), its position and orientation in W.
-    heading_sd : (T, n) rad, of the filter, about the vertical.
+    heading_sd : (T, n) rad, of the filter, about the vertical; with the smoother (1, n), at the end.
     joint_residual : (T, joints) distance of the two ends of each joint, m.
     refused : (T, n) zero velocities that the gate refused.
     nominal : (T, n, 16) as in `ErkfState`, of the filter; (0, n, 16) of the smoother.
