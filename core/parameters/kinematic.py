@@ -171,7 +171,8 @@ def stride_figures(
         for side, rows in curves.curves.get(figure.variable, {}).items():
             part = np.degrees(rows[:, figure.start_pct : figure.end_pct + 1])
             if figure.statistic == "at":
-                value = part[:, 0]
+                # a view would hold the whole part
+                value = part[:, 0].copy()
             elif figure.statistic == "max":
                 value = part.max(axis=1)
             elif figure.statistic == "min":

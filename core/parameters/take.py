@@ -68,6 +68,11 @@ def take_figures(
     times = (*summarise_times(strides), phase_coordination(strides))
     if angles is None:
         return TakeFigures(times, columns)
+    # before the curves of all angles are held
+    of_trunk = (
+        *trunk_regularity(choose_foot(strides), angles.t_s, trunk or {}),
+        stride_smoothness(choose_foot(strides), angles.t_s, trunk or {}),
+    )
     pitch = {} if orientations is None else foot_pitches(orientations)
     flat = find_stances(strides, angles.t_s, pitch)
     rows = spatial_rows(strides, feet, surface)
@@ -84,8 +89,7 @@ def take_figures(
             *side_parameters(strides, flat.rows, PARTS),
             *side_parameters(strides, phases, PHASES),
             *summarise_angles(curves, of_feet),
-            *trunk_regularity(choose_foot(strides), angles.t_s, trunk or {}),
-            stride_smoothness(choose_foot(strides), angles.t_s, trunk or {}),
+            *of_trunk,
         ),
         columns={
             **columns,
