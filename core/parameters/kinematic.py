@@ -6,7 +6,7 @@ The windows of the figures are those of the reference table (core/norms/data), s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -67,14 +67,20 @@ class MeanCurve:
     n: int
 
 
-def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
-    """Cut every angle into gait cycles.
+def cycle_curves(
+    angles: JointAngles, strides: Strides, variables: Collection[str] | None = None
+) -> CycleCurves:
+    """Cut angles into gait cycles.
 
     Pelvis angles appear once per side, over that side's cycles; obliquity is positive with that side up.
     Pelvic rotation (that side forward) and foot progression (toes in) are measured from their own mean over
     the stride: against the walking direction they have no level (`MEAN_ZERO`).
     A stride in which the angle is not known throughout is a row of NaN; one in which a knee bends the wrong
     way as no knee can (`LEAST_KNEE`) as well.
+
+    Parameters
+    ----------
+    variables : what is cut, None = every angle.
     """
     index = {side: tuple(i for i, s in enumerate(strides.strides) if s.side == side) for side in SIDES}
     curves: dict[str, dict[Side, Floats]] = {}
@@ -95,8 +101,9 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
                 names[name] = base
             elif suffix not in SUFFIX.values():
                 names[name] = name
+        names = {name: base for name, base in names.items() if variables is None or base in variables}
         for segment, variable in (("pelvis", "pelvis_rotation"), (FOOT[side], "foot_progression")):
-            if segment in angles.headings:
+            if segment in angles.headings and (variables is None or variable in variables):
                 (row,) = resample([angles.headings[segment]], angles.t_s, bounds, POINTS)
                 turned = row - row[:, :-1].mean(axis=1, keepdims=True)
                 curves.setdefault(variable, {})[side] = -turned if side == "left" else turned

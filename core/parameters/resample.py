@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
+from typing import Final
 
 import numpy as np
 
 from core.frames import Floats
+
+AT_ONCE: Final = 256
+"""Pieces whose places are worked out together."""
 
 
 def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int = 101) -> list[Floats]:
@@ -17,20 +21,23 @@ def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int
     ----------
     bounds : (pieces, 2) s. A piece that touches NaN in a signal is NaN throughout.
     """
-    place = (bounds - t_s[0]) * ((len(t_s) - 1) / (t_s[-1] - t_s[0]))
-    place = place[:, :1] + (place[:, 1:] - place[:, :1]) * _shares(points)
-    known = np.isfinite(place)
-    low = np.clip(np.floor(np.where(known, place, 0.0)).astype(np.int64), 0, len(t_s) - 2)
-    high, share = low + 1, place - low
-    found = []
-    for signal in signals:
-        here, rows = np.take(signal, low), np.take(signal, high)
-        # in place: ten minutes of all angles are a million points
-        rows -= here
-        rows *= share
-        rows += here
-        rows[~np.isfinite(rows.sum(axis=-1))] = np.nan
-        found.append(rows)
+    signals = tuple(np.asarray(x) for x in signals)
+    ends = (bounds - t_s[0]) * ((len(t_s) - 1) / (t_s[-1] - t_s[0]))
+    found = [np.empty((len(bounds), points), x.dtype) for x in signals]
+    for first in range(0, len(bounds), AT_ONCE):
+        part = slice(first, first + AT_ONCE)
+        place = ends[part, :1] + (ends[part, 1:] - ends[part, :1]) * _shares(points)
+        known = np.isfinite(place)
+        low = np.clip(np.floor(np.where(known, place, 0.0)).astype(np.int64), 0, len(t_s) - 2)
+        high, share = low + 1, place - low
+        for signal, all_rows in zip(signals, found, strict=True):
+            here, rows = np.take(signal, low), np.take(signal, high)
+            # in place: ten minutes of all angles are a million points
+            rows -= here
+            rows *= share
+            rows += here
+            rows[~np.isfinite(rows.sum(axis=-1))] = np.nan
+            all_rows[part] = rows
     return found
 
 

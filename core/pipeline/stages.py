@@ -227,9 +227,14 @@ def keep_what_poses_read(analysis: TakeAnalysis) -> TakeAnalysis:
 
 
 def keep_refined_alone(analysis: TakeAnalysis) -> TakeAnalysis:
-    """No orientations from before the estimator."""
+    """No orientations from before the estimator; a foot that it left out keeps what it had.
+
+    `measure_walk` falls back on the feet's where there are no angles: their stage does not fail.
+    """
     mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
-    return replace(analysis, mounted=replace(mounted, orientations=posed.orientations))
+    fused, refined = require_stage(analysis.fused, "orientation"), posed.orientations
+    fused = replace(fused, q={s: refined.q.get(s, q) for s, q in fused.q.items()})
+    return replace(analysis, fused=fused, mounted=replace(mounted, orientations=refined))
 
 
 def keep_what_is_measured(analysis: TakeAnalysis) -> TakeAnalysis:
@@ -241,11 +246,7 @@ def keep_what_is_measured(analysis: TakeAnalysis) -> TakeAnalysis:
     kind = figure_precision(len(poses.t_s))
     turned = {s: q if s in kept else np.asarray(q, kind) for s, q in poses.q.items()}
     posed = replace(posed, orientations=orientations, poses=replace(poses, q=turned))
-    # a foot that the estimator left out keeps what it had
-    fused = require_stage(analysis.fused, "orientation")
-    fused = replace(fused, q={s: kept.get(s, q) for s, q in fused.q.items()})
-    mounted = replace(mounted, orientations=orientations)
-    return replace(analysis, fused=fused, mounted=mounted, posed=posed)
+    return replace(analysis, mounted=replace(mounted, orientations=orientations), posed=posed)
 
 
 def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:

@@ -13,6 +13,7 @@ from core.angles import JointAngles
 from core.body.health import find_worst_verdict
 from core.body.model import LENGTHS
 from core.frames import SEGMENTS
+from core.norms.profile import NINE
 from core.parameters import cycle_curves
 from core.parameters.result import Parameter
 from core.quality import concern_paths_alone, find_shown_level
@@ -141,7 +142,7 @@ def _scores(analysis: TakeAnalysis) -> list[dict[str, object]]:
     """Profiles and indices over several curves, so that a trend over many visits reads no signals."""
     if analysis.angles is None or analysis.measured is None:
         return []
-    curves = cycle_curves(analysis.angles, analysis.measured.strides)
+    curves = cycle_curves(analysis.angles, analysis.measured.strides, NINE)
     unsure = list_estimated_variables(_estimator(analysis))
     return score_rows(score_curves(curves, analysis.angles.standing_deg, estimated=unsure))
 
