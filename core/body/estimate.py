@@ -45,6 +45,7 @@ from core.errors import EstimationError, Notice
 from core.estimators import BY_NAME, ERKF, L7S_3I, NO_FIGURE, ORIENTATIONS_ONLY, Estimator
 from core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
 from core.fusion.orientations import LastReading, Orientations
+from core.memory import give_memory_back
 
 ON_A_BELT: Final = (
     "On a treadmill a foot on the belt does not rest in the room, as the estimator takes it to. Positions "
@@ -170,6 +171,7 @@ class _Take:
             for q in (self.orientations.q, self.mounted.orientations.q):
                 if isinstance(q, LastReading):
                     q.forget(segments)
+            give_memory_back()
 
         run = run_erkf(
             self.calibrated,

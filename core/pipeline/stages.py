@@ -36,6 +36,7 @@ from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import LastReading, Orientations
 from core.measure import Tracks, measure_gait
+from core.memory import give_memory_back
 from core.parameters.spatial import surface_of
 from core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
 from core.pipeline.config import PipelineConfig
@@ -202,6 +203,7 @@ def mount_on_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAna
     """Mountings as standing width and joints show them; everything behind takes these."""
     calibrated = require_stage(analysis.calibrated, "calibration")
     mounted = mount_sensors(calibrated, require_stage(analysis.fused, "orientation"), config.poses)
+    give_memory_back()
     used = replace(mounted.calibrated, recording=drop_stuck_sensors(analysis.recording))
     score = score_calibration(used, config.calibration.score, analysis.agreed, mounted.turned_rad)
     return replace(analysis, mounted=mounted, calibration_score=score)
@@ -289,6 +291,7 @@ def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
         turns=contacts.turns,
         steps=contacts.steps,
     )
+    give_memory_back()
     return replace(analysis, tracks=tracks, measured=measure_gait(tracks))
 
 

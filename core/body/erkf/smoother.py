@@ -20,7 +20,7 @@ from core.body.erkf.kernel import filter_segments, row_length
 from core.body.erkf.params import ErkfParams
 from core.body.tree import ImuTree
 from core.errors import ParameterError
-from core.own_pages import make_pages
+from core.memory import make_pages
 
 SEGMENT = 128
 """Samples per segment, at least: 21 MB of kept states for ten minutes of seven sensors, and a record of 8 MB.
