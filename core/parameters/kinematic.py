@@ -7,7 +7,7 @@ The windows of the figures are those of the reference table (core/norms/data), s
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -190,6 +190,27 @@ def stride_figures(
     return values
 
 
+def measure_curves(
+    angles: JointAngles, strides: Strides
+) -> tuple[CycleCurves, dict[str, dict[Side, Floats]]]:
+    """What is known of all curves, without them, and their `stride_figures`.
+
+    Half of the curves are held at a time: those of an hour of seven sensors are 62 MB.
+    """
+    read = list_curve_figures()
+    variables = list(dict.fromkeys(figure.variable for figure in read.values()))
+    known = cycle_curves(angles, strides, ())
+    why, bounds = dict(known.why), dict(known.bounds)
+    values: dict[str, dict[Side, Floats]] = {}
+    for half in (variables[::2], variables[1::2]):
+        curves = cycle_curves(angles, strides, half)
+        values |= stride_figures(curves, {name: x for name, x in read.items() if x.variable in half})
+        why |= {v: curves.why[v] for v in half if v in curves.why}
+        bounds |= curves.bounds
+        del curves
+    return replace(known, why=why, bounds=bounds), {name: values[name] for name in read if name in values}
+
+
 def foot_pitch(
     orientations: Oriented, strides: Strides, pitch: Mapping[Segment, Floats] | None = None
 ) -> dict[str, dict[Side, Floats]]:
@@ -222,13 +243,13 @@ def turning_angle(strides: Strides) -> dict[str, dict[Side, Floats]]:
 
 
 def summarise_angles(
-    curves: CycleCurves, more: Mapping[str, Mapping[Side, Floats]] | None = None
+    curves: CycleCurves, measured: Mapping[str, Mapping[Side, Floats]] | None = None
 ) -> tuple[Parameter, ...]:
     """Angle parameters over the counted strides of each side, degrees.
 
     Parameters
     ----------
-    more : further figures, those of `foot_pitch` and `turning_angle`.
+    measured : figures of `measure_curves`, `foot_pitch` and `turning_angle`; None = those of the curves.
 
     Returns
     -------
@@ -237,8 +258,7 @@ def summarise_angles(
     """
     read = list_curve_figures()
     figures: dict[str, Mapping[Side, Floats]] = {name: {} for name in read}
-    figures |= stride_figures(curves)
-    figures |= more or {}
+    figures |= stride_figures(curves) if measured is None else measured
     parameters = []
     for side in SIDES:
         used = curves.used[side]
