@@ -67,22 +67,34 @@ def compare_sensors(
     params: JointParams,
     known: Terms | None = None,
     unchanged: Iterable[JointWindows] = (),
+    over_s: float = np.inf,
 ) -> tuple[tuple[JointWindows, ...], Terms]:
     """Windows of every joint whose sensors are worn, and the terms they were made from.
 
     Parameters
     ----------
     known : terms of sensors that have not changed. unchanged : joints neither of whose sensors has.
+    over_s : so long from the first window on terms are kept, as `find_exchange` looks at them; of the others
+        no more are held at a time than joints need.
     """
     worn = drop_stuck_sensors(recording)
     joints = list_worn_joints(worn.sensors)
-    terms, done = dict(known or {}), {(w.first, w.second): w for w in unchanged}
-    for segment in sorted({s for joint in joints for s in joint} - set(terms)):
-        terms[segment] = find_terms(worn.sensors[segment], worn.rate_hz, params)
-    return tuple(
-        done[a, b] if (a, b) in done else compare_at_joint((a, b), terms[a], terms[b], params)
-        for a, b in joints
-    ), terms
+    known, done = known or {}, {(w.first, w.second): w for w in unchanged}
+    order = (*known, *sorted({s for joint in joints for s in joint} - set(known)))
+    terms, found = dict(known), []
+    start = np.inf
+    for i, joint in enumerate(joints):
+        if joint not in done:
+            for s in joint:
+                if s not in terms or not terms[s].is_whole:
+                    terms[s] = find_terms(worn.sensors[s], worn.rate_hz, params)
+            done[joint] = compare_at_joint(joint, terms[joint[0]], terms[joint[1]], params)
+        found.append(done[joint])
+        start = min(start, done[joint].start_s)
+        wanted = {s for later in joints[i + 1 :] if later not in done for s in later}
+        for s in terms.keys() - wanted:
+            terms[s] = terms[s].keep_first(start + over_s)
+    return tuple(found), {s: terms[s].keep_first(start + over_s) for s in order}
 
 
 def check_agreement(
@@ -97,7 +109,8 @@ def check_agreement(
     recording : on its axis. timeline : how samples between points of the axis are laid.
     """
     params, timeline = params or AgreementParams(), timeline or TimelineParams()
-    joints, terms = compare_sensors(recording, params.joints)
+    over_s = params.exchange.over_s
+    joints, terms = compare_sensors(recording, params.joints, over_s=over_s)
     if not joints:
         return Agreement(recording)
     said: list[Notice] = []
@@ -110,7 +123,8 @@ def check_agreement(
         said.append(tell_exchange(exchange, params.exchange))
         if params.exchange.repair:
             current = replace(current, sensors=undo_exchange(exchange.swap, current.sensors))
-            joints, terms = compare_sensors(current, params.joints, undo_exchange(exchange.swap, terms))
+            known = undo_exchange(exchange.swap, terms)
+            joints, terms = compare_sensors(current, params.joints, known, over_s=over_s)
     clocks = list_judged(joints, params.lags)
     lags, drifts = find_sensor_lags(joints, params.lags), find_drifts(joints, params.lags)
     said += [tell_lag(x, params.lags) for x in lags if x.told]
@@ -124,7 +138,7 @@ def check_agreement(
         current = replace(current, sensors={**current.sensors, **shifted})
         kept = {s: x for s, x in terms.items() if s not in late}
         same = [w for w in joints if not {w.first, w.second} & set(late)]
-        joints, terms = compare_sensors(current, params.joints, kept, same)
+        joints, terms = compare_sensors(current, params.joints, kept, same, over_s)
         said += [tell_left_over(x) for x in find_sensor_lags(joints, params.lags) if x.told]
     slips, places = find_slips(current, terms, joints, params.slips)
     before, stayed = compare_standings(current, terms, params.slips)

@@ -19,7 +19,7 @@ from core.agreement.labels import sort_by_joints
 from core.agreement.mirrored import find_mirrored
 from core.agreement.params import ExchangeParams, JointParams
 from core.agreement.strides import find_swings
-from core.agreement.terms import SensorMotion, SensorTerms, cut_terms
+from core.agreement.terms import SensorMotion, SensorTerms, TermsPart, cut_terms
 from core.agreement.windows import JointWindows, compare_at_joint
 from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
 from core.rotation import rotate
@@ -82,12 +82,13 @@ def find_exchange(
 
     Parameters
     ----------
-    terms : of all worn leg sensors and the pelvis. joints : of the stated labels, over the whole take.
+    terms : of all worn leg sensors and the pelvis, for `over_s` from the first window on at least. joints :
+        of the stated labels, over the whole take.
     """
-    moving = [w.t_s[0] - 0.5 * w.width_s for w in joints if len(w.t_s)]
-    if len(joints) < 2 or not moving:
+    first = min((w.start_s for w in joints), default=np.inf)
+    if len(joints) < 2 or first == np.inf:
         return SensorExchange((), 0.0, None)
-    start = max(0.0, min(moving))
+    start = max(0.0, first)
     part = {s: cut_terms(x, start, start + params.over_s) for s, x in terms.items()}
     compared: dict[frozenset[Segment], JointWindows] = {
         frozenset((a, b)): compare_at_joint((a, b), part[a], part[b], joint_params)
@@ -98,7 +99,7 @@ def find_exchange(
         return SensorExchange((), 0.0, None)
     swap, ratio = choose_labels(compared, params)
     misfits = _misfits(compared)
-    rates = {s: float(np.sqrt((x.rate**2).sum(axis=1).mean())) for s, x in part.items()}
+    rates = {s: float(np.sqrt((x.motion.rate**2).sum(axis=1).mean())) for s, x in part.items()}
     order = sort_by_joints(misfits, rates, params.calmest)
     mirrored, gain = find_mirrored(part, misfits, list_worn_joints(part), joint_params, params)
     others = max(len(joints) * float(np.log(max(ratio, 1.0))), 0.0 if order is None else order.gain)
@@ -115,12 +116,12 @@ def find_exchange(
 
 
 def _compare_hips_of(
-    terms: Mapping[Segment, SensorTerms], rate_hz: float, joint_params: JointParams, params: ExchangeParams
+    terms: Mapping[Segment, TermsPart], rate_hz: float, joint_params: JointParams, params: ExchangeParams
 ) -> float | None:
     chains = {
         (a, b): compare_at_joint((a, b), terms[a], terms[b], joint_params) for a, b in list_worn_joints(terms)
     }
-    return compare_hips(terms, chains, rate_hz, params)
+    return compare_hips({s: x.motion for s, x in terms.items()}, chains, rate_hz, params)
 
 
 def choose_labels(

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from core.agreement.params import ExchangeParams, JointParams
-from core.agreement.terms import SensorTerms
+from core.agreement.terms import TermsPart
 from core.agreement.windows import compare_at_joint
 from core.frames import Floats, Segment
 
@@ -24,7 +24,7 @@ MOST: Final = 3
 LEVEL_AGAIN: Final[Floats] = np.array([1.0, -1.0, -1.0])
 
 
-def turn_round(terms: SensorTerms) -> SensorTerms:
+def turn_round(terms: TermsPart) -> TermsPart:
     """The terms of the same sensor with −f, levelled anew by half a turn about a horizontal line."""
     M = terms.M * LEVEL_AGAIN[:, None]
     M[:, :, 3] *= -1.0
@@ -32,7 +32,7 @@ def turn_round(terms: SensorTerms) -> SensorTerms:
 
 
 def find_mirrored(
-    terms: Mapping[Segment, SensorTerms],
+    terms: Mapping[Segment, TermsPart],
     misfits: Mapping[frozenset[Segment], float],
     joints: Sequence[tuple[Segment, Segment]],
     joint_params: JointParams,

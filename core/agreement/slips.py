@@ -105,16 +105,16 @@ def find_slips(
     axes: dict[Segment, Floats] = {}
     power: dict[Segment, Floats] = {}
     for s in (s for s in terms if s != "pelvis"):
-        rate = terms[s].rate
+        rate = terms[s].motion.rate
         axes[s] = find_main_axis(rate)
         power[s] = np.concatenate(([0.0], np.cumsum((rate**2).sum(axis=1))))
     moving = [_find_moving(w, power, rate_hz, params) for w in joints]
     turns = find_turns([w.choose(ok) for w, ok in zip(joints, moving, strict=True)], axes, params)
     half = 0.5 * max((w.width_s for w in joints), default=0.0)
-    slips = []
+    slips, motions = [], {s: x.motion for s, x in terms.items()}
     for segment, step in judge_turns(turns, half, params).items():
         valid = recording.sensors[segment].valid
-        slip = question_strides(segment, step, axes[segment], terms, valid, rate_hz, half, params)
+        slip = question_strides(segment, step, axes[segment], motions, valid, rate_hz, half, params)
         if slip is not None:
             slips.append(slip)
     return tuple(slips), _find_judged(turns, half, params)
@@ -400,7 +400,7 @@ def compile_agreement_kernels() -> None:
     wave = np.random.default_rng(0).normal(size=(2, n, 3))
     still = SensorSignals("", wave[0], wave[1], None, np.ones(n, np.bool_), np.zeros(n, np.bool_))
     terms = find_terms(still, 100.0, JointParams())
-    _ = terms.level
+    _ = terms.motion.level
     compare_at_joint(("pelvis", "thigh_l"), terms, terms, JointParams())
     turn, places = _turn_places(np.ones((4, 2, 3)), np.array([1.0, 0.0, 0.0]))
     found = PlaceTurns(np.arange(4.0), turn, places, 1.0)

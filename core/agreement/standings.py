@@ -102,7 +102,7 @@ def _list_walks(
 ) -> Iterator[tuple[Window, Window, Window]]:
     """Every walk, from its first to its last mid-swing, with the first rest before and after it."""
     first = rests[0] if rests else None
-    rates = [terms[SHANK[side]].rate for side in SIDES]
+    rates = [terms[SHANK[side]].motion.rate for side in SIDES]
     for a, b in pairwise(rests):
         gap = slice(round(a[1] * rate_hz), round(b[0] * rate_hz))
         swings: list[float] = []
@@ -125,9 +125,9 @@ def _measure_turns(
     found: dict[Segment, tuple[float, float, Floats]] = {}
     for side in SIDES:
         part = index_window(walk, rate_hz)
-        shank = terms[SHANK[side]].rate[part]
+        shank = terms[SHANK[side]].motion.rate[part]
         for segment in (s for s in terms if s.endswith(f"_{side[0]}")):
-            axis = _find_forward_axis(terms[segment].rate[part], shank, rate_hz)
+            axis = _find_forward_axis(terms[segment].motion.rate[part], shank, rate_hz)
             x = recording.sensors[segment]
             ups = []
             for window in (before, walk, after):

@@ -6,7 +6,7 @@ R (tilt by the complementary filter, heading free) that is R f + R K r: linear i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 import numba
@@ -15,7 +15,7 @@ import numpy as np
 from core.agreement.params import JointParams
 from core.filtering import low_pass
 from core.frames import GRAVITY, Bools, Floats
-from core.fusion.attitude import AttitudeState, advance
+from core.fusion.attitude import AttitudeParams, AttitudeState, advance
 from core.recording import SensorSignals
 from core.rest import Quietness, measure_quietness
 from core.rotation import compiled, from_matrix
@@ -56,34 +56,84 @@ class LevelMotion:
 
 
 @dataclass(frozen=True, eq=False)
+class TiltedSensor:
+    """`LevelMotion` of a whole take, worked out each time: an hour of seven sensors has 206 MB.
+
+    Parameters
+    ----------
+    bias : (3,) rad/s, its rate at rest. start, rest_norm : of the tilt, as `start_tilt` gives them.
+    """
+
+    signals: SensorSignals
+    bias: Floats
+    start: AttitudeState
+    rest_norm: float
+    rate_hz: float
+    params: AttitudeParams
+
+    @property
+    def q(self) -> Floats:
+        """(n, 4)."""
+        return self._tilt(len(self.signals.valid))
+
+    @property
+    def level(self) -> Floats:
+        """(3, n)."""
+        return _find_level(self.q, self.signals.acc)
+
+    @property
+    def rate(self) -> Floats:
+        """(n, 3)."""
+        return self.signals.gyr - self.bias
+
+    def cut(self, part: slice) -> LevelMotion:
+        """Some of the samples; what is behind them is not worked out."""
+        q = self._tilt(part.stop)[part]
+        return LevelMotion(
+            q, _find_level(q, self.signals.cut("acc", part)), self.signals.cut("gyr", part) - self.bias
+        )
+
+    def _tilt(self, stop: int) -> Floats:
+        until, valid = slice(stop), self.signals.valid[:stop]
+        gyr, acc = self.signals.cut("gyr", until) - self.bias, self.signals.cut("acc", until)
+        return advance(self.start, gyr, acc, valid, self.rate_hz, self.rest_norm, self.params)[0]
+
+
+@dataclass(frozen=True, eq=False)
 class SensorTerms:
     """One sensor's side of every joint, and how it moves at every sample of the take.
 
     Parameters
     ----------
-    q : as in `LevelMotion`. signals : of the sensor. bias : (3,) rad/s, its rate at rest.
-    M : (m, 3, 4) [R K | R f] in m/s² per m and m/s², x and y horizontal, z up. usable : (m,) no lost
-        sample is near. rate_hz : of these samples.
+    M : (m, 3, 4) [R K | R f] in m/s² per m and m/s², x and y horizontal, z up; of the first samples alone
+        once the joints of the take were compared (`keep_first`). usable : (m,) no lost sample is near.
+    rate_hz : of these samples.
     """
 
-    q: Floats
-    signals: SensorSignals
-    bias: Floats
+    motion: TiltedSensor
     M: Floats
     usable: Bools
     rate_hz: float
 
     @property
-    def level(self) -> Floats:
-        """(3, n) as in `LevelMotion`, worked out anew: an hour of seven sensors has 62 MB."""
-        out = np.empty((3, len(self.q)))
-        _write_level(self.q, self.signals.acc, out)
-        return out
+    def is_whole(self) -> bool:
+        """There are terms of the whole take."""
+        return len(self.M) == len(self.usable)
 
-    @property
-    def rate(self) -> Floats:
-        """(n, 3) as in `LevelMotion`, as well."""
-        return self.signals.gyr - self.bias
+    def keep_first(self, until_s: float) -> SensorTerms:
+        """Without the terms from then on: those of an hour of seven sensors are 123 MB."""
+        kept = min(len(self.M), max(0, int(until_s * self.rate_hz) + 2)) if until_s < np.inf else len(self.M)
+        return self if kept == len(self.M) else replace(self, M=self.M[:kept].copy())
+
+
+@dataclass(frozen=True, eq=False)
+class TermsPart:
+    """`SensorTerms` of a part of a take; `motion` is of its samples as well."""
+
+    motion: LevelMotion
+    M: Floats
+    usable: Bools
+    rate_hz: float
 
 
 NORMS: Final = (9.0, 10.6)
@@ -106,11 +156,12 @@ def find_terms(signals: SensorSignals, rate_hz: float, params: JointParams) -> S
     state, rest_norm = start_tilt(acc, signals.valid, rate_hz)
     q = advance(state, gyr, acc, signals.valid, rate_hz, rest_norm, params.attitude)[0]
     slow, _ = low_pass_terms(q[None], acc[None], gyr[None], rate_hz, params)
-    del acc, gyr
+    del acc, gyr, q
     thin = find_thinning(rate_hz, params)
     M = take_mean_out(slow, rate_hz / thin, params)[0]
     usable = find_usable(signals.valid[:, None], rate_hz)[0]
-    return SensorTerms(q, signals, bias, M, usable[::thin], rate_hz / thin)
+    motion = TiltedSensor(signals, bias, state, rest_norm, rate_hz, params.attitude)
+    return SensorTerms(motion, M, usable[::thin], rate_hz / thin)
 
 
 def find_thinning(rate_hz: float, params: JointParams) -> int:
@@ -151,26 +202,19 @@ def find_usable(valid: Bools, rate_hz: float) -> Bools:
     return np.array([np.convolve(~x, np.ones(2 * near + 1), "same") <= 0.5 for x in valid.T], np.bool_)
 
 
-def cut_terms(terms: SensorTerms, start_s: float, end_s: float) -> SensorTerms:
+def cut_terms(terms: SensorTerms, start_s: float, end_s: float) -> TermsPart:
     """The same of a part of the take; times begin anew."""
-    thin = round((len(terms.q) - 1) / max(1, len(terms.M) - 1))
+    thin = round(terms.motion.rate_hz / terms.rate_hz)
     first, last = (max(0, round(x * terms.rate_hz)) for x in (start_s, end_s))
     part, whole = slice(first, last), slice(first * thin, last * thin)
-    signals = terms.signals
-    return SensorTerms(
-        terms.q[whole],
-        signals.change(
-            acc=signals.held("acc")[whole],
-            gyr=signals.held("gyr")[whole],
-            mag=None,
-            valid=signals.valid[whole],
-            interpolated=signals.interpolated[whole],
-        ),
-        terms.bias,
-        terms.M[part],
-        terms.usable[part],
-        terms.rate_hz,
-    )
+    return TermsPart(terms.motion.cut(whole), terms.M[part], terms.usable[part], terms.rate_hz)
+
+
+def _find_level(q: Floats, acc: Floats) -> Floats:
+    """Specific force (3, n) in the level frame of q (n, 4), from acc (n, 3)."""
+    out = np.empty((3, len(q)))
+    _write_level(q, acc, out)
+    return out
 
 
 def find_bias(signals: SensorSignals, rate_hz: float, quiet: Quietness | None = None) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.agreement.params import JointParams
-from core.agreement.terms import TERMS, SensorTerms
+from core.agreement.terms import TERMS, SensorTerms, TermsPart
 from core.frames import Bools, Floats, Segment
 
 
@@ -42,6 +42,11 @@ class JointWindows:
     width_s: float
     step_s: float
 
+    @property
+    def start_s(self) -> float:
+        """Where the first window begins, s; infinite without one."""
+        return float(self.t_s[0]) - 0.5 * self.width_s if len(self.t_s) else np.inf
+
     def place_in(self, segment: Segment) -> Floats:
         """(m, 3) the joint in the axes of one of the two sensors, m."""
         return self.places[:, :3] if segment == self.first else self.places[:, 3:]
@@ -62,7 +67,10 @@ class JointWindows:
 
 
 def compare_at_joint(
-    names: tuple[Segment, Segment], first: SensorTerms, second: SensorTerms, params: JointParams
+    names: tuple[Segment, Segment],
+    first: SensorTerms | TermsPart,
+    second: SensorTerms | TermsPart,
+    params: JointParams,
 ) -> JointWindows:
     """Solve every window of a joint."""
     rate = first.rate_hz

@@ -44,7 +44,8 @@ from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError, Notice
 from core.estimators import BY_NAME, ERKF, L7S_3I, NO_FIGURE, ORIENTATIONS_ONLY, Estimator
 from core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
-from core.fusion.orientations import Orientations
+from core.fusion.orientations import LastReading, Orientations
+from core.memory import give_memory_back
 
 ON_A_BELT: Final = (
     "On a treadmill a foot on the belt does not rest in the room, as the estimator takes it to. Positions "
@@ -74,7 +75,8 @@ def estimate_poses(
 
     Parameters
     ----------
-    mounted : of the stage mounting, made with the same parameters.
+    mounted : of the stage mounting, made with the same parameters. Where its orientations are a
+        `LastReading`, those that the ErKF refined are forgotten.
     contacts : side → (n,) foot on the floor, from the events.
 
     Raises
@@ -164,11 +166,25 @@ class _Take:
         """Run the ErKF and its smoother."""
         if self.mounted.failure is not None:
             raise self.mounted.failure
+
+        def forget() -> None:
+            for q in (self.orientations.q, self.mounted.orientations.q):
+                if isinstance(q, LastReading):
+                    q.forget(segments)
+            give_memory_back()
+
         run = run_erkf(
-            self.calibrated, self.orientations, self.body, segments, self.params.erkf, self.mounted.arms
+            self.calibrated,
+            self.orientations,
+            self.body,
+            segments,
+            self.params.erkf,
+            self.mounted.arms,
+            forget,
         )
         health, turned = erkf_health(run), self.mounted.turned_rad
         tracks = find_segment_tracks(run, in_place=True)
+        run = run.forget_track()
         orientations = replace_orientations(run, self.orientations, tracks)
         poses = place_figure(run, orientations, self.contacts, self.body, tracks)
         poses = replace(
@@ -223,9 +239,10 @@ class _Take:
 
 def _without(orientations: Orientations, failed: Collection[Segment]) -> Orientations:
     kept = [s for s in orientations.q if s not in failed]
+    q = {s: orientations.q[s] for s in kept}
     return replace(
         orientations,
-        q={s: orientations.q[s] for s in kept},
+        q=LastReading(q) if isinstance(orientations.q, LastReading) else q,
         valid={s: orientations.valid[s] for s in kept},
     )
 

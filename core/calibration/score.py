@@ -287,12 +287,13 @@ class _Evidence:
         self.straight = np.zeros(len(self.recording.t_s), np.bool_)
         for window in self.calibration.walking:
             self.straight[index_window(window, rate)] = True
+        # before the rates of all sensors are held
+        self.knees = measure_knees(calibrated)
         self.rates: dict[Segment, Floats] = {
             s: (self.recording.sensors[s].gyr - x.gyro_bias) @ x.R_segment_sensor.T
             for s, x in self.calibration.segments.items()
         }
         self.axes = {s: self._find_axis(s) for s in self.rates}
-        self.knees = measure_knees(calibrated)
 
     def _seen(self, *segments: Segment) -> Bools:
         """Samples (n,) of straight walking at which all of these sensors were there."""

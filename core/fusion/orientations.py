@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from core.errors import Notice
 from core.frames import Bools, Floats, Segment
+
+
+class LastReading(dict[Segment, Floats]):
+    """Orientations (n, 4) by segment in the hands of their last reader, who lets go of what it has read."""
+
+    def forget(self, segments: Iterable[Segment]) -> None:
+        """Nothing of these any more; they keep their places in the order."""
+        self.update(dict.fromkeys(segments, np.empty((0, 4))))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ The windows of the figures are those of the reference table (core/norms/data), s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -67,14 +67,20 @@ class MeanCurve:
     n: int
 
 
-def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
-    """Cut every angle into gait cycles.
+def cycle_curves(
+    angles: JointAngles, strides: Strides, variables: Collection[str] | None = None
+) -> CycleCurves:
+    """Cut angles into gait cycles.
 
     Pelvis angles appear once per side, over that side's cycles; obliquity is positive with that side up.
     Pelvic rotation (that side forward) and foot progression (toes in) are measured from their own mean over
     the stride: against the walking direction they have no level (`MEAN_ZERO`).
     A stride in which the angle is not known throughout is a row of NaN; one in which a knee bends the wrong
     way as no knee can (`LEAST_KNEE`) as well.
+
+    Parameters
+    ----------
+    variables : what is cut, None = every angle.
     """
     index = {side: tuple(i for i, s in enumerate(strides.strides) if s.side == side) for side in SIDES}
     curves: dict[str, dict[Side, Floats]] = {}
@@ -95,19 +101,20 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
                 names[name] = base
             elif suffix not in SUFFIX.values():
                 names[name] = name
+        wanted = names if variables is None else {n: base for n, base in names.items() if base in variables}
         courses = {
             variable: angles.headings[segment]
             for segment, variable in (("pelvis", "pelvis_rotation"), (FOOT[side], "foot_progression"))
-            if segment in angles.headings
+            if segment in angles.headings and (variables is None or variable in variables)
         }
-        signals = [*courses.values(), *(angles.angles[name] for name in names)]
+        signals = [*courses.values(), *(angles.angles[name] for name in wanted)]
         if not signals:
             continue
         rows = iter(resample(signals, angles.t_s, bounds, POINTS))
         for variable, row in zip(courses, rows):  # noqa: B905 - the angles follow
             row -= row[:, :-1].mean(axis=1, keepdims=True)
             curves.setdefault(variable, {})[side] = np.negative(row, out=row) if side == "left" else row
-        for (name, base), row in zip(names.items(), rows, strict=True):
+        for (name, base), row in zip(wanted.items(), rows, strict=True):
             sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
             # from the mean of walking nobody knows where straight is
             if base == "knee_flexion" and angles.zero == "standing":
@@ -189,6 +196,27 @@ def _read_figure(figure: CurveFigure, rows: Floats) -> Floats:
     return np.asarray({"min": least, "max": most}.get(figure.statistic, most - least))
 
 
+def measure_curves(
+    angles: JointAngles, strides: Strides
+) -> tuple[CycleCurves, dict[str, dict[Side, Floats]]]:
+    """What is known of all curves, without them, and their `stride_figures`.
+
+    Half of the curves are held at a time: those of an hour of seven sensors are 62 MB.
+    """
+    read = list_curve_figures()
+    variables = list(dict.fromkeys(figure.variable for figure in read.values()))
+    known = cycle_curves(angles, strides, ())
+    why, bounds = dict(known.why), dict(known.bounds)
+    values: dict[str, dict[Side, Floats]] = {}
+    for half in (variables[::2], variables[1::2]):
+        curves = cycle_curves(angles, strides, half)
+        values |= stride_figures(curves, {name: x for name, x in read.items() if x.variable in half})
+        why |= {v: curves.why[v] for v in half if v in curves.why}
+        bounds |= curves.bounds
+        del curves
+    return replace(known, why=why, bounds=bounds), {name: values[name] for name in read if name in values}
+
+
 def foot_pitch(
     orientations: Oriented, strides: Strides, pitch: Mapping[Segment, Floats] | None = None
 ) -> dict[str, dict[Side, Floats]]:
@@ -222,13 +250,13 @@ def turning_angle(strides: Strides) -> dict[str, dict[Side, Floats]]:
 
 
 def summarise_angles(
-    curves: CycleCurves, more: Mapping[str, Mapping[Side, Floats]] | None = None
+    curves: CycleCurves, measured: Mapping[str, Mapping[Side, Floats]] | None = None
 ) -> tuple[Parameter, ...]:
     """Angle parameters over the counted strides of each side, degrees.
 
     Parameters
     ----------
-    more : further figures, those of `foot_pitch` and `turning_angle`.
+    measured : figures of `measure_curves`, `foot_pitch` and `turning_angle`; None = those of the curves.
 
     Returns
     -------
@@ -237,8 +265,7 @@ def summarise_angles(
     """
     read = list_curve_figures()
     figures: dict[str, Mapping[Side, Floats]] = {name: {} for name in read}
-    figures |= stride_figures(curves)
-    figures |= more or {}
+    figures |= stride_figures(curves) if measured is None else measured
     parameters = []
     for side in SIDES:
         used = curves.used[side]

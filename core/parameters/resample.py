@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
+from typing import Final
 
 import numpy as np
 
 from core.frames import Floats
+
+AT_ONCE: Final = 256
+"""Pieces whose places are worked out together."""
 
 
 def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int = 101) -> list[Floats]:
@@ -17,23 +21,34 @@ def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int
     ----------
     bounds : (pieces, 2) s. A piece that touches NaN in a signal is NaN throughout.
     """
-    if not len(bounds):
-        return [np.empty((0, points)) for _ in signals]
-    place = (bounds - t_s[0]) * ((len(t_s) - 1) / (t_s[-1] - t_s[0]))
-    place = place[:, :1] + (place[:, 1:] - place[:, :1]) * _shares(points)
-    known = np.isfinite(place)
-    low = np.clip(np.floor(np.where(known, place, 0.0)).astype(np.int64), 0, len(t_s) - 2)
-    high, share = low + 1, place - low
-    found: list[Floats] = []
-    # of a live stride all signals at once; of a take one by one, whose angles are a million points
-    for part in [np.stack(tuple(signals))] if len(bounds) == 1 else (np.asarray(x)[None] for x in signals):
-        here, rows = part.take(low, axis=1), part.take(high, axis=1)
-        rows -= here
-        rows *= share
-        rows += here
-        rows[~np.isfinite(rows.sum(axis=-1))] = np.nan
-        found.extend(rows)
+    signals = tuple(np.asarray(x) for x in signals)
+    ends = (bounds - t_s[0]) * ((len(t_s) - 1) / (t_s[-1] - t_s[0]))
+    if len(bounds) == 1:  # a live stride: all signals at once
+        return list(_interpolate(np.stack(signals), _place(ends, points), len(t_s)))
+    found = [np.empty((len(bounds), points), x.dtype) for x in signals]
+    for first in range(0, len(bounds), AT_ONCE):
+        part = slice(first, first + AT_ONCE)
+        place = _place(ends[part], points)
+        for signal, all_rows in zip(signals, found, strict=True):
+            (all_rows[part],) = _interpolate(signal[None], place, len(t_s))
     return found
+
+
+def _place(ends: Floats, points: int) -> Floats:
+    """Places (pieces, points) between samples, of pieces that begin and end at places (pieces, 2)."""
+    return np.asarray(ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * _shares(points))
+
+
+def _interpolate(signals: Floats, place: Floats, n: int) -> Floats:
+    """Signals (k, n) at places (pieces, points), as (k, pieces, points)."""
+    low = np.clip(np.floor(np.where(np.isfinite(place), place, 0.0)).astype(np.int64), 0, n - 2)
+    here, rows = signals.take(low, axis=1), signals.take(low + 1, axis=1)
+    # in place: ten minutes of all angles are a million points
+    rows -= here
+    rows *= place - low
+    rows += here
+    rows[~np.isfinite(rows.sum(axis=-1))] = np.nan
+    return rows
 
 
 @lru_cache(maxsize=8)

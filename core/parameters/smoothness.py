@@ -33,6 +33,9 @@ POINTS: Final = 128
 PADDING: Final = 16
 """Times the length, for a smooth spectrum (2⁴, as the authors' programme)."""
 
+AT_ONCE: Final = 256
+"""Strides whose padded spectra are held together: 16 kB each, and their curves."""
+
 
 def stride_smoothness(strides: Sequence[Window], t_s: Floats, trunk: Mapping[Segment, Floats]) -> Parameter:
     """`stride_sparc` of the pelvis over these strides.
@@ -65,6 +68,15 @@ def spectral_arc_length(pieces: Floats, step_s: Floats) -> Floats:
     """
     n = PADDING * pieces.shape[1]
     kept = int(np.ceil(LIMIT_HZ * n * float(np.max(step_s, initial=0.0)))) + 2
+    found = np.empty(len(pieces))
+    for first in range(0, len(pieces), AT_ONCE):
+        part = slice(first, first + AT_ONCE)
+        found[part] = _measure_arcs(pieces[part], step_s[part], n, kept)
+    return found
+
+
+def _measure_arcs(pieces: Floats, step_s: Floats, n: int, kept: int) -> Floats:
+    """The same of some signals: padded to n points, so many frequencies looked at."""
     spectrum = np.abs(np.fft.rfft(pieces, n, axis=1))[:, :kept]
     dc = spectrum[:, :1]
     shape = spectrum / np.where(dc > 0.0, dc, np.nan)

@@ -10,10 +10,9 @@ from core.angles import JointAngles
 from core.events.result import Strides
 from core.frames import Floats, Oriented, Segment, Side
 from core.parameters.kinematic import (
-    cycle_curves,
     foot_pitch,
+    measure_curves,
     per_stride_figures,
-    stride_figures,
     summarise_angles,
     turning_angle,
     without_bounds,
@@ -68,24 +67,28 @@ def take_figures(
     times = (*summarise_times(strides), phase_coordination(strides))
     if angles is None:
         return TakeFigures(times, columns)
+    # before the curves of the angles are held
+    of_trunk = (
+        *trunk_regularity(choose_foot(strides), angles.t_s, trunk or {}),
+        stride_smoothness(choose_foot(strides), angles.t_s, trunk or {}),
+    )
     pitch = {} if orientations is None else foot_pitches(orientations)
     flat = find_stances(strides, angles.t_s, pitch)
     rows = spatial_rows(strides, feet, surface)
     phases = phase_rows(strides, flat, angles, pitch, feet)
-    curves = cycle_curves(angles, strides)
+    curves, of_curves = measure_curves(angles, strides)
     of_feet = turning_angle(strides)
     if orientations is not None:
         of_feet |= foot_pitch(orientations, strides, pitch)
-    figures: dict[str, Mapping[Side, Floats]] = {**stride_figures(curves), **of_feet}
+    figures: dict[str, Mapping[Side, Floats]] = {**of_curves, **of_feet}
     return TakeFigures(
         parameters=(
             *times,
             *summarise_distances(strides, feet, rows, surface),
             *side_parameters(strides, flat.rows, PARTS),
             *side_parameters(strides, phases, PHASES),
-            *summarise_angles(curves, of_feet),
-            *trunk_regularity(choose_foot(strides), angles.t_s, trunk or {}),
-            stride_smoothness(choose_foot(strides), angles.t_s, trunk or {}),
+            *summarise_angles(curves, figures),
+            *of_trunk,
         ),
         columns={
             **columns,

@@ -34,8 +34,9 @@ from core.events.result import GaitEvents
 from core.events.turns import body_yaw_rate, find_turns
 from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
 from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
+from core.fusion.orientations import LastReading, Orientations
 from core.measure import Tracks, measure_gait
+from core.memory import give_memory_back
 from core.parameters.spatial import surface_of
 from core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
 from core.pipeline.config import PipelineConfig
@@ -202,6 +203,7 @@ def mount_on_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAna
     """Mountings as standing width and joints show them; everything behind takes these."""
     calibrated = require_stage(analysis.calibrated, "calibration")
     mounted = mount_sensors(calibrated, require_stage(analysis.fused, "orientation"), config.poses)
+    give_memory_back()
     used = replace(mounted.calibrated, recording=drop_stuck_sensors(analysis.recording))
     score = score_calibration(used, config.calibration.score, analysis.agreed, mounted.turned_rad)
     return replace(analysis, mounted=mounted, calibration_score=score)
@@ -217,16 +219,24 @@ def build_figure(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
     return replace(analysis, posed=withhold_distances(estimate_poses(mounted, contacts, config.poses)))
 
 
-def keep_feet_alone(analysis: TakeAnalysis) -> TakeAnalysis:
-    """Of the orientations before mounting only the feet's, which `measure_walk` falls back on."""
-    fused = require_stage(analysis.fused, "orientation")
-    return replace(analysis, fused=replace(fused, q={s: q for s, q in fused.q.items() if s in FOOT.values()}))
+def keep_what_poses_read(analysis: TakeAnalysis) -> TakeAnalysis:
+    """Of the orientations before mounting only the feet's, which `measure_walk` falls back on; those behind
+    it for the estimator alone, which lets go of what it refines while it runs."""
+    fused, mounted = require_stage(analysis.fused, "orientation"), require_stage(analysis.mounted, "mounting")
+    fused = replace(fused, q={s: q for s, q in fused.q.items() if s in FOOT.values()})
+    passed = replace(mounted.orientations, q=LastReading(mounted.orientations.q))
+    return replace(analysis, fused=fused, mounted=replace(mounted, orientations=passed))
 
 
 def keep_refined_alone(analysis: TakeAnalysis) -> TakeAnalysis:
-    """No orientations from before the estimator."""
+    """No orientations from before the estimator; a foot that it left out keeps what it had.
+
+    `measure_walk` falls back on the feet's where there are no angles: their stage does not fail.
+    """
     mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
-    return replace(analysis, mounted=replace(mounted, orientations=posed.orientations))
+    fused, refined = require_stage(analysis.fused, "orientation"), posed.orientations
+    fused = replace(fused, q={s: refined.q.get(s, q) for s, q in fused.q.items()})
+    return replace(analysis, fused=fused, mounted=replace(mounted, orientations=refined))
 
 
 def keep_what_is_measured(analysis: TakeAnalysis) -> TakeAnalysis:
@@ -238,11 +248,7 @@ def keep_what_is_measured(analysis: TakeAnalysis) -> TakeAnalysis:
     kind = figure_precision(len(poses.t_s))
     turned = {s: q if s in kept else np.asarray(q, kind) for s, q in poses.q.items()}
     posed = replace(posed, orientations=orientations, poses=replace(poses, q=turned))
-    # a foot that the estimator left out keeps what it had
-    fused = require_stage(analysis.fused, "orientation")
-    fused = replace(fused, q={s: kept.get(s, q) for s, q in fused.q.items()})
-    mounted = replace(mounted, orientations=orientations)
-    return replace(analysis, fused=fused, mounted=mounted, posed=posed)
+    return replace(analysis, mounted=replace(mounted, orientations=orientations), posed=posed)
 
 
 def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -285,6 +291,7 @@ def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
         turns=contacts.turns,
         steps=contacts.steps,
     )
+    give_memory_back()
     return replace(analysis, tracks=tracks, measured=measure_gait(tracks))
 
 
@@ -390,7 +397,7 @@ EVENTS: Final = PipelineStage(
 )
 TRUNK_EVENTS: Final = PipelineStage("events", 0.14, detect_trunk_steps, ("contacts",), ("lumbar", "turns"))
 MOUNTING: Final = PipelineStage(
-    "mounting", 0.15, mount_on_segments, ("mounted",), ("poses", "calibration"), let_go=keep_feet_alone
+    "mounting", 0.15, mount_on_segments, ("mounted",), ("poses", "calibration"), let_go=keep_what_poses_read
 )
 POSES: Final = PipelineStage("poses", 0.4, build_figure, ("posed",), ("poses",), let_go=keep_refined_alone)
 ANGLES: Final = PipelineStage("angles", 0.95, compute_angles, ("angles",), let_go=keep_what_is_measured)

@@ -5,13 +5,18 @@ Conventions and sources: `core/rotation/__init__.py`.
 
 from __future__ import annotations
 
-from typing import TypeVar
+from collections.abc import Callable
+from typing import Final, TypeVar
 
 import numpy as np
 
 from core.frames import Floats
 
 _SMALL = 1e-8
+
+_ROWS: Final = 1 << 14
+"""Rows of a long array that are worked on together: what is made on the way stays in the processor's cache,
+and an hour of a sensor is not held several times."""
 
 Angle = TypeVar("Angle", float, Floats)
 
@@ -23,8 +28,11 @@ def normalise(q: Floats) -> Floats:
 
 def multiply(p: Floats, q: Floats) -> Floats:
     """Hamilton product p ⊗ q of (..., 4) arrays, broadcasting."""
-    pw, px, py, pz = _components(np.asarray(p, np.float64))
-    qw, qx, qy, qz = _components(np.asarray(q, np.float64))
+    p, q = np.asarray(p, np.float64), np.asarray(q, np.float64)
+    if _are_long(p, q):
+        return _by_rows(multiply, 4, p, q)
+    pw, px, py, pz = _components(p)
+    qw, qx, qy, qz = _components(q)
     return np.stack(
         (
             pw * qw - px * qx - py * qy - pz * qz,
@@ -43,9 +51,11 @@ def conjugate(q: Floats) -> Floats:
 
 def rotate(q: Floats, v: Floats) -> Floats:
     """Rotate vectors (..., 3) by unit quaternions (..., 4), broadcasting."""
-    q = np.asarray(q, np.float64)
+    q, v = np.asarray(q, np.float64), np.asarray(v)
+    if _are_long(q, v):
+        return _by_rows(rotate, 3, q, v)
     u, w = q[..., 1:], q[..., :1]
-    t = 2.0 * _cross(u, np.asarray(v))
+    t = 2.0 * _cross(u, v)
     return np.asarray(v + w * t + _cross(u, t))
 
 
@@ -120,6 +130,8 @@ def mean(q: Floats, weights: Floats | None = None) -> Floats:
 
 def slerp(p: Floats, q: Floats, u: Floats | float) -> Floats:
     """Interpolate from p (u = 0) to q (u = 1) along the shorter arc; p, q (..., 4), u (...)."""
+    if np.ndim(u) == 0 and _are_long(p, q):
+        return _by_rows(lambda a, b: slerp(a, b, u), 4, p, q)
     step = log(multiply(conjugate(p), q))
     return multiply(p, exp(np.asarray(u, np.float64)[..., None] * step))
 
@@ -154,6 +166,20 @@ def split_heading(q: Floats) -> tuple[Floats, Floats]:
 def wrap_angle(angle: Angle) -> Angle:
     """The same angle (...) in rad in [−π, π)."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def _are_long(a: Floats, b: Floats) -> bool:
+    """One of both is (n, k) of many rows, and none has more axes."""
+    return (a.size > 4 * _ROWS or b.size > 4 * _ROWS) and max(a.ndim, b.ndim) == 2
+
+
+def _by_rows(of: Callable[[Floats, Floats], Floats], width: int, a: Floats, b: Floats) -> Floats:
+    """Rows (n, width) that a function makes of those of a and b, (n, k) or the same for all."""
+    found = np.empty((max(len(x) for x in (a, b) if x.ndim == 2), width))
+    for first in range(0, len(found), _ROWS):
+        part = slice(first, first + _ROWS)
+        found[part] = of(*(x[part] if x.ndim == 2 and len(x) == len(found) else x for x in (a, b)))
+    return found
 
 
 def _components(x: Floats) -> tuple[Floats, ...]:

@@ -14,6 +14,7 @@ from core.body.health import find_worst_verdict
 from core.body.model import LENGTHS
 from core.frames import SEGMENTS, Side
 from core.norms.controls import mean_curves
+from core.norms.profile import NINE, MeanCurves
 from core.parameters import cycle_curves
 from core.parameters.result import Parameter
 from core.quality import concern_paths_alone, find_shown_level
@@ -43,8 +44,7 @@ def summarise_analysis(analysis: TakeAnalysis) -> dict[str, object]:
         "estimator": _estimator(analysis),
         "parameters": [parameter_row(p) for p in analysis.parameters],
         "functional": _functional(analysis),
-        "scores": _scores(analysis),
-        "mean_curves": _mean_curves(analysis),
+        **_summarise_curves(analysis),
         "walking": _walking(analysis),
         "warnings": [n.to_json() for n in analysis.notices],
         "provenance": reduce_to_plain(analysis.provenance),
@@ -139,25 +139,30 @@ def _agreement(analysis: TakeAnalysis) -> dict[str, object] | None:
     }
 
 
-def _scores(analysis: TakeAnalysis) -> list[dict[str, object]]:
-    """Profiles and indices over several curves, so that a trend over many visits reads no signals."""
-    if analysis.angles is None or analysis.measured is None:
-        return []
-    curves = cycle_curves(analysis.angles, analysis.measured.strides)
-    unsure = list_estimated_variables(_estimator(analysis))
-    return score_rows(score_curves(curves, analysis.angles.standing_deg, estimated=unsure))
+def _summarise_curves(analysis: TakeAnalysis) -> dict[str, object]:
+    """Scores and mean curves, so that a trend over many visits and a group of controls read no angles.
 
-
-def _mean_curves(analysis: TakeAnalysis) -> dict[Side, dict[str, object]]:
-    """Side → variable → 101 degrees from standing, so that many controls are read without their angles.
-
-    Decimals are those of angles.parquet's single precision.
+    Profiles and indices are over several curves. Mean curves are side → variable → 101 degrees from standing,
+    with the decimals of angles.parquet's single precision. Nine curves are held at a time, then the others.
     """
-    if analysis.angles is None or analysis.measured is None or analysis.angles.zero != "standing":
-        return {}
-    curves = cycle_curves(analysis.angles, analysis.measured.strides)
-    found = mean_curves(curves, list_estimated_variables(_estimator(analysis)))
-    return {side: {v: reduce_to_plain(np.round(c, 5)) for v, c in own.items()} for side, own in found.items()}
+    angles, measured = analysis.angles, analysis.measured
+    if angles is None or measured is None:
+        return {"scores": [], "mean_curves": {}}
+    unsure = list_estimated_variables(_estimator(analysis))
+    curves = cycle_curves(angles, measured.strides, NINE)
+    scores = score_rows(score_curves(curves, angles.standing_deg, estimated=unsure))
+    means: dict[Side, dict[str, object]] = {}
+    if angles.zero == "standing":
+        _add_means(means, mean_curves(curves, unsure))
+        del curves
+        others = {name.removesuffix("_l").removesuffix("_r") for name in angles.angles}.difference(NINE)
+        _add_means(means, mean_curves(cycle_curves(angles, measured.strides, others), unsure))
+    return {"scores": scores, "mean_curves": means}
+
+
+def _add_means(means: dict[Side, dict[str, object]], found: MeanCurves) -> None:
+    for side, own in found.items():
+        means.setdefault(side, {}).update({v: reduce_to_plain(np.round(c, 5)) for v, c in own.items()})
 
 
 def score_rows(found: Scores) -> list[dict[str, object]]:

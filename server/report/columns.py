@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from core.frames import Bools, Floats
+from core.memory import give_memory_back
 
 if TYPE_CHECKING:
     from core.events.turns import Turn  # brings numba, which the web process does without
@@ -84,6 +85,9 @@ def parquet_file(t_s: Floats, columns: Mapping[str, ParquetColumn], meta: Mappin
                 sink, table.schema, compression="zstd", use_dictionary=False, use_byte_stream_split=split
             )
         writer.write_table(table)
+        if first + GROUP < len(t_s):
+            del table
+            give_memory_back()
     if writer is not None:
         writer.close()
     return sink.getvalue()

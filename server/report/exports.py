@@ -54,6 +54,12 @@ if TYPE_CHECKING:
 MEASURES: Final = list_names(SQUAT, "take")
 """Columns of a squat in repetitions.csv."""
 
+IN_ORDER: Final = (
+    "analysis.json", "poses.parquet", "events.csv", "strides.csv", "steps.csv", "repetitions.csv",
+    "angles.parquet", tracks.NAME, signals.NAME,
+)  # fmt: skip
+"""Files as they are given, which is not the order in which they are written."""
+
 STRIDE_COLUMNS = ("side", "start_s", "tc_s", "end_s", "opposite_tc_s", "opposite_ic_s", "turn_deg")
 """What a stride is; its parameters, `flags` and `excluded_reason` follow in strides.csv."""
 
@@ -74,6 +80,16 @@ def analysis_files(analysis: TakeAnalysis, let_go: Callable[[], None] = lambda: 
     measured, squats, held = analysis.measured, analysis.squats, analysis.tracks
     del analysis
     let_go()
+    # first what is larger in memory than as a file
+    if angles is not None:
+        held = None if held is None else replace(held, angles=None)
+        files["angles.parquet"] = angles_parquet(angles)
+        del angles
+        let_go()
+    # also where a later stage stopped: who asks why looks at the signals
+    files[signals.NAME] = signals.signals_parquet(recording)
+    del recording
+    let_go()
     if poses is not None:
         files["poses.parquet"] = poses_parquet(poses)
         del poses
@@ -85,17 +101,10 @@ def analysis_files(analysis: TakeAnalysis, let_go: Callable[[], None] = lambda: 
             files["steps.csv"] = steps_csv(measured.steps)
     if squats is not None:
         files["repetitions.csv"] = repetitions_csv(squats)
-    if angles is not None:
-        held = None if held is None else replace(held, angles=None)
-        files["angles.parquet"] = angles_parquet(angles)
-        del angles
-        let_go()
     if held is not None:
         files[tracks.NAME] = tracks.tracks_parquet(held)
         del held
-    # also where a later stage stopped: who asks why looks at the signals
-    files[signals.NAME] = signals.signals_parquet(recording)
-    return files
+    return {name: files[name] for name in IN_ORDER if name in files}
 
 
 def angles_parquet(angles: JointAngles) -> bytes:

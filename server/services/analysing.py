@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from server.processes.memory import give_memory_back
+from core.memory import give_memory_back
 from server.services.provenance import CODE_VERSION
 
 if TYPE_CHECKING:

@@ -92,8 +92,8 @@ FEW: Final = {
 SLOWER: Final = 1.6
 """A second of ten minutes may take so much longer than a second of one minute."""
 
-MOST_MB: Final = 360.0
-"""Of the whole process, for ten minutes."""
+MOST_MB: Final = {14: 335.0, 84: 620.0}
+"""Of the whole process, by laps: ten minutes, and an hour where it is measured; runs differ by 15 MB."""
 
 AT_ONCE: Final = (1, 10, 40) if WRITES else (1, 4)
 PEOPLE: Final = (1, 500, 5000) if WRITES else (1, 500)
@@ -150,7 +150,7 @@ def test_time_and_memory_grow_with_the_length_and_no_faster(tmp_path: Path) -> N
         record_goal("analysis of 60 min of seven sensors, peak memory", 600.0, found[84]["peak_mb"], "MB")
     assert all(x["parameters"] > 50 for x in found.values())
     assert found[14]["cpu_s"] / LAPS[14] <= SLOWER * found[1]["cpu_s"] / LAPS[1]
-    assert found[14]["peak_mb"] <= MOST_MB
+    assert {laps: x["peak_mb"] for laps, x in found.items() if x["peak_mb"] > MOST_MB.get(laps, np.inf)} == {}
 
 
 def test_a_live_session_costs_no_more_among_others() -> None:

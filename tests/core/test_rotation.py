@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -152,3 +156,26 @@ def test_a_rotation_with_rounding_becomes_a_rotation_again(phi: Floats) -> None:
     R, work = rotation.to_matrix(rotation.exp(phi)) + 1e-7 * np.arange(9.0).reshape(3, 3), np.empty((2, 3, 3))
     compiled.orthonormalise(R, work)
     np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-11)
+
+
+@pytest.mark.parametrize("rows", [16_384, 16_385, 40_000])
+def test_long_arrays_are_worked_out_as_short_ones_are(rows: int) -> None:
+    rng = np.random.default_rng(1)
+    p, q = (rotation.normalise(rng.normal(size=(rows, 4))) for _ in range(2))
+    v = rng.normal(size=(rows, 3))
+
+    def pieces(of: Callable[..., Floats], *by: Floats) -> Floats:
+        cut = range(0, rows, 1000)
+        return np.concatenate([of(*(x[i : i + 1000] if x.ndim == 2 else x for x in by)) for i in cut])
+
+    for of, by in (
+        (rotation.multiply, (p, q)),
+        (rotation.multiply, (p, q[0])),
+        (rotation.multiply, (p[0], q)),
+        (rotation.rotate, (p, v)),
+        (rotation.rotate, (p, v[0])),
+        (rotation.rotate, (p[0], v)),
+        (partial(rotation.slerp, u=0.5), (p, q)),
+    ):
+        np.testing.assert_array_equal(of(*by), pieces(of, *by))
+    np.testing.assert_array_equal(rotation.multiply(p[:1], q), rotation.multiply(p[0], q))

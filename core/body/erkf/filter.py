@@ -42,6 +42,7 @@ from core.body.tree import ImuTree
 from core.errors import EstimationError, ParameterError, SignalError
 from core.frames import Bools, Floats
 from core.held_samples import SampleSeries
+from core.memory import make_pages
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +107,7 @@ class ErkfTrack:
     Parameters
     ----------
     places, turns : of each sensor (T, 3) m and (T, 4), its position and orientation in W.
-    heading_sd : (T, n) rad, of the filter, about the vertical.
+    heading_sd : (T, n) rad, of the filter, about the vertical; with the smoother (1, n), at the end.
     joint_residual : (T, joints) distance of the two ends of each joint, m.
     refused : (T, n) zero velocities that the gate refused.
     nominal : (T, n, 16) as in `ErkfState`, of the filter; (0, n, 16) of the smoother.
@@ -183,7 +184,8 @@ def find_rests(
     of_sensor : index → acc, gyr (T, 3) of one sensor. valid : (T, n) measured.
     """
     contact, still = np.zeros(valid.shape, bool), np.zeros(valid.shape, bool)
-    rolling = np.zeros(valid.shape)
+    # of sensors that are not on a foot nothing is ever written
+    rolling = make_pages(*valid.shape[::-1]).T
     for i in range(len(tree.imus)):
         force, rate = of_sensor(i)
         still[:, i] = still_samples(force, rate, valid[:, i], rate_hz, AT_REST)

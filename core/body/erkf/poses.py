@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Final, cast
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from core.body.arms import MeasuredArms
 from core.body.corrected import SIGNALS, CorrectedSignals, correct_signals
 from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, TakeInputs, erkf_inputs, find_rests
 from core.body.erkf.params import ErkfParams
-from core.body.erkf.smoother import smooth
+from core.body.erkf.smoother import do_nothing, smooth
 from core.body.erkf.start import start_state
 from core.body.feet import FootTracks
 from core.body.kinematics import incomplete_legs
@@ -31,6 +31,9 @@ from core.rotation import from_matrix, multiply, rotate
 NEAR_START_S = 1.0
 """Rest that begins so early is a standing start."""
 
+AT_ONCE: Final = 1 << 14
+"""Samples whose poses are worked out at a time."""
+
 
 @dataclass(frozen=True, eq=False)
 class ErkfRun:
@@ -38,8 +41,8 @@ class ErkfRun:
 
     Parameters
     ----------
-    inputs : without their signals, which nobody reads after the filter. rest : samples of the standing start,
-        None = the take starts mid-walk.
+    inputs : without signals and rolling, which nobody reads after the filter. rest : samples of the standing
+        start, None = the take starts mid-walk.
     """
 
     tree: ImuTree
@@ -54,6 +57,12 @@ class ErkfRun:
         """Segments in the tree's order."""
         return cast("tuple[Segment, ...]", self.tree.imus)
 
+    def forget_track(self) -> ErkfRun:
+        """The run without its track, once segments and health were read from it."""
+        none = np.empty((0, len(self.tree.imus)))
+        joints, refused = np.empty((0, len(self.tree.joints))), none.astype(np.bool_)
+        return replace(self, track=ErkfTrack((), (), none, joints, refused, np.empty((0, 0, 16))))
+
 
 def run_erkf(
     calibrated: CalibratedRecording,
@@ -62,12 +71,14 @@ def run_erkf(
     segments: Sequence[Segment],
     params: ErkfParams,
     arms: MeasuredArms | None = None,
+    filtered: Callable[[], None] = do_nothing,
 ) -> ErkfRun:
     """Filter and smooth a take with the sensors of some segments; neighbours are joined, others run beside.
 
     Parameters
     ----------
-    arms : places of sensors and centres of joints; None = nominal.
+    arms : places of sensors and centres of joints; None = nominal. filtered : called when the orientations
+        are read for the last time and nothing can fail any more.
 
     Raises
     ------
@@ -92,8 +103,8 @@ def run_erkf(
     age_s = calibrated.calibration.zero[0] if calibrated.calibration.posture == "standing" else None
     # orientations are known: of the signals it takes the first sample
     start = start_state(tree, inputs.part(0, 1), params, rest, q=first, bias_age_s=age_s)
-    track, final = smooth(start, inputs, tree, params)
-    return ErkfRun(tree, inputs.known, start, rest, track, final)
+    track, final = smooth(start, inputs, tree, params, filtered=filtered)
+    return ErkfRun(tree, replace(inputs.known, rolling=None), start, rest, track, final)
 
 
 def _find_inputs(
@@ -144,10 +155,13 @@ def find_segment_tracks(run: ErkfRun, *, in_place: bool = False) -> SegmentTrack
     q, p = {}, {}
     for i, segment in enumerate(run.segments):
         place, turn = run.track.places[i], run.track.turns[i]
-        q[segment], p[segment] = run.tree.segment(i, place, turn)
-        if in_place:
-            turn[:], place[:] = q[segment], p[segment]
-            q[segment], p[segment] = turn, place
+        if not in_place:
+            q[segment], p[segment] = run.tree.segment(i, place, turn)
+            continue
+        for first in range(0, len(turn), AT_ONCE):
+            part = slice(first, first + AT_ONCE)
+            turn[part], place[part] = run.tree.segment(i, place[part], turn[part])
+        q[segment], p[segment] = turn, place
     return SegmentTracks(q, p)
 
 
@@ -178,20 +192,23 @@ def place_figure(
     """
     legs = [s for s in SIDES if {THIGH[s], SHANK[s], FOOT[s]} <= set(run.segments)]
     shown: list[Segment] = ["pelvis", *(x for s in legs for x in (THIGH[s], SHANK[s], FOOT[s]))]
-    place = {s: tracks.p[s] for s in shown}
     still = {s: run.inputs.contact[:, run.segments.index(FOOT[s])] for s in legs}
-    for side in legs:
-        place |= _hang_together(run, orientations, place, side, body)
-    floor = _floor({s: place[FOOT[s]][:, 2] - body.ankle_height for s in legs}, still)
-    for s, p in place.items():
-        level = p.astype(figure_precision(len(p)))
-        level[:, 2] = p[:, 2] - floor
-        place[s] = level
+    floor = _floor({s: tracks.p[FOOT[s]][:, 2] - body.ankle_height for s in legs}, still)
+    level = {s: np.empty((len(floor), 3), figure_precision(len(floor))) for s in shown}
+    for first in range(0, len(floor), AT_ONCE):
+        part = slice(first, first + AT_ONCE)
+        place = {s: tracks.p[s][part] for s in shown}
+        turned = {s: orientations.q[s][part] for s in shown}
+        for side in legs:
+            place |= _hang_together(run, turned, place, side, body)
+        for s, p in place.items():
+            level[s][part] = p
+            level[s][part, 2] = p[:, 2] - floor[part]
     return Poses(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
         q={s: orientations.q[s] for s in shown},
-        p=place,
+        p=level,
         valid=np.logical_and.reduce([orientations.valid[s] for s in shown]),
         contact={FOOT[s]: contacts.get(s, still[s]) for s in legs},
         body=body,
@@ -230,7 +247,11 @@ def foot_tracks(
 
 
 def _hang_together(
-    run: ErkfRun, orientations: Orientations, place: Mapping[Segment, Floats], side: Side, body: BodyModel
+    run: ErkfRun,
+    turned: Mapping[Segment, Floats],
+    place: Mapping[Segment, Floats],
+    side: Side,
+    body: BodyModel,
 ) -> dict[Segment, Floats]:
     """Origins (n, 3) of shank and thigh for a figure of the body's own lengths.
 
@@ -243,7 +264,7 @@ def _hang_together(
     for upper, lower in ((SHANK[side], FOOT[side]), (THIGH[side], SHANK[side])):
         joint = joints[upper, lower]
         used = rotate(run.tree.q_mount[joint.proximal], joint.r_proximal) + run.tree.place[joint.proximal]
-        shift = shift + rotate(orientations.q[upper], used - nominal[upper, lower][0])
+        shift = shift + rotate(turned[upper], used - nominal[upper, lower][0])
         moved[upper] = place[upper] + shift
     return moved
 

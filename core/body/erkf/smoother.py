@@ -10,6 +10,7 @@ memory (docs/science/erkf.md, "Smoother").
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -19,6 +20,7 @@ from core.body.erkf.kernel import filter_segments, row_length
 from core.body.erkf.params import ErkfParams
 from core.body.tree import ImuTree
 from core.errors import ParameterError
+from core.memory import make_pages
 
 SEGMENT = 128
 """Samples per segment, at least: 21 MB of kept states for ten minutes of seven sensors, and a record of 8 MB.
@@ -28,12 +30,17 @@ AT_ONCE: Final = 1 << 12
 """Samples, about, that are laid side by side for the filter: 1.4 MB of seven sensors."""
 
 
+def do_nothing() -> None:
+    """What is done after the filter where nothing is."""
+
+
 def smooth(
     state: ErkfState,
     inputs: ErkfInputs | TakeInputs,
     tree: ImuTree,
     params: ErkfParams,
     segment: int | None = None,
+    filtered: Callable[[], None] = do_nothing,
 ) -> tuple[ErkfTrack, ErkfState]:
     """Filter a whole recording and smooth it.
 
@@ -41,6 +48,8 @@ def smooth(
     ----------
     segment : samples between the states that are kept, ≥ 2; changes memory, and the result by rounding only.
         None = 128, and for takes above eleven minutes what keeps states and record small together.
+    filtered : called once the filter has come to the end, before anything of the size of the take is made:
+        what follows raises nothing.
 
     Returns
     -------
@@ -58,25 +67,29 @@ def smooth(
     if segment < 2:
         raise ParameterError("segment_range", f"Segments of {segment} samples; at least 2.")
     whole, N = -(-T // segment), n * params.states
-    kept = np.empty((whole, row_length(n, N)))
     at_once = max(1, AT_ONCE // segment)
     blocks = [(first, min(first + at_once, whole)) for first in range(0, whole, at_once)]
     record, lam, final = tuple(new_record(tree, params, 1)), np.zeros(N), state
+    kept = []
     for first, past in blocks:
         run = prepare_run(final, inputs.part(first * segment, past * segment), tree, params, segment)
-        rows = kept[first:past]
-        broke = filter_segments(*run.arguments(), record, tuple(run.output), rows, segment, False, lam)
+        # each block's go while the smoothed states grow
+        kept.append(make_pages(past - first, row_length(n, N)))
+        broke = filter_segments(*run.arguments(), record, tuple(run.output), kept[-1], segment, False, lam)
         final = run.end(broke, float(known.step_s[: first * segment].sum()))
+    filtered()
     places, turns = (tuple(np.empty((T, k)) for _ in range(n)) for k in (3, 4))
-    heading_sd, residual = np.empty((T, n)), np.empty((T, len(tree.joints)))
-    refused = np.empty((T, n), np.bool_)
+    residual, refused = np.empty((T, len(tree.joints))), np.empty((T, n), np.bool_)
+    heading_sd = np.empty((0, n))
     record = tuple(new_record(tree, params, segment))
     for first, past in reversed(blocks):
         part = slice(first * segment, past * segment)
         run = prepare_run(final, inputs.part(part.start, part.stop), tree, params, segment)
-        rows, found = kept[first:past], run.output
-        filter_segments(*run.arguments(), record, tuple(found), rows, segment, True, lam)
+        found = run.output
+        filter_segments(*run.arguments(), record, tuple(found), kept.pop(), segment, True, lam)
         for i in range(n):
             places[i][part], turns[i][part] = found.smoothed[:, i, :3], found.smoothed[:, i, 3:]
-        heading_sd[part], residual[part], refused[part] = found.heading_sd, found.residual, found.refused
+        residual[part], refused[part] = found.residual, found.refused
+        if past == whole:
+            heading_sd = found.heading_sd[-1:].copy()
     return ErkfTrack(places, turns, heading_sd, residual, refused, np.empty((0, n, 16))), final

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from core.agreement import Agreement, AgreementParams, check_agreement
-from core.agreement.exchange import LEGS, SWAPS, Swap, undo_exchange
+from core.agreement.agree import compare_sensors
+from core.agreement.exchange import LEGS, SWAPS, Swap, find_exchange, undo_exchange
 from core.agreement.params import ExchangeParams
 from core.recording import UniformRecording
 from tests.walks import only, simulated
@@ -88,3 +89,30 @@ def test_people_who_stand_have_no_exchange() -> None:
     assert found.recording.notices == ()
     assert found.exchange is not None
     assert found.exchange.swap == ()
+
+
+def test_terms_are_kept_as_long_as_labels_are_judged_and_judge_the_same() -> None:
+    params = AgreementParams()
+    short = replace(params.exchange, over_s=8.0)
+    joints, terms = compare_sensors(walk(), params.joints)
+    same, kept = compare_sensors(walk(), params.joints, over_s=8.0)
+    assert list(kept) == list(terms)
+    for a, b in zip(joints, same, strict=True):
+        np.testing.assert_array_equal(a.places, b.places)
+    for s, x in terms.items():
+        assert x.is_whole
+        assert not kept[s].is_whole
+        np.testing.assert_array_equal(kept[s].M, x.M[: len(kept[s].M)])
+    rate = walk().rate_hz
+    assert find_exchange(kept, same, rate, params.joints, short) == find_exchange(
+        terms, joints, rate, params.joints, short
+    )
+
+
+def test_exchanged_sensors_of_a_long_walk_are_compared_anew() -> None:
+    """Longer than their labels are judged on, so that no terms of the whole are left."""
+    swap: Swap = (("thigh_l", "thigh_r"),)
+    params = AgreementParams(exchange=ExchangeParams(over_s=8.0))
+    found = check_agreement(wrong(swap), params)
+    assert pairs(found) == {frozenset(swap[0])}
+    assert found.misfits == check_agreement(wrong(swap)).misfits == check_agreement(walk(), params).misfits

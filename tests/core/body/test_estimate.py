@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import replace
 from functools import cache
 
@@ -19,6 +20,7 @@ from core.body.tree import PRESETS
 from core.errors import EstimationError
 from core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
 from core.fusion.mahony import estimate_orientations
+from core.fusion.orientations import LastReading
 from core.recording import UniformRecording
 from core.simulate import WalkTruth
 from tests.walks import only, simulated
@@ -194,6 +196,33 @@ def test_without_an_answer_of_the_joints_the_next_estimator_is_used() -> None:
     assert made.poses.reduced == "estimator_failed"
     assert made.poses.method == "l7s_3i"
     assert "erkf cannot estimate this take" in made.poses.notices[0].message
+
+
+def handed_on(sensors: MountedSensors) -> tuple[MountedSensors, dict[Segment, weakref.ref[Floats]]]:
+    """The same with orientations for their last reader, and who of them is still there."""
+    passed = LastReading({s: q.copy() for s, q in sensors.orientations.q.items()})
+    watched = {s: weakref.ref(q) for s, q in passed.items()}
+    return replace(sensors, orientations=replace(sensors.orientations, q=passed)), watched
+
+
+def test_the_erkf_lets_go_of_orientations_that_nobody_else_reads_and_finds_the_same() -> None:
+    sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
+    handed, watched = handed_on(sensors)
+    made, whole = (estimate_poses(x, {}, PoseParams()) for x in (handed, sensors))
+    assert [s for s, there in watched.items() if there() is not None] == []
+    assert list(made.orientations.q) == list(whole.orientations.q)
+    for s, q in whole.orientations.q.items():
+        np.testing.assert_array_equal(made.orientations.q[s], q)
+    for s, p in whole.poses.p.items():
+        np.testing.assert_array_equal(made.poses.p[s], p)
+
+
+def test_where_the_erkf_fails_the_next_estimator_still_reads_the_orientations() -> None:
+    sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
+    handed, watched = handed_on(replace(sensors, failure=EstimationError("filter_diverged", "It diverged.")))
+    made = estimate_poses(handed, {}, PoseParams())
+    assert made.poses.method == "l7s_3i"
+    assert all(there() is not None for there in watched.values())
 
 
 def test_only_where_the_erkf_runs_forward_axes_are_turned_by_the_joints() -> None:

@@ -17,7 +17,7 @@ from core.fusion.orientations import Orientations
 from core.norms import adult_kinematics
 from core.parameters import cycle_curves, foot_pitch, gait_parameters, mean_curve, summarise_angles
 from core.parameters.catalogue import list_curve_figures
-from core.parameters.kinematic import per_stride_figures, stride_figures
+from core.parameters.kinematic import measure_curves, per_stride_figures, stride_figures
 from core.parameters.result import CycleCurves
 from tests.core.events.foot_signal import orientations
 from tests.data import data_folder
@@ -246,3 +246,25 @@ def test_the_simulated_pelvis_rotates_as_the_norm_it_was_made_from() -> None:
         rows = np.degrees(curves.curves["pelvis_rotation"][side])
         shape = np.median(rows, axis=0) - (norm - norm.mean())
         assert np.sqrt(np.mean(shape**2)) < 1.0, side
+
+
+def test_figures_of_half_the_curves_at_a_time_are_those_of_all() -> None:
+    # a knee that bends the wrong way in some strides, and an angle that was withheld
+    knee = wave() * np.where(T > 6.0, 1.5, SIZE)
+    take = replace(
+        angles(knee_flexion_r=knee, hip_flexion_r=wave(), hip_flexion_l=wave(), pelvis_tilt=wave()),
+        withheld={"ankle_flexion_r": "estimator_bad"},
+        bounds={"knee_flexion_r": 0.1},
+    )
+    curves = cycle_curves(take, strides())
+    known, figures = measure_curves(take, strides())
+    expected = stride_figures(curves)
+    assert [(name, *x) for name, x in figures.items()] == [(name, *x) for name, x in expected.items()]
+    for name, sides in expected.items():
+        for side, values in sides.items():
+            np.testing.assert_array_equal(figures[name][side], values)
+    assert (known.curves, known.why, known.bounds) == ({}, curves.why, curves.bounds)
+    assert summarise_angles(known, figures) == summarise_angles(curves)
+    some = cycle_curves(take, strides(), ("hip_flexion",))
+    assert set(some.curves) == {"hip_flexion"}
+    np.testing.assert_array_equal(some.curves["hip_flexion"]["left"], curves.curves["hip_flexion"]["left"])

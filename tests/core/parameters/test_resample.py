@@ -49,3 +49,13 @@ def test_crossings_are_told_first_and_last_and_upwards_only() -> None:
     pieces = np.stack((twice, never, down, x - 0.333))
     assert first_crossing(pieces) == pytest.approx([0.125, np.nan, np.nan, 0.333], nan_ok=True)
     assert last_crossing(pieces) == pytest.approx([0.625, np.nan, np.nan, 0.333], nan_ok=True)
+
+
+def test_many_pieces_are_those_of_few() -> None:
+    t = np.arange(5000) / 100.0
+    signal = np.sin(t) + np.where(t > 40.0, np.nan, 0.0)
+    start = np.linspace(0.0, 45.0, 700)
+    bounds = np.stack((start, start + 1.1), axis=1)
+    (whole,) = resample([signal], t, bounds)
+    parts = [resample([signal], t, bounds[i : i + 100])[0] for i in range(0, 700, 100)]
+    np.testing.assert_array_equal(whole, np.concatenate(parts))

@@ -83,3 +83,10 @@ def test_strides_of_a_pelvis() -> None:
     torn = up.copy()
     torn[::50] = np.nan
     assert stride_smoothness(strides, t, {"pelvis": torn}).reason == "gap"
+
+
+def test_many_strides_are_measured_as_few() -> None:
+    pieces = np.abs(np.random.default_rng(2).normal(size=(600, 128))).cumsum(axis=1)
+    step = np.full(600, 0.01)
+    parts = [spectral_arc_length(pieces[i : i + 50], step[i : i + 50]) for i in range(0, 600, 50)]
+    np.testing.assert_array_equal(spectral_arc_length(pieces, step), np.concatenate(parts))

@@ -22,6 +22,7 @@ from core.body.erkf.updates import (
     velocity_rows,
 )
 from core.body.tree import ImuTree
+from core.errors import EstimationError
 from core.frames import Floats
 from core.rotation import exp, log, multiply, normalise, to_matrix
 from tests.core.body.erkf.walks import (
@@ -218,6 +219,20 @@ def test_the_smoother_gives_the_same_for_any_segment() -> None:
         for name in ("p", "q", "heading_sd", "joint_residual"):
             a, b = getattr(one, name), getattr(other, name)
             np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-10, err_msg=f"{segment} {name}")
+
+
+def test_the_smoother_says_when_the_filter_is_through_and_not_before_it_broke() -> None:
+    take, said = mixed_walk(), []
+    inputs = take.inputs.part(400, 700)
+    smooth(
+        start_state(take.tree, inputs, OFFLINE), inputs, take.tree, OFFLINE, filtered=lambda: said.append(1)
+    )
+    assert said == [1]
+    first = start_state(take.tree, inputs, OFFLINE)
+    broken = replace(first, P=-first.P)
+    with pytest.raises(EstimationError, match="positive definite"):
+        smooth(broken, inputs, take.tree, OFFLINE, filtered=lambda: said.append(2))
+    assert said == [1]
 
 
 def test_the_smoother_equals_the_best_estimate_on_a_linear_problem() -> None:
