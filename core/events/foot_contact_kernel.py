@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 
 from core.events.foot_pitch_kernel import foot_pitch_kernel
+from core.inner import inner_njit
 
 TC: Final = 0
 IC: Final = 1
@@ -75,7 +76,7 @@ class ContactRule(NamedTuple):
     least: int
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _read_rule(x):  # type: ignore[no-untyped-def]
     """The rule in an array (27,): a tuple would take longer to hand over than the block to go through."""
     return ContactRule(
@@ -85,14 +86,14 @@ def _read_rule(x):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _rate(pitch, j, rate_hz):  # type: ignore[no-untyped-def]
     """Pitch rate between samples j and j + 1, rad/s."""
     size = pitch.shape[0]
     return (pitch[(j + 1) % size] - pitch[j % size]) * rate_hz
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _knock(acc, j, apart):  # type: ignore[no-untyped-def]
     """Change of the acceleration over the `apart` samples before j, m/s²."""
     size = acc.shape[0]
@@ -100,7 +101,7 @@ def _knock(acc, j, apart):  # type: ignore[no-untyped-def]
     return sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _deepest(pitch, rate_hz, first, last):  # type: ignore[no-untyped-def]
     """Place j and value of the least pitch rate between samples first and last + 1."""
     place, least = first, _rate(pitch, first, rate_hz)
@@ -111,7 +112,7 @@ def _deepest(pitch, rate_hz, first, last):  # type: ignore[no-untyped-def]
     return place, least
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _highest(pitch, first, last):  # type: ignore[no-untyped-def]
     """Sample of the highest pitch among first … last."""
     size = pitch.shape[0]
@@ -122,7 +123,7 @@ def _highest(pitch, first, last):  # type: ignore[no-untyped-def]
     return place
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _lowest(pitch, first, last):  # type: ignore[no-untyped-def]
     """Sample of the lowest pitch among first … last."""
     size = pitch.shape[0]
@@ -133,7 +134,7 @@ def _lowest(pitch, first, last):  # type: ignore[no-untyped-def]
     return place
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _landing(pitch, acc, top, first, last, moves, rate_hz, rule):  # type: ignore[no-untyped-def]
     """Sample and uncertainty (s) of a contact whose highest pitch is at `top`, from samples first … last.
 
@@ -189,7 +190,7 @@ def _landing(pitch, acc, top, first, last, moves, rate_hz, rule):  # type: ignor
     return j + 0.5 + (level - here) / min(after - here, -1e-9), rule.flat_sd_s
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _leaving(pitch, bottom, first, rate_hz, rule):  # type: ignore[no-untyped-def]
     """Sample and uncertainty (s) of a foot-off whose lowest pitch is at `bottom`, from samples first …
 
@@ -215,7 +216,7 @@ def _leaving(pitch, bottom, first, rate_hz, rule):  # type: ignore[no-untyped-de
     return at, sqrt(rule.leaving_sd_s**2 + 0.25 * width * width)
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _leaving_loosely(pitch, start, middle, reach, rule):  # type: ignore[no-untyped-def]
     """Sample of the lowest pitch, foot-off and its uncertainty (s) of a movement from `start` on."""
     size = pitch.shape[0]
@@ -230,7 +231,7 @@ def _leaving_loosely(pitch, start, middle, reach, rule):  # type: ignore[no-unty
     return bottom, at, max(sd, rule.loose_sd_s)
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _tell(found_int, found_float, total, kind, number, known, last, at, sd):  # type: ignore[no-untyped-def]
     """Write one report; returns how many there are."""
     found_int[total, 0], found_int[total, 1] = kind, number
@@ -239,7 +240,7 @@ def _tell(found_int, found_float, total, kind, number, known, last, at, sd):  # 
     return total + 1
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _tell_held(found_int, found_float, total, counters, sums, k):  # type: ignore[no-untyped-def]
     """Report the swing without pitch that is held; returns how many reports there are."""
     for kind, place in ((TC, HELD_TC), (IC, HELD_IC)):
@@ -250,7 +251,7 @@ def _tell_held(found_int, found_float, total, counters, sums, k):  # type: ignor
     return total
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule):  # type: ignore[no-untyped-def]
     """Tell the last foot-off again where a contact at `at` is too near; returns how many reports there are.
 
@@ -264,14 +265,14 @@ def _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach
     return _tell(found_int, found_float, total, TC, counters[LEFT], k, 1, off, sd)
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _begin_movement(counters, sums, k, told):  # type: ignore[no-untyped-def]
     """A movement of the foot begins at sample k."""
     counters[START], counters[TOP], counters[TOLD] = k, k, told
     sums[:OFFSET] = 0.0
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _add_way(sums, q, acc, rate_hz):  # type: ignore[no-untyped-def]
     """Add one sample to the horizontal velocity and way of a movement; gravity has no part in them."""
     w, x, y, z = q
@@ -284,7 +285,7 @@ def _add_way(sums, q, acc, rate_hz):  # type: ignore[no-untyped-def]
     sums[WAY + 1] += sums[SPEED + 1] / rate_hz
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _leads_far(sums, samples, end, start, rate_hz, rule):  # type: ignore[no-untyped-def]
     """Whether a movement from rest to rest over `samples` is a swing: fast, long, and away from its place."""
     half = 0.5 * samples / rate_hz
@@ -293,7 +294,7 @@ def _leads_far(sums, samples, end, start, rate_hz, rule):  # type: ignore[no-unt
     return long and sums[FASTEST] >= rule.swing_rad_s and sqrt(a * a + b * b) >= rule.step_m
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _lands_between(pitch, counters, k, rate_hz, rule):  # type: ignore[no-untyped-def]
     """Whether the highest pitch of the movement, a slap's length ago, was a landing."""
     start, top, size = counters[START], counters[TOP], pitch.shape[0]
