@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import numba
 
-F = TypeVar("F", bound=Callable[..., Any])
 
-
-def inner_njit(**options: bool) -> Callable[[F], F]:
+def inner_njit(**options: bool) -> Callable[[Callable[..., Any]], Any]:
     """A decorator like `numba.njit` without what Python and C would call the function by.
 
     That is a tenth of the time that the ErKF takes to compile. Python that calls such a function all the same
@@ -20,7 +18,7 @@ def inner_njit(**options: bool) -> Callable[[F], F]:
     ----------
     options : of `numba.njit`, besides those of all our loops.
     """
-    made: Callable[[F], F] = numba.njit(
+    made: Callable[[Callable[..., Any]], Any] = numba.njit(
         cache=True, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options
     )
     return made

@@ -11,8 +11,11 @@ from numba import njit
 from core.events.foot_pitch_kernel import foot_pitch_kernel
 from core.inner import inner_njit
 
-TC: Final = 0
-IC: Final = 1
+# not plain numbers: for each of those all that takes it would be compiled once more
+TC: Final = np.int64(0)
+IC: Final = np.int64(1)
+NO: Final = np.int64(0)
+YES: Final = np.int64(1)
 NONE: Final = -(1 << 40)
 
 # places in `counters`
@@ -245,7 +248,7 @@ def _tell_held(found_int, found_float, total, counters, sums, k):  # type: ignor
     """Report the swing without pitch that is held; returns how many reports there are."""
     for kind, place in ((TC, HELD_TC), (IC, HELD_IC)):
         at, sd, number = sums[place], sums[place + 1], counters[NUMBER]
-        total = _tell(found_int, found_float, total, kind, number, k, 1, at, sd)
+        total = _tell(found_int, found_float, total, kind, number, k, YES, at, sd)
         counters[NUMBER] = number + 1
     counters[HELD] = NONE
     return total
@@ -262,7 +265,7 @@ def _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach
         return total
     middle = start + (int(left) - start) // 2
     _, off, sd = _leaving_loosely(pitch, start, middle, reach, rule)
-    return _tell(found_int, found_float, total, TC, counters[LEFT], k, 1, off, sd)
+    return _tell(found_int, found_float, total, TC, counters[LEFT], k, YES, off, sd)
 
 
 @inner_njit()
@@ -324,7 +327,7 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
     rate_hz = rule.rate_hz
     kind, index, known = np.empty(2, np.int64), np.empty(2, np.int64), np.empty(2, np.int64)
     offset, s = np.empty(2), np.empty(1)
-    total = 0
+    total = np.int64(0)
     for i in range(q.shape[0]):
         k = counters[SEEN]
         counters[SEEN] = k + 1
@@ -349,10 +352,10 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
                     found_int, found_float, total, pitch, counters, sums, k, reach, at, rule
                 )
             number = counters[OPEN_NUMBER]
-            total = _tell(found_int, found_float, total, IC, number, k, 1, at, sd)
+            total = _tell(found_int, found_float, total, IC, number, k, YES, at, sd)
             counters[OPEN_TOP] = -1
             # the foot is on the floor: what moves from here on is another movement
-            _begin_movement(counters, sums, k, 0)
+            _begin_movement(counters, sums, k, NO)
         n = foot_pitch_kernel(
             s, valid[i : i + 1], pitch_ring, pitch_counters, pitch_held,
             window, need, threshold, fall, kind, index, known, offset,
@@ -376,12 +379,12 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
                 if at != at:
                     at = index[e] + offset[e] - rule.lag_s * rate_hz
                 counters[BOTTOM], counters[LEFT], sums[LEFT_AT] = index[e], number, at
-                total = _tell(found_int, found_float, total, TC, number, k, 1, at, sd)
+                total = _tell(found_int, found_float, total, TC, number, k, YES, at, sd)
             else:
                 at = index[e] + offset[e] + rule.lead_s * rate_hz
                 counters[OPEN_TOP], counters[OPEN_KNOWN], counters[OPEN_NUMBER] = index[e], k, number
                 sums[OFFSET] = offset[e]
-                total = _tell(found_int, found_float, total, IC, number, k, 0, at, rule.late_sd_s)
+                total = _tell(found_int, found_float, total, IC, number, k, NO, at, rule.late_sd_s)
         if not moves:
             continue
         if speed[i] < rule.still_rad_s:
@@ -391,7 +394,7 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             if counters[MOVING] == 0:
                 counters[MOVING] = 1
                 # where the take begins in a movement, it is not known where that began
-                _begin_movement(counters, sums, k, 1 if n > 0 or counters[MEASURED] < rule.quiet else 0)
+                _begin_movement(counters, sums, k, YES if n > 0 or counters[MEASURED] < rule.quiet else NO)
         if counters[MOVING] == 0:
             continue
         _add_way(sums, q[i], acc[i], rate_hz)
@@ -423,7 +426,7 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
         sd = max(sd, rule.loose_sd_s)
         if swinging:
             total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule)
-            total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, 1, at, sd)
+            total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, YES, at, sd)
             counters[NUMBER] += 1
         else:
             sums[HELD_IC], sums[HELD_IC + 1] = at, sd
@@ -431,5 +434,5 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
                 total = _tell_held(found_int, found_float, total, counters, sums, k)
         # the pitch rule need not wait for a maximum any more
         pitch_counters[2], pitch_counters[4], pitch_counters[5] = 0, k, -1
-        _begin_movement(counters, sums, k, 0)
+        _begin_movement(counters, sums, k, NO)
     return total
