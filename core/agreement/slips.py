@@ -397,7 +397,8 @@ def question_strides(
 def compile_agreement_kernels() -> None:
     """Compile the kernels or load them, so that the first recording does not wait for them."""
     n = 1000
-    wave = np.random.default_rng(0).normal(size=(2, n, 3))
+    # single precision, as sensors give it: then arrays are of the kind that takes have
+    wave = np.random.default_rng(0).normal(size=(2, n, 3)).astype(np.float32).astype(np.float64)
     still = SensorSignals("", wave[0], wave[1], None, np.ones(n, np.bool_), np.zeros(n, np.bool_))
     terms = find_terms(still, 100.0, JointParams())
     _ = terms.motion.level

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from core.agreement.params import JointParams
 from core.agreement.terms import TERMS, SensorTerms, TermsPart
 from core.frames import Bools, Floats, Segment
+from core.inner import inner_njit
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +205,7 @@ def _sum_products(A, B, ok_a, ok_b, chunk, widest, ok, AA, BB, AB):  # type: ign
                         AB[c, k, 2, i, j] += a2 * b2
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@inner_njit()
 def _solve_six(N, h):  # type: ignore[no-untyped-def]
     """Overwrite h (6,) with N⁻¹ h by Cholesky; N (6, 6) positive definite is overwritten."""
     for j in range(6):
@@ -224,7 +225,7 @@ def _solve_six(N, h):  # type: ignore[no-untyped-def]
         h[i] /= N[i, i]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@inner_njit()
 def _fit_places(AA, BB, AB, ridge, turn, N, r):  # type: ignore[no-untyped-def]
     """Places r (6,) and turn of one window at one lag, from a first turn; returns misfit² and turn."""
     cost = 1e300

@@ -122,6 +122,12 @@ class AngleKernel:
         return out
 
 
+def compile_angle_kernel() -> None:
+    """Compile the kernel or load it, so that the first take does not wait for it."""
+    q = np.tile([1.0, 0.0, 0.0, 0.0], (1, 2, 1))
+    AngleKernel.between(("pelvis", "thigh_l")).measure(q, np.ones((1, 2), np.bool_))
+
+
 def mean_angles(angles: Floats) -> Floats:
     """Circular mean (k,) in rad of angles (T, k) over their finite samples; 0 where there is none."""
     finite = np.where(np.isfinite(angles), angles, 0.0)

@@ -9,9 +9,13 @@ import numpy as np
 from numba import njit
 
 from core.events.foot_pitch_kernel import foot_pitch_kernel
+from core.inner import inner_njit
 
-TC: Final = 0
-IC: Final = 1
+# not plain numbers: for each of those all that takes it would be compiled once more
+TC: Final = np.int64(0)
+IC: Final = np.int64(1)
+NO: Final = np.int64(0)
+YES: Final = np.int64(1)
 NONE: Final = -(1 << 40)
 
 # places in `counters`
@@ -75,7 +79,7 @@ class ContactRule(NamedTuple):
     least: int
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _read_rule(x):  # type: ignore[no-untyped-def]
     """The rule in an array (27,): a tuple would take longer to hand over than the block to go through."""
     return ContactRule(
@@ -85,14 +89,14 @@ def _read_rule(x):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _rate(pitch, j, rate_hz):  # type: ignore[no-untyped-def]
     """Pitch rate between samples j and j + 1, rad/s."""
     size = pitch.shape[0]
     return (pitch[(j + 1) % size] - pitch[j % size]) * rate_hz
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _knock(acc, j, apart):  # type: ignore[no-untyped-def]
     """Change of the acceleration over the `apart` samples before j, m/s²."""
     size = acc.shape[0]
@@ -100,7 +104,7 @@ def _knock(acc, j, apart):  # type: ignore[no-untyped-def]
     return sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _deepest(pitch, rate_hz, first, last):  # type: ignore[no-untyped-def]
     """Place j and value of the least pitch rate between samples first and last + 1."""
     place, least = first, _rate(pitch, first, rate_hz)
@@ -111,7 +115,7 @@ def _deepest(pitch, rate_hz, first, last):  # type: ignore[no-untyped-def]
     return place, least
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _highest(pitch, first, last):  # type: ignore[no-untyped-def]
     """Sample of the highest pitch among first … last."""
     size = pitch.shape[0]
@@ -122,7 +126,7 @@ def _highest(pitch, first, last):  # type: ignore[no-untyped-def]
     return place
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _lowest(pitch, first, last):  # type: ignore[no-untyped-def]
     """Sample of the lowest pitch among first … last."""
     size = pitch.shape[0]
@@ -133,7 +137,7 @@ def _lowest(pitch, first, last):  # type: ignore[no-untyped-def]
     return place
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _landing(pitch, acc, top, first, last, moves, rate_hz, rule):  # type: ignore[no-untyped-def]
     """Sample and uncertainty (s) of a contact whose highest pitch is at `top`, from samples first … last.
 
@@ -189,7 +193,7 @@ def _landing(pitch, acc, top, first, last, moves, rate_hz, rule):  # type: ignor
     return j + 0.5 + (level - here) / min(after - here, -1e-9), rule.flat_sd_s
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _leaving(pitch, bottom, first, rate_hz, rule):  # type: ignore[no-untyped-def]
     """Sample and uncertainty (s) of a foot-off whose lowest pitch is at `bottom`, from samples first …
 
@@ -215,7 +219,7 @@ def _leaving(pitch, bottom, first, rate_hz, rule):  # type: ignore[no-untyped-de
     return at, sqrt(rule.leaving_sd_s**2 + 0.25 * width * width)
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _leaving_loosely(pitch, start, middle, reach, rule):  # type: ignore[no-untyped-def]
     """Sample of the lowest pitch, foot-off and its uncertainty (s) of a movement from `start` on."""
     size = pitch.shape[0]
@@ -230,7 +234,7 @@ def _leaving_loosely(pitch, start, middle, reach, rule):  # type: ignore[no-unty
     return bottom, at, max(sd, rule.loose_sd_s)
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _tell(found_int, found_float, total, kind, number, known, last, at, sd):  # type: ignore[no-untyped-def]
     """Write one report; returns how many there are."""
     found_int[total, 0], found_int[total, 1] = kind, number
@@ -239,18 +243,18 @@ def _tell(found_int, found_float, total, kind, number, known, last, at, sd):  # 
     return total + 1
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _tell_held(found_int, found_float, total, counters, sums, k):  # type: ignore[no-untyped-def]
     """Report the swing without pitch that is held; returns how many reports there are."""
     for kind, place in ((TC, HELD_TC), (IC, HELD_IC)):
         at, sd, number = sums[place], sums[place + 1], counters[NUMBER]
-        total = _tell(found_int, found_float, total, kind, number, k, 1, at, sd)
+        total = _tell(found_int, found_float, total, kind, number, k, YES, at, sd)
         counters[NUMBER] = number + 1
     counters[HELD] = NONE
     return total
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule):  # type: ignore[no-untyped-def]
     """Tell the last foot-off again where a contact at `at` is too near; returns how many reports there are.
 
@@ -261,17 +265,17 @@ def _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach
         return total
     middle = start + (int(left) - start) // 2
     _, off, sd = _leaving_loosely(pitch, start, middle, reach, rule)
-    return _tell(found_int, found_float, total, TC, counters[LEFT], k, 1, off, sd)
+    return _tell(found_int, found_float, total, TC, counters[LEFT], k, YES, off, sd)
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _begin_movement(counters, sums, k, told):  # type: ignore[no-untyped-def]
     """A movement of the foot begins at sample k."""
     counters[START], counters[TOP], counters[TOLD] = k, k, told
     sums[:OFFSET] = 0.0
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _add_way(sums, q, acc, rate_hz):  # type: ignore[no-untyped-def]
     """Add one sample to the horizontal velocity and way of a movement; gravity has no part in them."""
     w, x, y, z = q
@@ -284,7 +288,7 @@ def _add_way(sums, q, acc, rate_hz):  # type: ignore[no-untyped-def]
     sums[WAY + 1] += sums[SPEED + 1] / rate_hz
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _leads_far(sums, samples, end, start, rate_hz, rule):  # type: ignore[no-untyped-def]
     """Whether a movement from rest to rest over `samples` is a swing: fast, long, and away from its place."""
     half = 0.5 * samples / rate_hz
@@ -293,7 +297,7 @@ def _leads_far(sums, samples, end, start, rate_hz, rule):  # type: ignore[no-unt
     return long and sums[FASTEST] >= rule.swing_rad_s and sqrt(a * a + b * b) >= rule.step_m
 
 
-@njit(cache=True, nogil=True)
+@inner_njit()
 def _lands_between(pitch, counters, k, rate_hz, rule):  # type: ignore[no-untyped-def]
     """Whether the highest pitch of the movement, a slap's length ago, was a landing."""
     start, top, size = counters[START], counters[TOP], pitch.shape[0]
@@ -323,7 +327,7 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
     rate_hz = rule.rate_hz
     kind, index, known = np.empty(2, np.int64), np.empty(2, np.int64), np.empty(2, np.int64)
     offset, s = np.empty(2), np.empty(1)
-    total = 0
+    total = np.int64(0)
     for i in range(q.shape[0]):
         k = counters[SEEN]
         counters[SEEN] = k + 1
@@ -348,10 +352,10 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
                     found_int, found_float, total, pitch, counters, sums, k, reach, at, rule
                 )
             number = counters[OPEN_NUMBER]
-            total = _tell(found_int, found_float, total, IC, number, k, 1, at, sd)
+            total = _tell(found_int, found_float, total, IC, number, k, YES, at, sd)
             counters[OPEN_TOP] = -1
             # the foot is on the floor: what moves from here on is another movement
-            _begin_movement(counters, sums, k, 0)
+            _begin_movement(counters, sums, k, NO)
         n = foot_pitch_kernel(
             s, valid[i : i + 1], pitch_ring, pitch_counters, pitch_held,
             window, need, threshold, fall, kind, index, known, offset,
@@ -375,12 +379,12 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
                 if at != at:
                     at = index[e] + offset[e] - rule.lag_s * rate_hz
                 counters[BOTTOM], counters[LEFT], sums[LEFT_AT] = index[e], number, at
-                total = _tell(found_int, found_float, total, TC, number, k, 1, at, sd)
+                total = _tell(found_int, found_float, total, TC, number, k, YES, at, sd)
             else:
                 at = index[e] + offset[e] + rule.lead_s * rate_hz
                 counters[OPEN_TOP], counters[OPEN_KNOWN], counters[OPEN_NUMBER] = index[e], k, number
                 sums[OFFSET] = offset[e]
-                total = _tell(found_int, found_float, total, IC, number, k, 0, at, rule.late_sd_s)
+                total = _tell(found_int, found_float, total, IC, number, k, NO, at, rule.late_sd_s)
         if not moves:
             continue
         if speed[i] < rule.still_rad_s:
@@ -390,7 +394,7 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             if counters[MOVING] == 0:
                 counters[MOVING] = 1
                 # where the take begins in a movement, it is not known where that began
-                _begin_movement(counters, sums, k, 1 if n > 0 or counters[MEASURED] < rule.quiet else 0)
+                _begin_movement(counters, sums, k, YES if n > 0 or counters[MEASURED] < rule.quiet else NO)
         if counters[MOVING] == 0:
             continue
         _add_way(sums, q[i], acc[i], rate_hz)
@@ -422,7 +426,7 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
         sd = max(sd, rule.loose_sd_s)
         if swinging:
             total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule)
-            total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, 1, at, sd)
+            total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, YES, at, sd)
             counters[NUMBER] += 1
         else:
             sums[HELD_IC], sums[HELD_IC + 1] = at, sd
@@ -430,5 +434,5 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
                 total = _tell_held(found_int, found_float, total, counters, sums, k)
         # the pitch rule need not wait for a maximum any more
         pitch_counters[2], pitch_counters[4], pitch_counters[5] = 0, k, -1
-        _begin_movement(counters, sums, k, 0)
+        _begin_movement(counters, sums, k, NO)
     return total

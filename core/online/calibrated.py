@@ -26,7 +26,7 @@ from core.fusion.attitude import compile_attitude_kernel
 from core.fusion.mahony import MahonyParams, estimate_orientations
 from core.fusion.orientations import Orientations
 from core.online.frame import SegmentCheck
-from core.peaks import find_peaks
+from core.peaks import compile_peak_kernel
 from core.recording import UniformRecording
 
 
@@ -144,7 +144,7 @@ def compile_calibration_kernels() -> None:
     """Load and compile all that a calibration needs, so that the first one does not take a second longer."""
     import scipy.ndimage  # noqa: F401
 
-    # the kernels of filter and peaks
-    find_peaks(low_pass(np.arange(9.0), 1.0, 100.0), height=0.0, distance=1.0, prominence=0.0)
+    low_pass(np.arange(9.0), 1.0, 100.0)
+    compile_peak_kernel()
     compile_attitude_kernel()
     compile_pose_kernels()

@@ -12,6 +12,7 @@ import numba
 import numpy as np
 
 from core.frames import Floats
+from core.inner import inner_njit
 
 SMALL = 1e-8
 """Below this angle in rad the series of one term replaces the sine."""
@@ -144,7 +145,7 @@ def multiply3(a: Floats, b: Floats, out: Floats) -> None:
             out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def sine_quotients(square):  # type: ignore[no-untyped-def]
     """sin θ / θ, (1 − cos θ) / θ² and (θ − sin θ) / θ³ of an angle θ given as its square."""
     if square < SERIES * SERIES:

@@ -135,9 +135,10 @@ def follow(line: Channel) -> None:
 def compile_kernels() -> None:
     """Compile the kernels or load them from the cache, before a patient stands there."""
     from core.online import compile_live_kernels
-    from server.processes.compiling import compile_filters_once
+    from server.processes.compiling import OFFLINE, compile_filters_once
 
-    compile_filters_once()
+    # what a walk needs first: workers analyse while the rest is compiled here
+    compile_filters_once(OFFLINE)
     compile_live_kernels()
 
 

@@ -108,13 +108,14 @@ def _warm() -> None:
     from core.body import estimate
     from core.events import foot_contact
     from core.fusion import attitude
-    from server.processes.compiling import compile_filters_once
+    from server.processes.compiling import OFFLINE, compile_filters_once
 
-    compile_filters_once()
+    # a first walk waits for no filter of few sensors or of live takes: the live estimator compiles those
+    compile_filters_once(OFFLINE)
     attitude.compile_attitude_kernel()
     compile_agreement_kernels()
     foot_contact.compile_foot_contact_kernel()
-    estimate.compile_pose_kernels()
+    estimate.compile_erkf_kernels()
 
 
 register(Task(recordings.INSPECT, _inspect, _publish_inspection, keeps_files=False))

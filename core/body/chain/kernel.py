@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.frames import GRAVITY, Bools, Floats
+from core.inner import inner_njit
 from core.rotation.compiled import cross, exp_so3, multiply3, transform
 
 LOST_TURN = 2.0
@@ -69,7 +70,7 @@ def make_scratch(n):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@inner_njit()
 def accelerate(w, al, v, out, work):  # type: ignore[no-untyped-def]
     """Add α × v + ω × (ω × v), the acceleration of a point at v on a turning link, to out (3,)."""
     cross(al, v, work[0])
@@ -79,7 +80,7 @@ def accelerate(w, al, v, out, work):  # type: ignore[no-untyped-def]
         out[c] += work[0, c] + work[2, c]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@inner_njit()
 def differentiate_point(w, al, v, d, out, work):  # type: ignore[no-untyped-def]
     """Add the derivative of `accelerate` by one state to out (3,); d (4, 3) of turn, ω, α and a."""
     cross(d[0], v, work[0])
@@ -96,7 +97,7 @@ def differentiate_point(w, al, v, d, out, work):  # type: ignore[no-untyped-def]
         out[c] += work[1, c] + work[2, c] + work[3, c] + work[4, c]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@inner_njit()
 def pass_joint(motion, axis, offset, x, j, n, s):  # type: ignore[no-untyped-def]
     """Go from the link below a joint to the one above it, in place; x (3,) angle, rate, acceleration.
 
@@ -176,7 +177,7 @@ def climb(chain, i, x, below, motion, n, s):  # type: ignore[no-untyped-def]
         pass_joint(motion, chain.axes[j], chain.offsets[j], x[j], j - chain.first[i], n, s)
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@inner_njit()
 def predict_states(x, P, noise):  # type: ignore[no-untyped-def]
     """Constant acceleration over a step for the joints of a group: x (m, 3), P (3 m, 3 m) in place."""
     T, m = noise.step, x.shape[0]
@@ -200,7 +201,7 @@ def predict_states(x, P, noise):  # type: ignore[no-untyped-def]
                 P[3 * r + b, 3 * r + c] += noise.jerk**2 / T * g[b] * g[c]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@inner_njit()
 def lose_states(x, P, step):  # type: ignore[no-untyped-def]
     """A sample without its sensor: angles are held and become uncertain; x (m, 3), P (3 m, 3 m) in place."""
     for j in range(x.shape[0]):
@@ -235,7 +236,7 @@ def take_row(P, row, variance, innovation, s):  # type: ignore[no-untyped-def]
             P[c, r] = P[r, c]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@inner_njit()
 def correct_states(x, P, gyr, acc, bounded, noise, s):  # type: ignore[no-untyped-def]
     """Correct a group by its sensor and by the virtual one; x (m, 3), P in place; False if P broke."""
     n = P.shape[0]

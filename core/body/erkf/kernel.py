@@ -29,6 +29,7 @@ from core.body.erkf.updates import (
     velocity_rows,
 )
 from core.frames import Bools, Floats
+from core.inner import inner_njit
 from core.rotation.compiled import to_matrix, turn
 
 INVALID, CONTACT, STILL, PATCHED = 1, 2, 4, 8
@@ -145,7 +146,7 @@ class Links(NamedTuple):
     sd: Floats
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     """vᵀ S⁻¹ v ≤ gate for the zero velocity of the IMU whose errors begin at b."""
     S = P[b + 3 : b + 6, b + 3 : b + 6]
@@ -301,7 +302,7 @@ def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-unty
         copy_row(x[i], nominal[i])
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def measure_joints(x, links, scratch, residual):  # type: ignore[no-untyped-def]
     """Write how far both ends of each joint are apart (J,), m, in states x (n, 16) turned by `scratch.R`."""
     y = scratch.y
@@ -331,7 +332,7 @@ def advance(  # type: ignore[no-untyped-def]
     return good
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def keep_state(memory, row):  # type: ignore[no-untyped-def]
     """Write the state into one row (`row_length`,), of P what is on and below the diagonal."""
     x, before, P, at = memory.x, memory.before, memory.P, 0
@@ -349,7 +350,7 @@ def keep_state(memory, row):  # type: ignore[no-untyped-def]
         at += r + 2
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def restore_state(memory, row):  # type: ignore[no-untyped-def]
     """The way back of `keep_state`; above the diagonal P stays as it is."""
     x, before, P, at = memory.x, memory.before, memory.P, 0
@@ -372,7 +373,7 @@ def row_length(n: int, N: int) -> int:
     return n * (16 + 6 + 1) + N + N * (N + 1) // 2
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, no_cfunc_wrapper=True)  # type: ignore[misc, unused-ignore]
 def filter_segments(  # type: ignore[no-untyped-def]
     memory, samples, links, noise, record, output, kept, segment, smoothing, lam,
 ):  # fmt: skip
@@ -409,7 +410,7 @@ def filter_segments(  # type: ignore[no-untyped-def]
     )
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def run_segments(  # type: ignore[no-untyped-def]
     memory, samples, links, noise, record, output, kept, length, smoothing, scratch, adjoint,
 ):  # fmt: skip
@@ -454,7 +455,7 @@ def run_segments(  # type: ignore[no-untyped-def]
     return -1
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def measure_smoothed(states, links, scratch, residual):  # type: ignore[no-untyped-def]
     """Write how far the two ends of each joint are apart in states (K, n, 16), (K, J), m."""
     for k in range(states.shape[0]):

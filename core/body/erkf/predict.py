@@ -12,6 +12,7 @@ import numba
 
 from core.body.erkf.lanes import IN_LINE, mix, read_columns, read_lanes, write_columns, write_lanes
 from core.frames import GRAVITY
+from core.inner import inner_njit
 from core.rotation.compiled import (
     multiply3,
     sine_quotients,
@@ -64,7 +65,7 @@ def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-unty
             F[C, i, j] = -dt * (first * start[i, j] + last * R[i, j])
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def reset_before(F, d):  # type: ignore[no-untyped-def]
     """Fold the reset Jacobian G = 1 − ½[δθ̂]× of the last correction (eq 27) into A and S: F ← F G."""
     a, b, c = 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]

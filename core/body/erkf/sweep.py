@@ -5,21 +5,20 @@ Equations: docs/science/erkf.md, "Smoother".
 
 from __future__ import annotations
 
-import numba
-
 from core.body.erkf.predict import propagate_back, propagate_error
 from core.body.erkf.updates import back_correct
+from core.inner import inner_njit
 from core.rotation.compiled import turn
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def copy_row(source, target):  # type: ignore[no-untyped-def]
     """Write one row (k,) over another; numba compiles this in a tenth of the time of `target[:] = source`."""
     for c in range(len(target)):
         target[c] = source[c]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def sweep_back(lam, step, record, m, swept):  # type: ignore[no-untyped-def]
     """Sweep λ (N,) back over a recorded segment; `swept` (K, N): λ of each sample before its blocks."""
     for k in range(len(step) - 1, -1, -1):
@@ -29,7 +28,7 @@ def sweep_back(lam, step, record, m, swept):  # type: ignore[no-untyped-def]
         propagate_back(lam, record.F[k], m, step[k])
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def multiply_lower(P, lam, d):  # type: ignore[no-untyped-def]
     """d ← −P λ, of P only what is on and below the diagonal."""
     d[:] = 0.0
@@ -40,7 +39,7 @@ def multiply_lower(P, lam, d):  # type: ignore[no-untyped-def]
         d[r] -= P[r, r] * lam[r]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def move_smoothed(d, step, record, m, swept, out):  # type: ignore[no-untyped-def]
     """Turn a segment's filtered states `out` (K, n, 16) into smoothed ones.
 

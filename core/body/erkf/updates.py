@@ -13,6 +13,7 @@ from math import atan2, sqrt
 import numba
 
 from core.body.erkf.lanes import IN_LINE, mix, read_lanes, spread, write_lanes
+from core.inner import inner_njit
 from core.rotation.compiled import skew, times_cross, wrap_angle
 
 FIRST, SECOND, UNIT, TURNS = range(4)
@@ -23,7 +24,7 @@ POSITION, VELOCITY = 0, 3
 """Offsets in an IMU's errors."""
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def turn_apart(R, i, j, ri, rj, y):  # type: ignore[no-untyped-def]
     """Write R_j r_j − R_i r_i (3,)."""
     for k in range(3):
@@ -44,7 +45,7 @@ def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-u
             y[k] += x[j, k] - x[i, k]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
     """Variance of the joint centre's second-order term, ½ σ⁴ |r_xy|² of both levers, in m².
 
@@ -272,7 +273,7 @@ def subtract_blocks(P, V, blocks):  # type: ignore[no-untyped-def]
             write_lanes(P, r + 3, e, q3)
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@inner_njit(_nrt=False)
 def back_correct(lam, place, H, V, E):  # type: ignore[no-untyped-def]
     """λ ← λ − Hᵀ L⁻ᵀ (V λ + e): one block of the modified Bryson–Frazier smoother
     (docs/science/erkf.md, "Smoother")."""

@@ -113,6 +113,14 @@ def remove_gravity(acc: Floats, valid: Bools, q: Floats, mounted: SegmentCalibra
     return out
 
 
+def compile_gravity_kernel() -> None:
+    """Compile what `remove_gravity` calls or load it, so that the first take does not wait for it."""
+    mounted = SegmentCalibration(np.eye(3), np.zeros(3), GRAVITY, "declared", 1.0)
+    valid = np.ones(1, np.bool_)
+    valid.setflags(write=False)  # as that of a take
+    remove_gravity(np.zeros((1, 3)), valid, np.array([[1.0, 0.0, 0.0, 0.0]]), mounted)
+
+
 @dataclass(frozen=True, eq=False)
 class FreeAcceleration:
     """Acceleration of one sensor as `remove_gravity`, of the part that is asked for.

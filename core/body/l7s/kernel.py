@@ -8,6 +8,7 @@ import numpy as np
 from core.body.l7s.constraints import project
 from core.body.l7s.updates import VELOCITY, N, apply_row, inject, reset
 from core.frames import Floats
+from core.inner import inner_njit
 from core.rotation.compiled import log_so3
 
 
@@ -67,7 +68,7 @@ def predict(R, p, v, P, acc, dt, q_acc, q_turn, printed):  # type: ignore[no-unt
             P[phi + j, rho + k] -= h * omega[i]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@inner_njit()
 def _relative(a: Floats, b: Floats, out: Floats) -> None:
     """Write aᵀ b (3, 3)."""
     for i in range(3):
@@ -75,7 +76,7 @@ def _relative(a: Floats, b: Floats, out: Floats) -> None:
             out[i, j] = a[0, i] * b[0, j] + a[1, i] * b[1, j] + a[2, i] * b[2, j]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@inner_njit()
 def yaw_row(R, leg, out):  # type: ignore[no-untyped-def]
     """Write J_f (3,) = ∂θ/∂φ of a foot, θ the heading of the feet's summed z axes (eq 22–25)."""
     tx, ty = R[1, 0, 2] + R[2, 0, 2], R[1, 1, 2] + R[2, 1, 2]
@@ -87,7 +88,7 @@ def yaw_row(R, leg, out):  # type: ignore[no-untyped-def]
     out[2] = 0.0
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@inner_njit()
 def apply_measurement(R, p, v, P, measured, three, step, z_variance, heights, r, dx, work):  # type: ignore[no-untyped-def]
     """The stacked update: leaves the correction in dx and injects it (docs/science/l7s.md, "Measurements").
 

@@ -11,6 +11,7 @@ import numba
 import numpy as np
 
 from core.body.se3 import right_jacobian
+from core.inner import inner_njit
 from core.rotation.compiled import exp_so3, multiply3, orthonormalise
 
 N = 27
@@ -20,7 +21,7 @@ VELOCITY = 18
 """Where the velocities begin in it."""
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@inner_njit()
 def apply_row(P, dx, index, value, residual, variance, gain):  # type: ignore[no-untyped-def]
     """One row of the stacked update: H is `value` (k,) at `index` (k,), else 0; gain (27,) is scratch."""
     total, count = variance, len(index)
