@@ -5,8 +5,8 @@ Recording files have no more than single precision: an hour of seven sensors is 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final, Protocol, Self, TypeVar
 
 import numpy as np
@@ -18,11 +18,20 @@ Held = TypeVar("Held", bound="HoldsSamples")
 SOME_ROWS: Final = 1 << 12
 """Rows that are looked at together: the first that need double precision end the search."""
 
+AT_A_TIME: Final = 1 << 14
+"""Samples that are worked on at a time, where what is made on the way is larger than what comes of it."""
+
 
 class SampleSeries(Protocol):
     """Samples (T, …, 3) of which a part is asked for: an array, or what is computed when it is."""
 
     def __getitem__(self, part: slice, /) -> Floats: ...
+
+
+def cut_blocks(samples: int) -> Iterator[slice]:
+    """Successive parts of a take, in order; what each gives on its own is what the whole gives there."""
+    for first in range(0, samples, AT_A_TIME):
+        yield slice(first, min(first + AT_A_TIME, samples))
 
 
 class HoldsSamples:
@@ -42,6 +51,18 @@ class HoldsSamples:
         """The same with other fields; samples that stay are held once for both."""
         kept = {name: self.held(name) for name in self.sampled}
         return replace(self, **{**kept, **fields})  # type: ignore[type-var] # every class here is a dataclass
+
+
+@dataclass(frozen=True, eq=False)
+class HeldSeries:
+    """A field of samples in double precision less an offset (3,), of the part that is asked for."""
+
+    of: HoldsSamples
+    name: str
+    offset: Floats | float = 0.0
+
+    def __getitem__(self, part: slice, /) -> Floats:
+        return np.asarray(self.of.cut(self.name, part) - self.offset)
 
 
 class _HeldField:

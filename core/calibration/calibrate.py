@@ -45,6 +45,7 @@ from core.calibration.walking import (
 from core.errors import CalibrationError, Notice, SignalError
 from core.frames import R_NEUTRAL, Bools, Floats, Segment
 from core.fusion.attitude import AttitudeParams, estimate_orientation
+from core.held_samples import HeldSeries
 from core.recording import UniformRecording
 from core.rest import RestParams, Window
 from core.rotation import conjugate, from_matrix, rotate
@@ -221,9 +222,9 @@ def _rest_world(
     signals = recording.sensors[segment]
     at = round(0.5 * (zero[0] + zero[1]) * recording.rate_hz)
     q_rest = from_matrix(R_NEUTRAL @ vertical_frame(standing.up))
-    gyr = signals.gyr - standing.gyro_bias
+    gyr, acc = HeldSeries(signals, "gyr", standing.gyro_bias), HeldSeries(signals, "acc")
     return estimate_orientation(
-        q_rest, at, gyr, signals.acc, signals.valid, recording.rate_hz, standing.rest_norm, params
+        q_rest, at, gyr, acc, signals.valid, recording.rate_hz, standing.rest_norm, params
     )
 
 

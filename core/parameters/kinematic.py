@@ -6,8 +6,8 @@ The windows of the figures are those of the reference table (core/norms/data), s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -17,7 +17,7 @@ from core.events.result import Strides
 from core.frames import FOOT, SIDES, SUFFIX, Bools, Floats, Oriented, Segment, Side
 from core.parameters.catalogue import CATALOGUE, CurveFigure, list_curve_figures
 from core.parameters.plausible import IMPOSSIBLE, LEAST_KNEE
-from core.parameters.resample import resample
+from core.parameters.resample import resample, resample_in_turn
 from core.parameters.result import CycleCurves, Parameter
 from core.parameters.rows import Column, as_column
 from core.parameters.stance import foot_pitches
@@ -76,8 +76,38 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
     A stride in which the angle is not known throughout is a row of NaN; one in which a knee bends the wrong
     way as no knee can (`LEAST_KNEE`) as well.
     """
-    index = {side: tuple(i for i, s in enumerate(strides.strides) if s.side == side) for side in SIDES}
     curves: dict[str, dict[Side, Floats]] = {}
+
+    def keep(variable: str, side: Side, rows: Floats) -> None:
+        curves.setdefault(variable, {})[side] = rows
+
+    return replace(_cut_cycles(angles, strides, keep), curves=curves)
+
+
+def measure_cycles(
+    angles: JointAngles, strides: Strides
+) -> tuple[CycleCurves, dict[str, dict[Side, Floats]]]:
+    """What is known about the curves of `cycle_curves`, and `stride_figures` of them.
+
+    The curves themselves are let go of as they are read, and are not there: those of an hour are as large as
+    its signals.
+    """
+    figures, found = list_curve_figures(), dict[str, dict[Side, Floats]]()
+
+    def read(variable: str, side: Side, rows: Floats) -> None:
+        for name, figure in figures.items():
+            if figure.variable == variable:
+                found.setdefault(name, {})[side] = _read_figure(figure, rows)
+
+    known = _cut_cycles(angles, strides, read)
+    return known, {name: found[name] for name in figures if name in found}
+
+
+def _cut_cycles(
+    angles: JointAngles, strides: Strides, take: Callable[[str, Side, Floats], None]
+) -> CycleCurves:
+    """Hand every curve (strides, 101) to `take`; what is known beside the curves."""
+    index = {side: tuple(i for i, s in enumerate(strides.strides) if s.side == side) for side in SIDES}
     ends: dict[str, dict[Side, float]] = {}
     why: dict[str, dict[Side, str]] = {}
     for name, reason in angles.withheld.items():
@@ -99,10 +129,11 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
             if segment in angles.headings:
                 (row,) = resample([angles.headings[segment]], angles.t_s, bounds, POINTS)
                 turned = row - row[:, :-1].mean(axis=1, keepdims=True)
-                curves.setdefault(variable, {})[side] = -turned if side == "left" else turned
+                take(variable, side, -turned if side == "left" else turned)
+                del row, turned
         if not names:
             continue
-        rows = resample((angles.angles[name] for name in names), angles.t_s, bounds, POINTS)
+        rows = resample_in_turn((angles.angles[name] for name in names), angles.t_s, bounds, POINTS)
         for (name, base), row in zip(names.items(), rows, strict=True):
             sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
             # from the mean of walking nobody knows where straight is
@@ -113,11 +144,11 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
                 if torn.any():
                     why.setdefault(base, {})[side] = IMPOSSIBLE
             row *= sign
-            curves.setdefault(base, {})[side] = row
+            take(base, side, row)
             if name in angles.bounds:
                 ends.setdefault(base, {})[side] = angles.bounds[name]
     return CycleCurves(
-        curves=curves,
+        curves={},
         stride_index=index,
         used={
             side: np.array([strides.strides[i].excluded_reason is None for i in rows], np.bool_)
@@ -169,17 +200,21 @@ def stride_figures(
     values: dict[str, dict[Side, Floats]] = {}
     for name, figure in (list_curve_figures() if figures is None else figures).items():
         for side, rows in curves.curves.get(figure.variable, {}).items():
-            part = np.degrees(rows[:, figure.start_pct : figure.end_pct + 1])
-            if figure.statistic == "at":
-                value = part[:, 0]
-            elif figure.statistic == "max":
-                value = part.max(axis=1)
-            elif figure.statistic == "min":
-                value = part.min(axis=1)
-            else:
-                value = np.ptp(part, axis=1)
-            values.setdefault(name, {})[side] = np.asarray(value)
+            values.setdefault(name, {})[side] = _read_figure(figure, rows)
     return values
+
+
+def _read_figure(figure: CurveFigure, rows: Floats) -> Floats:
+    """Figure (strides,) in degrees of curves (strides, 101) in rad."""
+    part = np.degrees(rows[:, figure.start_pct : figure.end_pct + 1])
+    if figure.statistic == "at":
+        # a copy: what it is read from is let go of
+        return part[:, 0].copy()
+    if figure.statistic == "max":
+        return np.asarray(part.max(axis=1))
+    if figure.statistic == "min":
+        return np.asarray(part.min(axis=1))
+    return np.asarray(np.ptp(part, axis=1))
 
 
 def foot_pitch(

@@ -10,10 +10,9 @@ from core.angles import JointAngles
 from core.events.result import Strides
 from core.frames import Floats, Oriented, Segment, Side
 from core.parameters.kinematic import (
-    cycle_curves,
     foot_pitch,
+    measure_cycles,
     per_stride_figures,
-    stride_figures,
     summarise_angles,
     turning_angle,
     without_bounds,
@@ -72,18 +71,18 @@ def take_figures(
     flat = find_stances(strides, angles.t_s, pitch)
     rows = spatial_rows(strides, feet, surface)
     phases = phase_rows(strides, flat, angles, pitch, feet)
-    curves = cycle_curves(angles, strides)
+    curves, read = measure_cycles(angles, strides)
     of_feet = turning_angle(strides)
     if orientations is not None:
         of_feet |= foot_pitch(orientations, strides, pitch)
-    figures: dict[str, Mapping[Side, Floats]] = {**stride_figures(curves), **of_feet}
+    figures: dict[str, Mapping[Side, Floats]] = {**read, **of_feet}
     return TakeFigures(
         parameters=(
             *times,
             *summarise_distances(strides, feet, rows, surface),
             *side_parameters(strides, flat.rows, PARTS),
             *side_parameters(strides, phases, PHASES),
-            *summarise_angles(curves, of_feet),
+            *summarise_angles(curves, figures),
             *trunk_regularity(choose_foot(strides), angles.t_s, trunk or {}),
             stride_smoothness(choose_foot(strides), angles.t_s, trunk or {}),
         ),
