@@ -1,11 +1,17 @@
-"""Samples that are read in double precision and held in single, where that loses nothing.
+"""Samples that are held in less memory than they take: in single precision, or in a file.
 
-Recording files have no more than single precision: an hour of seven sensors is 62 MB less.
+Recording files have no more than single precision, so that samples are read in double precision and held in
+single, where that loses nothing: an hour of seven sensors is 62 MB less. What a long take gives is read again
+block by block, or one signal after the other, and lies in a file meanwhile.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+import mmap
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final, Protocol, Self, TypeVar
 
@@ -17,6 +23,9 @@ Held = TypeVar("Held", bound="HoldsSamples")
 
 SOME_ROWS: Final = 1 << 12
 """Rows that are looked at together: the first that need double precision end the search."""
+
+SHORT: Final = 1 << 16
+"""Samples up to which a take is held in memory as a whole: eleven minutes at 100 Hz."""
 
 AT_A_TIME: Final = 1 << 14
 """Samples that are worked on at a time, where what is made on the way is larger than what comes of it."""
@@ -32,6 +41,37 @@ def cut_blocks(samples: int) -> Iterator[slice]:
     """Successive parts of a take, in order; what each gives on its own is what the whole gives there."""
     for first in range(0, samples, AT_A_TIME):
         yield slice(first, min(first + AT_A_TIME, samples))
+
+
+def make_room(rows: int, *more: int, kind: type[np.floating[Any]] = np.float64) -> Any:
+    """An array (rows, more) to be written, of a long take in a file without a name that goes with it.
+
+    Parameters
+    ----------
+    rows : samples. kind : its precision.
+
+    Returns
+    -------
+    The array. Of its file as much is in memory as was touched, until `give_pages_back`. The file is in the
+    folder for temporary files (`TMPDIR`); where that has no room the array is in memory.
+    """
+    size = math.prod((rows, *more)) * np.dtype(kind).itemsize
+    if rows <= SHORT or not hasattr(mmap, "MADV_DONTNEED"):
+        return np.empty((rows, *more), kind)
+    try:
+        with tempfile.TemporaryFile() as file:
+            # now, since later nobody could be told that the disk is full
+            os.posix_fallocate(file.fileno(), 0, size)
+            return np.ndarray((rows, *more), kind, mmap.mmap(file.fileno(), size))
+    except OSError:
+        return np.empty((rows, *more), kind)
+
+
+def give_pages_back(arrays: Iterable[Floats]) -> None:
+    """Keep none of these arrays in memory that lie in a file; all stay as they are."""
+    for a in arrays:
+        if isinstance(a.base, mmap.mmap):
+            a.base.madvise(mmap.MADV_DONTNEED)
 
 
 class HoldsSamples:

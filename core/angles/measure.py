@@ -13,7 +13,7 @@ from core.angles.kernel import AngleKernel, mean_angles, subtract_zero
 from core.angles.result import SIGNS, JointAngles, list_leg_joints
 from core.errors import Notice
 from core.frames import SIDES, SUFFIX, Bools, Floats, Posture
-from core.held_samples import cut_blocks
+from core.held_samples import cut_blocks, give_pages_back, make_room
 from core.rest import Window, index_window
 
 if TYPE_CHECKING:
@@ -56,13 +56,16 @@ def measure_angles(
     offset = mean_angles(standing)
     kept = [i for i, x in enumerate(known) if x]
     n = len(orientations.t_s)
-    held = {i: np.empty(n) for i in kept if not (kernel.estimated[i] and kernel.names[i] in dropped)}
+    held: dict[int, Floats] = {
+        i: make_room(n) for i in kept if not (kernel.estimated[i] and kernel.names[i] in dropped)
+    }
     locked = np.empty((n, len(kernel.names)), np.bool_)
     for part in cut_blocks(n):
         raw = kernel.measure(*_stack(orientations, poses, part))
         locked[part] = np.abs(raw) > GIMBAL_LIMIT
         for i, angle in held.items():
             angle[part] = subtract_zero(raw[:, i], offset[i])
+        give_pages_back((*held.values(), *(() if poses is None else poses.q.values())))
     notices = _find_missing_joints(orientations, kernel) + _find_gimbal(locked, kernel, orientations.t_s)
     for name in sorted(name for name, x in zip(kernel.names, known, strict=True) if not x):
         message = (

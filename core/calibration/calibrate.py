@@ -17,7 +17,7 @@ from core.calibration.functional import (
     find_functional_axes,
     find_functional_movements,
 )
-from core.calibration.gyro_pca import about_vertical, count_steps, sagittal_angle
+from core.calibration.gyro_pca import about_vertical, count_steps, sagittal_angle, sagittal_course
 from core.calibration.heading import HeadingParams, Part, step_time
 from core.calibration.joint_turns import JointTurnParams, measure_joint_turns
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
@@ -322,6 +322,5 @@ def _straight_steps(
     leg = next((s for s in found if s not in TRUNK), None)
     if leg is None or not walk.parts:
         return None
-    up = rotate(conjugate(q[leg]), np.array([0.0, 0.0, 1.0]))
     R = about_vertical(-found[leg].angle) @ vertical_frame(standing[leg].up)
-    return count_steps(sagittal_angle(up, R), walk.mask)
+    return count_steps(sagittal_course(q[leg], R), walk.mask)

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from core.frames import Floats
+from core.held_samples import give_pages_back
 
 
 def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int = 101) -> list[Floats]:
@@ -35,6 +36,7 @@ def resample_in_turn(
         rows *= share
         rows += here
         del here
+        give_pages_back((signal,))
         rows[~np.isfinite(rows.sum(axis=-1))] = np.nan
         yield rows
 
