@@ -67,6 +67,17 @@ def make_room(rows: int, *more: int, kind: type[np.floating[Any]] = np.float64) 
         return np.empty((rows, *more), kind)
 
 
+def lay_aside(a: Floats) -> Floats:
+    """The same array, of a long take in a file; nobody writes to the one that was given any more."""
+    room: Floats = make_room(*a.shape, kind=a.dtype.type)
+    if not isinstance(room.base, mmap.mmap):
+        return a
+    for part in cut_blocks(len(a)):
+        room[part] = a[part]
+        give_pages_back((room,))
+    return room
+
+
 def give_pages_back(arrays: Iterable[Floats]) -> None:
     """Keep none of these arrays in memory that lie in a file; all stay as they are."""
     for a in arrays:

@@ -81,7 +81,6 @@ def measure_quietness(signals: SensorSignals, rate_hz: float, params: RestParams
     offset = mean_rate[:, int(np.argmin(np.where(whole, spread, np.inf)))]
     if np.linalg.norm(offset) > params.gyro_limit:
         offset = np.zeros(3)
-    del mean_rate, spread
     gyro = _moving_mean(np.sqrt(_sum_axes(lambda k: (rate(k) - offset[k]) ** 2)), width)
     norm = np.sqrt(_sum_axes(lambda k: force(k) ** 2))
     norm -= norm.mean()

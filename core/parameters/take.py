@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from core.angles import JointAngles
 from core.events.result import Strides
 from core.frames import Floats, Oriented, Segment, Side
+from core.held_samples import give_pages_back
 from core.parameters.kinematic import (
     foot_pitch,
     measure_cycles,
@@ -71,6 +72,8 @@ def take_figures(
     flat = find_stances(strides, angles.t_s, pitch)
     rows = spatial_rows(strides, feet, surface)
     phases = phase_rows(strides, flat, angles, pitch, feet)
+    if feet is not None:
+        give_pages_back((*feet.p.values(), *feet.q.values()))
     curves, read = measure_cycles(angles, strides)
     of_feet = turning_angle(strides)
     if orientations is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mmap
 import resource
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -95,5 +96,5 @@ def test_without_room_on_the_disk_it_is_in_memory() -> None:
 
 def resident_kb() -> int:
     """Pages of this process that are in memory and belong to a file, or to one in memory."""
-    with open("/proc/self/status") as status:
-        return sum(int(x.split()[1]) for x in status if x.startswith(("RssFile", "RssShmem")))
+    status = Path("/proc/self/status").read_text().splitlines()
+    return sum(int(x.split()[1]) for x in status if x.startswith(("RssFile", "RssShmem")))

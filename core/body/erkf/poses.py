@@ -24,6 +24,7 @@ from core.calibration.result import CalibratedRecording
 from core.estimators import ERKF, LINKED_PATHS, SINGLE_PATHS
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
+from core.held_samples import cut_blocks
 from core.recording import UniformRecording
 from core.rest import find_runs
 from core.rotation import from_matrix, multiply, rotate
@@ -144,10 +145,12 @@ def find_segment_tracks(run: ErkfRun, *, in_place: bool = False) -> SegmentTrack
     q, p = {}, {}
     for i, segment in enumerate(run.segments):
         place, turn = run.track.places[i], run.track.turns[i]
-        q[segment], p[segment] = run.tree.segment(i, place, turn)
-        if in_place:
-            turn[:], place[:] = q[segment], p[segment]
-            q[segment], p[segment] = turn, place
+        if not in_place:
+            q[segment], p[segment] = run.tree.segment(i, place, turn)
+            continue
+        for part in cut_blocks(len(place)):
+            turn[part], place[part] = run.tree.segment(i, place[part], turn[part])
+        q[segment], p[segment] = turn, place
     return SegmentTracks(q, p)
 
 
