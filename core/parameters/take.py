@@ -71,9 +71,9 @@ def take_figures(
     pitch = {} if orientations is None else foot_pitches(orientations)
     flat = find_stances(strides, angles.t_s, pitch)
     rows = spatial_rows(strides, feet, surface)
-    phases = phase_rows(strides, flat, angles, pitch, feet)
     if feet is not None:
         give_pages_back((*feet.p.values(), *feet.q.values()))
+    phases = phase_rows(strides, flat, angles, pitch, feet)
     curves, read = measure_cycles(angles, strides)
     of_feet = turning_angle(strides)
     if orientations is not None:

@@ -84,6 +84,9 @@ def l7s_poses(
     for window in windows:
         figure.add(window)
         P = window.P
+        del window
+    seen = SeenWalk.join(figure.seen)
+    figure.seen.clear()
     variances = np.diag(P)[:18].reshape(3, 6)[:, :3]
     poses = Poses(
         t_s=orientations.t_s,
@@ -103,7 +106,7 @@ def l7s_poses(
             "position_sd_m": {s: float(np.sqrt(x.max())) for s, x in zip(BODIES, variances, strict=True)},
             "min_eigenvalue": float(np.linalg.eigvalsh(P)[0]),
             "gap_s": longest_gaps({s: orientations.valid[s] for s in measured}, rate),
-            **walking_checks(SeenWalk.join(figure.seen), model, rate),
+            **walking_checks(seen, model, rate),
         },
     )
     health = l7s_health(poses)
