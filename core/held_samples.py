@@ -1,12 +1,18 @@
-"""Samples that are read in double precision and held in single, where that loses nothing.
+"""Samples that are held in less memory than they take: in single precision, or in a file.
 
-Recording files have no more than single precision: an hour of seven sensors is 62 MB less.
+Recording files have no more than single precision, so that samples are read in double precision and held in
+single, where that loses nothing: an hour of seven sensors is 62 MB less. What a long take gives is read again
+block by block, or one signal after the other, and lies in a file meanwhile.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+import math
+import mmap
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final, Protocol, Self, TypeVar
 
 import numpy as np
@@ -18,11 +24,65 @@ Held = TypeVar("Held", bound="HoldsSamples")
 SOME_ROWS: Final = 1 << 12
 """Rows that are looked at together: the first that need double precision end the search."""
 
+SHORT: Final = 1 << 16
+"""Samples up to which a take is held in memory as a whole: eleven minutes at 100 Hz."""
+
+AT_A_TIME: Final = 1 << 14
+"""Samples that are worked on at a time, where what is made on the way is larger than what comes of it."""
+
 
 class SampleSeries(Protocol):
     """Samples (T, …, 3) of which a part is asked for: an array, or what is computed when it is."""
 
     def __getitem__(self, part: slice, /) -> Floats: ...
+
+
+def cut_blocks(samples: int) -> Iterator[slice]:
+    """Successive parts of a take, in order; what each gives on its own is what the whole gives there."""
+    for first in range(0, samples, AT_A_TIME):
+        yield slice(first, min(first + AT_A_TIME, samples))
+
+
+def make_room(rows: int, *more: int, kind: type[np.floating[Any]] = np.float64) -> Any:
+    """An array (rows, more) to be written, of a long take in a file without a name that goes with it.
+
+    Parameters
+    ----------
+    rows : samples. kind : its precision.
+
+    Returns
+    -------
+    The array. Of its file as much is in memory as was touched, until `give_pages_back`. The file is in the
+    folder for temporary files (`TMPDIR`); where that has no room the array is in memory.
+    """
+    size = math.prod((rows, *more)) * np.dtype(kind).itemsize
+    if rows <= SHORT or not hasattr(mmap, "MADV_DONTNEED"):
+        return np.empty((rows, *more), kind)
+    try:
+        with tempfile.TemporaryFile() as file:
+            # now, since later nobody could be told that the disk is full
+            os.posix_fallocate(file.fileno(), 0, size)
+            return np.ndarray((rows, *more), kind, mmap.mmap(file.fileno(), size))
+    except OSError:
+        return np.empty((rows, *more), kind)
+
+
+def lay_aside(a: Floats) -> Floats:
+    """The same array, of a long take in a file; nobody writes to the one that was given any more."""
+    room: Floats = make_room(*a.shape, kind=a.dtype.type)
+    if not isinstance(room.base, mmap.mmap):
+        return a
+    for part in cut_blocks(len(a)):
+        room[part] = a[part]
+        give_pages_back((room,))
+    return room
+
+
+def give_pages_back(arrays: Iterable[Floats]) -> None:
+    """Keep none of these arrays in memory that lie in a file; all stay as they are."""
+    for a in arrays:
+        if isinstance(a.base, mmap.mmap):
+            a.base.madvise(mmap.MADV_DONTNEED)
 
 
 class HoldsSamples:
@@ -42,6 +102,18 @@ class HoldsSamples:
         """The same with other fields; samples that stay are held once for both."""
         kept = {name: self.held(name) for name in self.sampled}
         return replace(self, **{**kept, **fields})  # type: ignore[type-var] # every class here is a dataclass
+
+
+@dataclass(frozen=True, eq=False)
+class HeldSeries:
+    """A field of samples in double precision less an offset (3,), of the part that is asked for."""
+
+    of: HoldsSamples
+    name: str
+    offset: Floats | float = 0.0
+
+    def __getitem__(self, part: slice, /) -> Floats:
+        return np.asarray(self.of.cut(self.name, part) - self.offset)
 
 
 class _HeldField:

@@ -20,7 +20,7 @@ from core.body.estimate import PoseEstimate
 from core.body.health import HealthFinding
 from core.body.poses import Poses
 from core.errors import Notice
-from core.estimators import BY_METHOD, PoseMethod
+from core.estimators import BY_METHOD
 from core.frames import FOOT, SIDES, SUFFIX, Oriented, Segment, Side
 from core.rest import Window, find_runs
 from core.rotation import wrap_angle
@@ -71,7 +71,7 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
     """
     estimated = frozenset(map(str, angles.diagnostics.get("estimated", ())))  # type: ignore[call-overload]
     estimator = BY_METHOD.get(poses.method)
-    fixed = {name for name in angles.angles if name in estimated and _is_fixed(name, estimator)}
+    fixed = list_fixed(poses) & estimated & set(angles.zero_offset)
     bad = [f for f in poses.health if f.verdict == "bad"]
     out = {name for f in bad for name in _concerned(f, estimated) if name in angles.angles} - fixed
     kept = {name: x for name, x in angles.angles.items() if name not in out | fixed}
@@ -174,10 +174,11 @@ def _concerned(f: HealthFinding, estimated: frozenset[str]) -> Iterator[str]:
         yield from estimated
 
 
-def _is_fixed(name: str, estimator: PoseMethod | None) -> bool:
-    """An angle that no two sensors measure and the estimator's model of the leg holds fixed."""
-    variable = name.removesuffix("_l").removesuffix("_r")
-    return estimator is not None and variable in estimator.fixed
+def list_fixed(poses: Poses) -> frozenset[str]:
+    """Angles that the estimator's model of the leg holds fixed, where no two sensors measure them."""
+    estimator = BY_METHOD.get(poses.method)
+    variables = () if estimator is None else estimator.fixed
+    return frozenset(x for v in variables for x in (v, *(f"{v}_{end}" for end in SUFFIX.values())))
 
 
 def _foot_side(of: str | None) -> Side | None:

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from core.frames import R_NEUTRAL, Floats, Oriented, Segment
+from core.held_samples import cut_blocks
 from core.rotation import conjugate, from_matrix, multiply, rotate, to_matrix
 
 COURSE_AXES: Final[dict[Segment, tuple[float, float, float]]] = {
@@ -45,8 +46,10 @@ def compute_headings(orientations: Oriented) -> dict[str, Floats]:
         if segment not in orientations.q:
             continue
         ok = orientations.valid[segment]
-        x, y, _ = rotate(orientations.q[segment][ok], np.array(axis)).T
         course = np.full(len(ok), np.nan)
-        course[ok] = np.unwrap(np.arctan2(y, x))
+        for part in cut_blocks(len(ok)):
+            x, y, _ = rotate(orientations.q[segment][part], np.array(axis)).T
+            course[part] = np.arctan2(y, x)
+        course[ok], course[~ok] = np.unwrap(course[ok]), np.nan
         found[segment] = course
     return found

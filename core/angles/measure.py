@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from math import radians
 from typing import TYPE_CHECKING, Final
 
@@ -13,14 +13,12 @@ from core.angles.kernel import AngleKernel, mean_angles, subtract_zero
 from core.angles.result import SIGNS, JointAngles, list_leg_joints
 from core.errors import Notice
 from core.frames import SIDES, SUFFIX, Bools, Floats, Posture
+from core.held_samples import cut_blocks, give_pages_back, make_room
 from core.rest import Window, index_window
 
 if TYPE_CHECKING:
     from core.body.poses import Poses
     from core.fusion.orientations import Orientations
-
-STACKED: Final = 1 << 14
-"""Samples whose orientations are laid side by side at a time."""
 
 GIMBAL_LIMIT: Final = radians(80.0)
 """|b| beyond which a and c cannot be told apart (docs/science/joint-angles.md, "Joints")."""
@@ -32,6 +30,7 @@ def measure_angles(
     poses: Poses | None = None,
     standing_deg: Mapping[str, float] | None = None,
     posture: Posture = "standing",
+    dropped: Collection[str] = (),
 ) -> JointAngles:
     """Angles of every joint whose two segments are there, zeroed on the mean over a window.
 
@@ -44,6 +43,7 @@ def measure_angles(
     standing_deg : goniometer angles of that standing; kept beside the angles, not added.
     posture : what was done in that window. From the mean of walking no goniometer leads to the anatomical
         zero.
+    dropped : angles taken from `poses` that nobody wants: they have a zero and notices, and are not held.
 
     Returns
     -------
@@ -51,15 +51,22 @@ def measure_angles(
     passes 80° a notice `gimbal`, one without signal while standing is left out with `no_standing_zero`.
     """
     kernel = AngleKernel.between(tuple(orientations.q), () if poses is None else tuple(poses.q))
-    # by angle: each is a row of it in the end, and none is held twice
-    raw = np.empty((len(kernel.names), len(orientations.t_s)))
-    for first in range(0, raw.shape[1], STACKED):
-        part = slice(first, first + STACKED)
-        raw[:, part] = kernel.measure(*_stack(orientations, poses, part)).T
-    notices = _find_missing_joints(orientations, kernel) + _find_gimbal(raw, kernel, orientations.t_s)
-    # in the order of time, which decides how their sums round
-    standing = np.ascontiguousarray(raw[:, index_window(zero, orientations.rate_hz)].T)
+    standing = kernel.measure(*_stack(orientations, poses, index_window(zero, orientations.rate_hz)))
     known = [bool(x.any()) for x in np.isfinite(standing).T]
+    offset = mean_angles(standing)
+    kept = [i for i, x in enumerate(known) if x]
+    n = len(orientations.t_s)
+    held: dict[int, Floats] = {
+        i: make_room(n) for i in kept if not (kernel.estimated[i] and kernel.names[i] in dropped)
+    }
+    locked = np.empty((n, len(kernel.names)), np.bool_)
+    for part in cut_blocks(n):
+        raw = kernel.measure(*_stack(orientations, poses, part))
+        locked[part] = np.abs(raw) > GIMBAL_LIMIT
+        for i, angle in held.items():
+            angle[part] = subtract_zero(raw[:, i], offset[i])
+        give_pages_back((*held.values(), *(() if poses is None else poses.q.values())))
+    notices = _find_missing_joints(orientations, kernel) + _find_gimbal(locked, kernel, orientations.t_s)
     for name in sorted(name for name, x in zip(kernel.names, known, strict=True) if not x):
         message = (
             f"{name}: no angle, its sensors have no signal while standing ({zero[0]:.1f} to {zero[1]:.1f} "
@@ -67,13 +74,9 @@ def measure_angles(
             "there is no zero."
         )
         notices.append(Notice("no_standing_zero", message, t_s=zero[0]))
-    offset = mean_angles(standing)
-    kept = [i for i, x in enumerate(known) if x]
-    for i in kept:
-        raw[i] = subtract_zero(raw[i], offset[i])
     return JointAngles(
         orientations.t_s,
-        {kernel.names[i]: raw[i] for i in kept},
+        {kernel.names[i]: angle for i, angle in held.items()},
         {kernel.names[i]: float(offset[i]) for i in kept},
         notices=tuple(notices),
         diagnostics={"estimated": tuple(kernel.names[i] for i in kept if kernel.estimated[i])},
@@ -108,15 +111,15 @@ def _find_missing_joints(orientations: Orientations, kernel: AngleKernel) -> lis
     return notices
 
 
-def _find_gimbal(raw: Floats, kernel: AngleKernel, t_s: Floats) -> list[Notice]:
-    """A notice for every joint whose frontal angle in raw (names, n) passes the limit."""
+def _find_gimbal(locked: Bools, kernel: AngleKernel, t_s: Floats) -> list[Notice]:
+    """A notice for every joint whose frontal angle is beyond the limit; `locked` (n, names)."""
     notices: list[Notice] = []
     for side in SIDES:
         for joint, _, _ in list_leg_joints(side):
             frontal = f"{SIGNS[joint][1][0]}_{SUFFIX[side]}"
             if frontal not in kernel.names:
                 continue
-            beyond = np.abs(raw[kernel.names.index(frontal)]) > GIMBAL_LIMIT
+            beyond = locked[:, kernel.names.index(frontal)]
             if beyond.any():
                 message = (
                     f"{side} {joint}: the frontal angle passes 80° in {beyond.mean():.1%} of the take; there "

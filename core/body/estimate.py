@@ -45,6 +45,7 @@ from core.errors import EstimationError, Notice
 from core.estimators import BY_NAME, ERKF, L7S_3I, NO_FIGURE, ORIENTATIONS_ONLY, Estimator
 from core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
 from core.fusion.orientations import LastReading, Orientations
+from core.held_samples import lay_aside
 from core.memory import give_memory_back
 
 ON_A_BELT: Final = (
@@ -234,7 +235,13 @@ class _Take:
         )
         tracks = find_segment_tracks(run, in_place=True)
         paths = foot_tracks(run, replace_orientations(run, self.orientations, tracks), self.body, tracks)
-        return replace(made, poses=poses, feet=replace(paths, posture=self.calibrated.calibration.posture))
+        paths = replace(
+            paths,
+            p={side: lay_aside(p) for side, p in paths.p.items()},
+            q={side: lay_aside(q) for side, q in paths.q.items()},
+            posture=self.calibrated.calibration.posture,
+        )
+        return replace(made, poses=poses, feet=paths)
 
 
 def _without(orientations: Orientations, failed: Collection[Segment]) -> Orientations:

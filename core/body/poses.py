@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +12,7 @@ from core.body.health import HealthFinding
 from core.body.model import BodyModel
 from core.errors import Notice
 from core.frames import Bools, Floats, Segment
-
-SHORT: Final = 1 << 16
-"""Samples up to which a figure is held in double precision: eleven minutes at 100 Hz."""
+from core.held_samples import SHORT
 
 
 def figure_precision(samples: int) -> type[np.floating[Any]]:

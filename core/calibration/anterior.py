@@ -24,7 +24,7 @@ from core.calibration.gyro_pca import (
     flexion_axis,
     gait_margin,
     measure_flexion,
-    sagittal_angle,
+    sagittal_course,
 )
 from core.calibration.heading import (
     Complexes,
@@ -49,7 +49,7 @@ from core.errors import CalibrationError, Notice
 from core.frames import FOOT, Bools, Floats, Segment
 from core.recording import SensorSignals
 from core.rest import Window
-from core.rotation import conjugate, rotate
+from core.rotation import rotate
 
 DISAGREEMENT = radians(15.0)
 """Difference of two measures of the walking direction that is told
@@ -406,8 +406,7 @@ def _signed(
 
 
 def _margin(segment: Segment, angle: float, R_vertical: Floats, q: Floats, walk: CalibrationWalk) -> float:
-    up = rotate(conjugate(q), np.array([0.0, 0.0, 1.0]))
-    return gait_margin(sagittal_angle(up, about_vertical(-angle) @ R_vertical), walk.mask, segment)
+    return gait_margin(sagittal_course(q, about_vertical(-angle) @ R_vertical), walk.mask, segment)
 
 
 def _sign_notices(

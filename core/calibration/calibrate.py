@@ -17,7 +17,7 @@ from core.calibration.functional import (
     find_functional_axes,
     find_functional_movements,
 )
-from core.calibration.gyro_pca import about_vertical, count_steps, sagittal_angle
+from core.calibration.gyro_pca import about_vertical, count_steps, sagittal_angle, sagittal_course
 from core.calibration.heading import HeadingParams, Part, step_time
 from core.calibration.joint_turns import JointTurnParams, measure_joint_turns
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
@@ -45,6 +45,7 @@ from core.calibration.walking import (
 from core.errors import CalibrationError, Notice, SignalError
 from core.frames import R_NEUTRAL, Bools, Floats, Segment
 from core.fusion.attitude import AttitudeParams, estimate_orientation
+from core.held_samples import HeldSeries
 from core.recording import UniformRecording
 from core.rest import RestParams, Window
 from core.rotation import conjugate, from_matrix, rotate
@@ -221,9 +222,9 @@ def _rest_world(
     signals = recording.sensors[segment]
     at = round(0.5 * (zero[0] + zero[1]) * recording.rate_hz)
     q_rest = from_matrix(R_NEUTRAL @ vertical_frame(standing.up))
-    gyr = signals.gyr - standing.gyro_bias
+    gyr, acc = HeldSeries(signals, "gyr", standing.gyro_bias), HeldSeries(signals, "acc")
     return estimate_orientation(
-        q_rest, at, gyr, signals.acc, signals.valid, recording.rate_hz, standing.rest_norm, params
+        q_rest, at, gyr, acc, signals.valid, recording.rate_hz, standing.rest_norm, params
     )
 
 
@@ -321,6 +322,5 @@ def _straight_steps(
     leg = next((s for s in found if s not in TRUNK), None)
     if leg is None or not walk.parts:
         return None
-    up = rotate(conjugate(q[leg]), np.array([0.0, 0.0, 1.0]))
     R = about_vertical(-found[leg].angle) @ vertical_frame(standing[leg].up)
-    return count_steps(sagittal_angle(up, R), walk.mask)
+    return count_steps(sagittal_course(q[leg], R), walk.mask)

@@ -21,10 +21,11 @@ from core.events.foot_contact import (
     FootContactState,
     advance_foot_contacts,
 )
-from core.events.foot_movement import FootMovement
+from core.events.foot_movement import FootMovement, FootMovements
 from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
 from core.events.result import EventKind, GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
+from core.held_samples import cut_blocks
 from core.rotation import angle_between
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def detect_contacts(
     orientations: Orientations,
     pitch: FootPitchParams | None = None,
     params: FootContactParams | None = None,
-    motions: Mapping[Segment, FootMovement] | None = None,
+    motions: Mapping[Segment, FootMovement | FootMovements] | None = None,
 ) -> GaitEvents:
     """Contacts of each foot that carries a sensor, at the moment of contact, with their uncertainty.
 
@@ -77,10 +78,13 @@ def detect_contacts(
         state = FootContactState.start(orientations.rate_hz, rule, params)
         motion = (motions or {}).get(FOOT[side])
         q, valid = orientations.q[FOOT[side]], orientations.valid[FOOT[side]]
-        told = advance_foot_contacts(state, q, valid, *(() if motion is None else (motion.speed, motion.acc)))
         latest: dict[int, GaitEvent] = {}
-        for _ in read_reports(told, side, float(orientations.t_s[0]), orientations.rate_hz, latest):
-            pass
+        for part in cut_blocks(len(q)):
+            moved = None if motion is None else motion.cut(part)
+            signals = () if moved is None else (moved.speed, moved.acc)
+            told = advance_foot_contacts(state, q[part], valid[part], *signals)
+            for _ in read_reports(told, side, float(orientations.t_s[0]), orientations.rate_hz, latest):
+                pass
         return list(latest.values())
 
     return _each_foot(orientations, rule, find)
@@ -190,7 +194,9 @@ def _quiet_level(q: Floats, s: Floats, valid: Bools, rate_hz: float, params: Foo
     whole = len(s) // second
     if whole == 0:
         return None
-    speed = np.append(angle_between(q[:-1], q[1:]) * rate_hz, 0.0)
+    speed = np.zeros(len(q))
+    for part in cut_blocks(len(q) - 1):
+        speed[part] = angle_between(q[part], q[part.start + 1 : part.stop + 1]) * rate_hz
     seconds = (whole, second)
     quiet = speed[: whole * second].reshape(seconds).mean(axis=1) < params.quiet_rad_s
     quiet &= valid[: whole * second].reshape(seconds).all(axis=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from core.frames import FOOT, Floats, Segment
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
     from core.calibration.result import CalibratedRecording, SegmentCalibration
+    from core.recording import SensorSignals
 
 
 class FootMovement(NamedTuple):
@@ -31,12 +33,29 @@ class FootMovement(NamedTuple):
         speed = np.sqrt(((gyr - mounted.gyro_bias) ** 2).sum(axis=1))
         return cls(speed, acc @ mounted.R_segment_sensor.T)
 
+    def cut(self, part: slice) -> FootMovement:
+        """Some of the samples."""
+        return FootMovement(self.speed[part], self.acc[part])
 
-def measure_foot_movements(calibrated: CalibratedRecording) -> Mapping[Segment, FootMovement]:
+
+@dataclass(frozen=True, eq=False)
+class FootMovements:
+    """Motion of one foot over a take, of the part that is asked for."""
+
+    signals: SensorSignals
+    mounted: SegmentCalibration
+
+    def cut(self, part: slice) -> FootMovement:
+        """Some of the samples."""
+        signals = self.signals
+        return FootMovement.of_signals(signals.cut("acc", part), signals.cut("gyr", part), self.mounted)
+
+
+def measure_foot_movements(calibrated: CalibratedRecording) -> Mapping[Segment, FootMovements]:
     """Motion of every foot that is calibrated."""
     mounted, sensors = calibrated.calibration.segments, calibrated.recording.sensors
     return {
-        foot: FootMovement.of_signals(sensors[foot].acc, sensors[foot].gyr, mounted[foot])
+        foot: FootMovements(sensors[foot], mounted[foot])
         for foot in FOOT.values()
         if foot in mounted and foot in sensors
     }

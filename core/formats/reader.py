@@ -25,13 +25,13 @@ from core.sample_blocks import LongStream
 
 _SHOWN = 5
 
-ROW_BYTES: Final = 1000.0
-SENSOR_BYTES: Final = 150.0
-"""Memory that an analysis needs for a row and for each sensor in it: two feet 1.3 kB, seven sensors 2."""
+ROW_BYTES: Final = 300.0
+SENSOR_BYTES: Final = 250.0
+"""Memory that an analysis needs for a row and for each sensor in it: two feet 0.8 kB, seven sensors 2."""
 
 MOST_BYTES: Final = 4.2e9
 """A recording that needs more is read block by block, for the monitor of daily life: at 100 Hz five and a
-half hours of seven sensors, nine of two feet. Half of what a process may use (server/settings.py)."""
+half hours of seven sensors, fourteen of two feet. Half of what a process may use (server/settings.py)."""
 
 MOST_ROWS_ALONE: Final = 2_000_000
 """More of one sensor alone is daily life, five and a half hours at 100 Hz: by blocks it needs less memory."""

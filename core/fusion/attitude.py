@@ -22,6 +22,7 @@ import numpy as np
 
 from core.errors import EstimationError, ParameterError
 from core.frames import Bools, Floats
+from core.held_samples import SampleSeries, cut_blocks
 from core.rotation import compiled, normalise, slerp
 
 
@@ -164,8 +165,8 @@ def advance(
 def estimate_orientation(
     q_rest: Floats,
     at: int,
-    gyr: Floats,
-    acc: Floats,
+    gyr: SampleSeries,
+    acc: SampleSeries,
     valid: Bools,
     rate_hz: float,
     rest_norm: float,
@@ -179,40 +180,52 @@ def estimate_orientation(
     accelerometer corrected, and its lag cancels. A stretch behind a gap starts from where the gap began,
     learns its tilt by the first run, and keeps an unknown heading (core/fusion/drift.py). Inside a gap the
     orientation is held.
+
+    Parameters
+    ----------
+    gyr, acc : (n, 3) as in `advance`, asked for in blocks.
     """
 
-    def run(q0: Floats, first: int, last: int, age_s: float = np.inf) -> Floats:
-        """Orientations from sample `first` to `last`, both included, in that order of time."""
-        step = 1 if last >= first else -1
-        part = slice(first, last + step if last + step >= 0 else None, step)
-        state = AttitudeState(q0, step * gyr[first], age_s)
-        rate, force, ok = step * gyr[part][1:], acc[part][1:], valid[part][1:]
-        return np.concatenate((q0[None], advance(state, rate, force, ok, rate_hz, rest_norm, params)[0]))
+    def run(q0: Floats, first: int, last: int, age_s: float = np.inf, out: Floats | None = None) -> Floats:
+        """Orientation at sample `last` from that at `first`; all from the lower to the higher into `out`."""
+        step, low = (1, first) if last >= first else (-1, last)
+        state = AttitudeState(q0, step * gyr[first : first + 1][0], age_s)
+        if out is not None:
+            out[first - low] = q0
+        for block in list(cut_blocks(abs(last - first)))[::step]:
+            # of the samples without the first one
+            start = low + (step == 1)
+            part = slice(start + block.start, start + block.stop)
+            rate, force = step * gyr[part][::step], acc[part][::step]
+            q, state = advance(state, rate, force, valid[part][::step], rate_hz, rest_norm, params)
+            if out is not None:
+                out[part.start - low : part.stop - low] = q[::step]
+        return state.q
 
-    def smooth(q0: Floats, start: int, a: int, b: int, age_s: float = np.inf) -> Floats:
-        """Orientations of the samples a to b, both included, from q0 at one of them."""
-        if start == b and start != a:
-            first = run(q0, b, a, age_s)[-1]
-        else:
-            first = run(run(q0, start, b, age_s)[-1], b, a)[-1]
-        forward = run(first, a, b)
-        backward = run(forward[-1], b, a)[::-1]
-        return normalise(slerp(backward, forward, 0.5))
+    def smooth(into: Floats, q0: Floats, start: int, a: int, b: int, age_s: float = np.inf) -> None:
+        """Write orientations of the samples a to b, both included, from q0 at one of them."""
+        at_end = start == b and start != a
+        first = run(q0, b, a, age_s) if at_end else run(run(q0, start, b, age_s), b, a)
+        last = run(first, a, b, out=into)
+        backward = np.empty_like(into)
+        run(last, b, a, out=backward)
+        for part in cut_blocks(len(into)):
+            into[part] = normalise(slerp(backward[part], into[part], 0.5))
 
-    out = np.tile(q_rest, (len(gyr), 1))
+    out = np.empty((len(valid), 4))
     stretches = _stretches(valid, round(params.relearn_s * rate_hz))
     if not stretches:
+        out[:] = q_rest
         return out
     home = min(range(len(stretches)), key=lambda k: max(stretches[k][0] - at, at - stretches[k][1], 0))
     a, b = stretches[home]
-    start = min(max(at, a), b)
-    out[a : b + 1] = smooth(q_rest, start, a, b)
+    smooth(out[a : b + 1], q_rest, min(max(at, a), b), a, b)
     out[:a], out[b + 1 :] = out[a], out[b]
     for a, b in stretches[home + 1 :]:
-        out[a : b + 1] = smooth(out[a - 1], a, a, b, 0.0)
+        smooth(out[a : b + 1], out[a - 1].copy(), a, a, b, 0.0)
         out[b + 1 :] = out[b]
     for a, b in reversed(stretches[:home]):
-        out[a : b + 1] = smooth(out[b + 1], b, a, b, 0.0)
+        smooth(out[a : b + 1], out[b + 1].copy(), b, a, b, 0.0)
         out[:a] = out[a]
     return out
 

@@ -16,10 +16,12 @@ from itertools import pairwise
 from math import degrees, radians
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.calibration.result import Calibration
 from core.errors import Notice
 from core.frames import Bools, Floats, Segment
+from core.held_samples import cut_blocks
 from core.rest import find_runs, index_window
 from core.rotation import about, multiply, yaw
 
@@ -68,7 +70,7 @@ def remove_relative_drift(
     gaps = any((~v).any() for v in valid.values())
     if len(q) < 2 or (np.count_nonzero(straight) <= params.reference_s * rate_hz and not gaps):
         return corrected, {}, []
-    heading = {s: np.exp(1j * yaw(x)) for s, x in q.items()}
+    heading = {s: _find_headings(x) for s, x in q.items()}
     whole = [s for s in q if not _gaps(valid[s], rate_hz)] or list(q)
     steady: list[Segment] = ["pelvis"] if "pelvis" in whole else whole
     reference = np.asarray(np.sum([heading[s] for s in steady], axis=0))
@@ -80,7 +82,9 @@ def remove_relative_drift(
         turn = _drift(
             np.asarray(relative), straight & valid[segment], valid[segment], calibration, rate_hz, params
         )
-        corrected[segment] = multiply(about(2, -turn), x)
+        corrected[segment] = np.empty_like(x)
+        for part in cut_blocks(n):
+            corrected[segment][part] = multiply(about(2, -turn[part]), x[part])
         largest[segment] = float(np.abs(turn).max())
     notices = []
     if largest and max(largest.values()) > params.tell:
@@ -92,6 +96,14 @@ def remove_relative_drift(
         )
         notices.append(Notice("heading_rereferenced", message, sensor=worst, severity="info"))
     return corrected, largest, notices
+
+
+def _find_headings(q: Floats) -> NDArray[np.complex128]:
+    """Headings (n,) of a segment as complex numbers of length 1."""
+    found = np.empty(len(q), np.complex128)
+    for part in cut_blocks(len(q)):
+        found[part] = np.exp(1j * yaw(q[part]))
+    return found
 
 
 def _drift(

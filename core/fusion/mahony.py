@@ -15,6 +15,7 @@ from core.frames import R_NEUTRAL, Bools, Floats, Segment
 from core.fusion.attitude import AttitudeParams, estimate_orientation
 from core.fusion.drift import DriftParams, remove_relative_drift
 from core.fusion.orientations import Orientations
+from core.held_samples import HeldSeries, cut_blocks
 from core.recording import SensorSignals
 from core.rest import Window
 from core.rotation import conjugate, from_matrix, multiply
@@ -78,8 +79,9 @@ def segment_orientation(
     if start is None:
         start = from_matrix(R_NEUTRAL @ mounted.R_segment_sensor)
     at = min(round(0.5 * (zero[0] + zero[1]) * rate_hz), len(signals.valid) - 1)
-    gyr = signals.gyr - mounted.gyro_bias
-    sensor = estimate_orientation(
-        start, at, gyr, signals.acc, signals.valid, rate_hz, mounted.rest_norm, params
-    )
-    return multiply(sensor, conjugate(from_matrix(mounted.R_segment_sensor)))
+    gyr, acc = HeldSeries(signals, "gyr", mounted.gyro_bias), HeldSeries(signals, "acc")
+    q = estimate_orientation(start, at, gyr, acc, signals.valid, rate_hz, mounted.rest_norm, params)
+    back = conjugate(from_matrix(mounted.R_segment_sensor))
+    for part in cut_blocks(len(q)):
+        q[part] = multiply(q[part], back)
+    return q

@@ -6,8 +6,9 @@ The windows of the figures are those of the reference table (core/norms/data), s
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Final
 
 import numpy as np
@@ -17,7 +18,7 @@ from core.events.result import Strides
 from core.frames import FOOT, SIDES, SUFFIX, Bools, Floats, Oriented, Segment, Side
 from core.parameters.catalogue import CATALOGUE, CurveFigure, list_curve_figures
 from core.parameters.plausible import IMPOSSIBLE, LEAST_KNEE
-from core.parameters.resample import resample
+from core.parameters.resample import resample_in_turn
 from core.parameters.result import CycleCurves, Parameter
 from core.parameters.rows import Column, as_column
 from core.parameters.stance import foot_pitches
@@ -82,8 +83,41 @@ def cycle_curves(
     ----------
     variables : what is cut, None = every angle.
     """
-    index = {side: tuple(i for i, s in enumerate(strides.strides) if s.side == side) for side in SIDES}
     curves: dict[str, dict[Side, Floats]] = {}
+
+    def keep(variable: str, side: Side, rows: Floats) -> None:
+        curves.setdefault(variable, {})[side] = rows
+
+    return replace(_cut_cycles(angles, strides, keep, variables), curves=curves)
+
+
+def measure_cycles(
+    angles: JointAngles, strides: Strides
+) -> tuple[CycleCurves, dict[str, dict[Side, Floats]]]:
+    """What is known about the curves of `cycle_curves`, and `stride_figures` of them.
+
+    The curves themselves are let go of as they are read, and are not there: those of an hour are as large as
+    its signals.
+    """
+    figures, found = list_curve_figures(), dict[str, dict[Side, Floats]]()
+
+    def read(variable: str, side: Side, rows: Floats) -> None:
+        for name, figure in figures.items():
+            if figure.variable == variable:
+                found.setdefault(name, {})[side] = _read_figure(figure, rows)
+
+    known = _cut_cycles(angles, strides, read)
+    return known, {name: found[name] for name in figures if name in found}
+
+
+def _cut_cycles(
+    angles: JointAngles,
+    strides: Strides,
+    take: Callable[[str, Side, Floats], None],
+    variables: Collection[str] | None = None,
+) -> CycleCurves:
+    """Hand every curve (strides, 101) to `take`; what is known beside the curves."""
+    index = {side: tuple(i for i, s in enumerate(strides.strides) if s.side == side) for side in SIDES}
     ends: dict[str, dict[Side, float]] = {}
     why: dict[str, dict[Side, str]] = {}
     for name, reason in angles.withheld.items():
@@ -107,13 +141,11 @@ def cycle_curves(
             for segment, variable in (("pelvis", "pelvis_rotation"), (FOOT[side], "foot_progression"))
             if segment in angles.headings and (variables is None or variable in variables)
         }
-        signals = [*courses.values(), *(angles.angles[name] for name in wanted)]
-        if not signals:
-            continue
-        rows = iter(resample(signals, angles.t_s, bounds, POINTS))
+        signals = chain(courses.values(), (angles.angles[name] for name in wanted))
+        rows = resample_in_turn(signals, angles.t_s, bounds, POINTS)
         for variable, row in zip(courses, rows):  # noqa: B905 - the angles follow
             row -= row[:, :-1].mean(axis=1, keepdims=True)
-            curves.setdefault(variable, {})[side] = np.negative(row, out=row) if side == "left" else row
+            take(variable, side, np.negative(row, out=row) if side == "left" else row)
         for (name, base), row in zip(wanted.items(), rows, strict=True):
             sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
             # from the mean of walking nobody knows where straight is
@@ -124,11 +156,11 @@ def cycle_curves(
                 if torn.any():
                     why.setdefault(base, {})[side] = IMPOSSIBLE
             row *= sign
-            curves.setdefault(base, {})[side] = row
+            take(base, side, row)
             if name in angles.bounds:
                 ends.setdefault(base, {})[side] = angles.bounds[name]
     return CycleCurves(
-        curves=curves,
+        curves={},
         stride_index=index,
         used={
             side: np.array([strides.strides[i].excluded_reason is None for i in rows], np.bool_)
@@ -196,27 +228,6 @@ def _read_figure(figure: CurveFigure, rows: Floats) -> Floats:
     return np.asarray({"min": least, "max": most}.get(figure.statistic, most - least))
 
 
-def measure_curves(
-    angles: JointAngles, strides: Strides
-) -> tuple[CycleCurves, dict[str, dict[Side, Floats]]]:
-    """What is known of all curves, without them, and their `stride_figures`.
-
-    Half of the curves are held at a time: those of an hour of seven sensors are 62 MB.
-    """
-    read = list_curve_figures()
-    variables = list(dict.fromkeys(figure.variable for figure in read.values()))
-    known = cycle_curves(angles, strides, ())
-    why, bounds = dict(known.why), dict(known.bounds)
-    values: dict[str, dict[Side, Floats]] = {}
-    for half in (variables[::2], variables[1::2]):
-        curves = cycle_curves(angles, strides, half)
-        values |= stride_figures(curves, {name: x for name, x in read.items() if x.variable in half})
-        why |= {v: curves.why[v] for v in half if v in curves.why}
-        bounds |= curves.bounds
-        del curves
-    return replace(known, why=why, bounds=bounds), {name: values[name] for name in read if name in values}
-
-
 def foot_pitch(
     orientations: Oriented, strides: Strides, pitch: Mapping[Segment, Floats] | None = None
 ) -> dict[str, dict[Side, Floats]]:
@@ -256,7 +267,7 @@ def summarise_angles(
 
     Parameters
     ----------
-    measured : figures of `measure_curves`, `foot_pitch` and `turning_angle`; None = those of the curves.
+    measured : figures of `measure_cycles`, `foot_pitch` and `turning_angle`; None = those of the curves.
 
     Returns
     -------

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
-from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.frames import Floats
-
-AT_ONCE: Final = 256
-"""Pieces whose places are worked out together."""
+from core.held_samples import give_pages_back
 
 
 def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int = 101) -> list[Floats]:
@@ -21,31 +19,33 @@ def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int
     ----------
     bounds : (pieces, 2) s. A piece that touches NaN in a signal is NaN throughout.
     """
-    signals = tuple(np.asarray(x) for x in signals)
-    ends = (bounds - t_s[0]) * ((len(t_s) - 1) / (t_s[-1] - t_s[0]))
+    return list(resample_in_turn(signals, t_s, bounds, points))
+
+
+def resample_in_turn(
+    signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int = 101
+) -> Iterator[Floats]:
+    """The same, one signal after the other: the curves of an hour are as large as its signals."""
+    place = (bounds - t_s[0]) * ((len(t_s) - 1) / (t_s[-1] - t_s[0]))
+    share = place[:, :1] + (place[:, 1:] - place[:, :1]) * _shares(points)
+    low = np.clip(np.floor(np.where(np.isfinite(share), share, 0.0)).astype(np.int64), 0, len(t_s) - 2)
+    share -= low
     if len(bounds) == 1:  # a live stride: all signals at once
-        return list(_interpolate(np.stack(signals), _place(ends, points), len(t_s)))
-    found = [np.empty((len(bounds), points), x.dtype) for x in signals]
-    for first in range(0, len(bounds), AT_ONCE):
-        part = slice(first, first + AT_ONCE)
-        place = _place(ends[part], points)
-        for signal, all_rows in zip(signals, found, strict=True):
-            (all_rows[part],) = _interpolate(signal[None], place, len(t_s))
-    return found
+        found = tuple(signals)
+        yield from _interpolate(np.stack(found), low, share) if found else ()
+        return
+    for signal in signals:
+        (rows,) = _interpolate(np.asarray(signal)[None], low, share)
+        give_pages_back((signal,))
+        yield rows
 
 
-def _place(ends: Floats, points: int) -> Floats:
-    """Places (pieces, points) between samples, of pieces that begin and end at places (pieces, 2)."""
-    return np.asarray(ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * _shares(points))
-
-
-def _interpolate(signals: Floats, place: Floats, n: int) -> Floats:
-    """Signals (k, n) at places (pieces, points), as (k, pieces, points)."""
-    low = np.clip(np.floor(np.where(np.isfinite(place), place, 0.0)).astype(np.int64), 0, n - 2)
-    here, rows = signals.take(low, axis=1), signals.take(low + 1, axis=1)
+def _interpolate(signals: Floats, low: NDArray[np.int64], share: Floats) -> Floats:
+    """Signals (k, n) a share of the way from a sample to the next, as (k, pieces, points)."""
+    here, rows = signals.take(low, axis=1), signals[:, 1:].take(low, axis=1)
     # in place: ten minutes of all angles are a million points
     rows -= here
-    rows *= place - low
+    rows *= share
     rows += here
     rows[~np.isfinite(rows.sum(axis=-1))] = np.nan
     return rows

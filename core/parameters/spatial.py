@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from core.body.feet import FootTracks
 from core.events.result import Stride, Strides
-from core.frames import SIDES, Floats, Protocol, Side
+from core.frames import SIDES, Bools, Floats, Protocol, Side
 from core.parameters.catalogue import list_names
 from core.parameters.catalogue.entry import DISTANCES
 from core.parameters.clearance import SoleHeights, measure_floor_heights, sole_heights, toe_clearance
@@ -171,8 +171,8 @@ class _Paths:
 
     places: Places
     heights: Mapping[Side, SoleHeights | None]
-    lost: Mapping[Side, NDArray[np.int64]]
-    patched: Mapping[Side, NDArray[np.int64]]
+    lost: Mapping[Side, NDArray[np.int32]]
+    patched: Mapping[Side, NDArray[np.int32]]
     heading: Mapping[tuple[Side, int], float]
     known: bool
     """How far apart the feet stood, without which width is not known."""
@@ -187,14 +187,20 @@ def _paths(strides: Strides, feet: FootTracks) -> _Paths:
     return _Paths(
         places=found,
         heights={side: sole_heights(feet, side) for side in feet.p},
-        lost={side: np.concatenate(([0], np.cumsum(~feet.valid[side]))) for side in feet.p},
+        lost={side: _count_before(~feet.valid[side]) for side in feet.p},
         patched={
-            side: np.concatenate(([0], np.cumsum(feet.patched.get(side, np.zeros(len(feet.t_s), np.bool_)))))
-            for side in feet.p
+            side: _count_before(feet.patched.get(side, np.zeros(len(feet.t_s), np.bool_))) for side in feet.p
         },
         heading=heading,
         known=feet.body.standing_width is not None,
     )
+
+
+def _count_before(mask: Bools) -> NDArray[np.int32]:
+    """How many (n + 1,) of a mask (n,) are true before each sample, and in all."""
+    count = np.zeros(len(mask) + 1, np.int32)
+    np.cumsum(mask, out=count[1:])
+    return count
 
 
 def _row(s: Stride, feet: FootTracks | None, paths: _Paths | None) -> Row:

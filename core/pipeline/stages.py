@@ -44,7 +44,7 @@ from core.quality.stuck import drop_stuck_sensors, mark_stuck
 from core.recording import UniformRecording
 from core.rest import STANDING, Window, find_rest_windows
 from core.setup.propose import propose_labels, propose_repair
-from core.withheld import withhold, withhold_at_slips, withhold_distances
+from core.withheld import list_fixed, withhold, withhold_at_slips, withhold_distances
 
 CHAIN: Final[frozenset[Segment]] = frozenset(s for joint in LEG_JOINTS for s in joint)
 """With all of these worn the joints compare the clocks of both feet."""
@@ -256,7 +256,10 @@ def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
     posed, mounted = require_stage(analysis.posed, "poses"), require_stage(analysis.mounted, "mounting")
     standing = analysis.recording.subject.standing_angles_deg
     calibration = mounted.calibrated.calibration
-    joint = measure_angles(posed.orientations, calibration.zero, posed.poses, standing, calibration.posture)
+    fixed = list_fixed(posed.poses)
+    joint = measure_angles(
+        posed.orientations, calibration.zero, posed.poses, standing, calibration.posture, fixed
+    )
     shown = withhold(joint, posed.poses, posed.orientations)
     doubtful = {} if analysis.agreed is None else analysis.agreed.doubtful
     return replace(analysis, angles=withhold_at_slips(shown, doubtful) if doubtful else shown)

@@ -127,9 +127,9 @@ def check_device(stream: ImuStream, params: RestParams | None = None) -> DeviceC
     """
     params = params or RestParams()
     rate = stream.rate_hz
-    if stream.gyr is None:
+    if stream.held("gyr") is None:
         return DeviceCheck(stream.device_id, rate, reason="no_gyroscope")
-    signals = _held(stream, stream.gyr)
+    signals = _held(stream)
     rests = find_windows(measure_quietness(signals, rate, params).quiet, rate, params)
     still = [r for r in rests if not is_drifting(signals, r, rate, params)]
     if not still:
@@ -154,11 +154,14 @@ def check_device(stream: ImuStream, params: RestParams | None = None) -> DeviceC
     )
 
 
-def _held(stream: ImuStream, gyr: Floats) -> SensorSignals:
+def _held(stream: ImuStream) -> SensorSignals:
     """The stream's samples, missing ones held and not valid, nor those beside a gap in time."""
-    good = np.asarray(np.isfinite(np.concatenate((stream.acc, gyr), axis=1)).all(axis=1), np.bool_)
+    there = [np.isfinite(stream.held(name)).all(axis=1) for name in ("acc", "gyr")]
+    good = np.asarray(np.logical_and(*there), np.bool_)
     last = np.maximum.accumulate(np.where(good, np.arange(len(good)), 0))
-    acc, rates = np.nan_to_num(stream.acc[last]), np.nan_to_num(gyr[last])
+    acc, rates = (
+        np.nan_to_num(stream.held(name)[last].astype(np.float64), copy=False) for name in ("acc", "gyr")
+    )
     pause = np.diff(stream.t_s) > LONGEST_GAP / stream.rate_hz
     valid = good & ~np.concatenate(([False], pause)) & ~np.concatenate((pause, [False]))
     return SensorSignals(stream.device_id, acc, rates, None, valid, ~good)

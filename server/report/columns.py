@@ -72,8 +72,18 @@ GROUP: Final = 1 << 17
 """Rows that are laid out and written together."""
 
 
-def parquet_file(t_s: Floats, columns: Mapping[str, ParquetColumn], meta: Mapping[str, object]) -> bytes:
-    """Columns over time as Parquet with `meta` as JSON under "sagittal"; NaN becomes null."""
+def parquet_file(
+    t_s: Floats,
+    columns: Mapping[str, ParquetColumn],
+    meta: Mapping[str, object],
+    written: Callable[[], None] = lambda: None,
+) -> bytes:
+    """Columns over time as Parquet with `meta` as JSON under "sagittal"; NaN becomes null.
+
+    Parameters
+    ----------
+    written : called after each group of rows.
+    """
     kept = {"sagittal": json.dumps(reduce_to_plain(meta))}
     sink, writer = io.BytesIO(), None
     for first in range(0, max(1, len(t_s)), GROUP):
@@ -85,8 +95,9 @@ def parquet_file(t_s: Floats, columns: Mapping[str, ParquetColumn], meta: Mappin
                 sink, table.schema, compression="zstd", use_dictionary=False, use_byte_stream_split=split
             )
         writer.write_table(table)
+        del table
+        written()
         if first + GROUP < len(t_s):
-            del table
             give_memory_back()
     if writer is not None:
         writer.close()

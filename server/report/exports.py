@@ -31,6 +31,7 @@ from core.body.poses import Poses
 from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
 from core.frames import Floats
+from core.held_samples import give_pages_back
 from core.parameters.catalogue import list_names
 from core.parameters.catalogue.entry import SQUAT
 from core.parameters.rows import Column
@@ -90,20 +91,23 @@ def analysis_files(analysis: TakeAnalysis, let_go: Callable[[], None] = lambda: 
     files[signals.NAME] = signals.signals_parquet(recording)
     del recording
     let_go()
-    if poses is not None:
-        files["poses.parquet"] = poses_parquet(poses)
-        del poses
-        let_go()
     if measured is not None:
         files["events.csv"] = events_csv(measured.events)
         files["strides.csv"] = strides_csv(measured.strides, measured.columns)
         if measured.steps is not None:
             files["steps.csv"] = steps_csv(measured.steps)
+        del measured
     if squats is not None:
         files["repetitions.csv"] = repetitions_csv(squats)
     if held is not None:
         files[tracks.NAME] = tracks.tracks_parquet(held)
         del held
+        let_go()
+    # behind those, since the figure of a long take lies in a file
+    if poses is not None:
+        files["poses.parquet"] = poses_parquet(poses)
+        del poses
+        let_go()
     return {name: files[name] for name in IN_ORDER if name in files}
 
 
@@ -121,7 +125,7 @@ def angles_parquet(angles: JointAngles) -> bytes:
         meta["estimated"] = reduce_to_plain(angles.diagnostics["estimated"])
     if angles.standing_deg:
         meta["standing_angles_deg"] = dict(angles.standing_deg)
-    return parquet_file(angles.t_s, columns, meta)
+    return parquet_file(angles.t_s, columns, meta, lambda: give_pages_back(angles.angles.values()))
 
 
 def _degrees(a: Floats) -> ParquetColumn:
@@ -139,7 +143,8 @@ def poses_parquet(poses: Poses) -> bytes:
     columns |= {f"contact_{segment.removeprefix('foot_')}": c for segment, c in poses.contact.items()}
     body = {name: getattr(poses.body, name) for name in poses.body.__dataclass_fields__}
     meta = {"schema": SCHEMA, "rate_hz": poses.rate_hz, "method": poses.method, "body": body}
-    return parquet_file(poses.t_s, columns, meta)
+    held = (*poses.q.values(), *poses.p.values())
+    return parquet_file(poses.t_s, columns, meta, lambda: give_pages_back(held))
 
 
 def events_csv(events: GaitEvents) -> bytes:

@@ -23,6 +23,7 @@ from core.events.result import GaitEvents
 from core.events.steps import Step, Steps
 from core.events.turns import Turn
 from core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
+from core.held_samples import cut_blocks, give_pages_back
 from core.measure import Tracks
 from core.parameters import Surface
 from server.report.columns import (
@@ -53,7 +54,7 @@ def tracks_parquet(tracks: Tracks) -> bytes:
         assert feet is not None  # noqa: S101 (narrows the type)
         foot = FOOT[side]
         columns |= _spread(f"{foot}_path", p, "xyz")
-        if foot not in tracks.q or not np.array_equal(feet.q[side], tracks.q[foot]):
+        if foot not in tracks.q or not _are_equal(feet.q[side], tracks.q[foot]):
             columns |= _spread(f"{foot}_path_q", feet.q[side], "wxyz")
         columns[f"{foot}_path_valid"] = feet.valid[side]
         columns[f"{foot}_still"] = feet.still[side]
@@ -82,7 +83,13 @@ def tracks_parquet(tracks: Tracks) -> bytes:
             "sensor_ahead_m": dict(feet.sensor_ahead),
         },
     }
-    return parquet_file(tracks.t_s, columns, meta)
+    paths = () if feet is None else (*feet.p.values(), *feet.q.values())
+    return parquet_file(tracks.t_s, columns, meta, lambda: give_pages_back(paths))
+
+
+def _are_equal(a: Floats, b: Floats) -> bool:
+    """Whether two arrays (n, k) are, without reading further than they are."""
+    return a is b or all(np.array_equal(a[part], b[part]) for part in cut_blocks(len(a)))
 
 
 def read_tracks(data: bytes, events: GaitEvents, angles: JointAngles | None) -> Tracks:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import mmap
+import resource
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from core.frames import Floats
+from core.held_samples import SHORT, HeldSeries, cut_blocks, give_pages_back, make_room
 from core.recording import SensorSignals
 
 
@@ -48,3 +53,48 @@ def test_a_changed_sensor_holds_the_same_samples_once() -> None:
     assert other.held("acc") is one.held("acc")
     assert other.mag is None
     assert one.mag is not None
+
+
+@pytest.mark.parametrize("samples", [0, 1, 1 << 14, (1 << 15) + 5])
+def test_blocks_are_every_sample_once_and_in_order(samples: int) -> None:
+    cut = [range(samples)[part] for part in cut_blocks(samples)]
+    assert [k for part in cut for k in part] == list(range(samples))
+
+
+def test_a_series_is_the_field_less_its_offset() -> None:
+    values = np.random.default_rng(0).normal(size=(40, 3))
+    off = np.array([0.1, 0.2, 0.3])
+    assert np.array_equal(HeldSeries(sensor(values), "acc", off)[3:9], (values - off)[3:9])
+    assert np.array_equal(HeldSeries(sensor(values), "acc")[:], values)
+
+
+def test_what_a_long_take_gives_lies_in_a_file_and_is_not_in_memory_until_it_is_read() -> None:
+    rows = 8 * SHORT
+    assert not isinstance(make_room(SHORT, 4).base, mmap.mmap)
+    room = make_room(rows, 4)
+    assert isinstance(room.base, mmap.mmap)
+    before = resident_kb()
+    room[:] = np.arange(4.0 * rows).reshape(rows, 4)
+    assert resident_kb() - before > 0.9 * room.nbytes / 1024
+    give_pages_back((room, np.zeros(3)))
+    assert resident_kb() - before < 0.1 * room.nbytes / 1024
+    assert np.array_equal(room, np.arange(4.0 * rows).reshape(rows, 4))
+
+
+def test_without_room_on_the_disk_it_is_in_memory() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 16, hard))
+    try:
+        room = make_room(2 * SHORT, kind=np.float32)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert not isinstance(room.base, mmap.mmap)
+    room[:] = 1.0
+    give_pages_back((room,))
+    assert room.sum() == 2 * SHORT
+
+
+def resident_kb() -> int:
+    """Pages of this process that are in memory and belong to a file, or to one in memory."""
+    status = Path("/proc/self/status").read_text().splitlines()
+    return sum(int(x.split()[1]) for x in status if x.startswith(("RssFile", "RssShmem")))

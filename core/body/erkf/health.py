@@ -7,10 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from core.body.erkf.poses import AT_ONCE, ErkfRun
+from core.body.erkf.poses import ErkfRun
 from core.body.erkf.start import find_parts
 from core.body.health import LONGEST_MOVING_S, HealthFinding, longest_run_s
 from core.errors import Notice, Severity
+from core.held_samples import cut_blocks
 from core.rotation import conjugate, multiply, wrap_angle, yaw
 
 RESIDUAL_MM: Final = (25.0, 80.0)
@@ -156,10 +157,12 @@ def _start_heading(run: ErkfRun) -> HealthFinding:
 def _climb_pct(run: ErkfRun, foot: int) -> float:
     """How far the foot's last rest lies above or below its first, of the way between, %."""
     rests = run.inputs.contact[:, foot]
-    place, turned, p = run.track.places[foot], run.track.turns[foot], []
-    for first in range(0, len(rests), AT_ONCE):
-        part = slice(first, first + AT_ONCE)
-        p.append(run.tree.segment(foot, place[part][rests[part]], turned[part][rests[part]])[1])
-    path = np.concatenate(p)
+    place, turned = run.track.places[foot], run.track.turns[foot]
+    path = np.concatenate(
+        [
+            run.tree.segment(foot, place[part][rests[part]], turned[part][rests[part]])[1]
+            for part in cut_blocks(len(rests))
+        ]
+    )
     way = float(np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1).sum())
     return 100.0 * float(abs(path[-1, 2] - path[0, 2])) / max(way, CLIMB_WAY_M)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, cast
+from typing import cast
 
 import numpy as np
 
@@ -24,15 +24,13 @@ from core.calibration.result import CalibratedRecording
 from core.estimators import ERKF, LINKED_PATHS, SINGLE_PATHS
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
+from core.held_samples import cut_blocks
 from core.recording import UniformRecording
 from core.rest import find_runs
 from core.rotation import from_matrix, multiply, rotate
 
 NEAR_START_S = 1.0
 """Rest that begins so early is a standing start."""
-
-AT_ONCE: Final = 1 << 14
-"""Samples whose poses are worked out at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,8 +156,7 @@ def find_segment_tracks(run: ErkfRun, *, in_place: bool = False) -> SegmentTrack
         if not in_place:
             q[segment], p[segment] = run.tree.segment(i, place, turn)
             continue
-        for first in range(0, len(turn), AT_ONCE):
-            part = slice(first, first + AT_ONCE)
+        for part in cut_blocks(len(place)):
             turn[part], place[part] = run.tree.segment(i, place[part], turn[part])
         q[segment], p[segment] = turn, place
     return SegmentTracks(q, p)
@@ -195,8 +192,7 @@ def place_figure(
     still = {s: run.inputs.contact[:, run.segments.index(FOOT[s])] for s in legs}
     floor = _floor({s: tracks.p[FOOT[s]][:, 2] - body.ankle_height for s in legs}, still)
     level = {s: np.empty((len(floor), 3), figure_precision(len(floor))) for s in shown}
-    for first in range(0, len(floor), AT_ONCE):
-        part = slice(first, first + AT_ONCE)
+    for part in cut_blocks(len(floor)):
         place = {s: tracks.p[s][part] for s in shown}
         turned = {s: orientations.q[s][part] for s in shown}
         for side in legs:

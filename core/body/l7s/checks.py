@@ -19,6 +19,7 @@ from core.body.health import longest_run_s
 from core.body.l7s.filter import L7sInputs, L7sTrack
 from core.body.l7s.legs import LegModel
 from core.frames import Bools, Floats, Segment
+from core.held_samples import cut_blocks
 from core.rest import find_runs
 
 OUTWARD: Final = (-0.5, 2.0)
@@ -94,8 +95,11 @@ def walking_checks(seen: SeenWalk, model: LegModel, rate_hz: float) -> dict[str,
     moving = np.asarray(~seen.step.all(axis=1))
     heading = np.unwrap(np.arctan2(seen.forward[:, 1], seen.forward[:, 0]))
     if moving.any():
-        to_left = np.stack((-np.sin(heading), np.cos(heading)), axis=1)
-        outward = np.sum(to_left * (seen.feet[:, 0] - seen.feet[:, 1]), axis=1)[moving]
+        outward = np.empty(len(heading))
+        for part in cut_blocks(len(heading)):
+            to_left = np.stack((-np.sin(heading[part]), np.cos(heading[part])), axis=1)
+            outward[part] = np.sum(to_left * (seen.feet[part, 0] - seen.feet[part, 1]), axis=1)
+        outward = outward[moving]
         low, high = (x * model.hip_width for x in OUTWARD)
         found["out_of_place_share"] = float(np.mean((outward < low) | (outward > high)))
     rests = [_rests(seen.step[:, leg], rate_hz) for leg in range(2)]

@@ -25,7 +25,7 @@ from core.errors import Notice
 from core.estimators import L7S_2I, L7S_3I
 from core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
-from core.held_samples import SampleSeries
+from core.held_samples import SampleSeries, give_pages_back, make_room
 from core.rotation import angle_between, from_matrix
 
 STRETCHED_M: Final = 1e-6
@@ -84,6 +84,9 @@ def l7s_poses(
     for window in windows:
         figure.add(window)
         P = window.P
+        del window
+    seen = SeenWalk.join(figure.seen)
+    figure.seen.clear()
     variances = np.diag(P)[:18].reshape(3, 6)[:, :3]
     poses = Poses(
         t_s=orientations.t_s,
@@ -103,7 +106,7 @@ def l7s_poses(
             "position_sd_m": {s: float(np.sqrt(x.max())) for s, x in zip(BODIES, variances, strict=True)},
             "min_eigenvalue": float(np.linalg.eigvalsh(P)[0]),
             "gap_s": longest_gaps({s: orientations.valid[s] for s in measured}, rate),
-            **walking_checks(SeenWalk.join(figure.seen), model, rate),
+            **walking_checks(seen, model, rate),
         },
     )
     health = l7s_health(poses)
@@ -119,8 +122,8 @@ class _Figure:
     def __init__(self, take: L7sTake) -> None:
         n = len(take.step)
         kind = figure_precision(n)
-        self.q: dict[Segment, Floats] = {s: np.empty((n, 4), kind) for s in FIGURE}
-        self.p: dict[Segment, Floats] = {s: np.empty((n, 3), kind) for s in FIGURE}
+        self.q: dict[Segment, Floats] = {s: make_room(n, 4, kind=kind) for s in FIGURE}
+        self.p: dict[Segment, Floats] = {s: make_room(n, 3, kind=kind) for s in FIGURE}
         self.seen: list[SeenWalk] = []
         self._model = take.model
         both = take.step.all(axis=1)
@@ -135,6 +138,7 @@ class _Figure:
         at = slice(window.first, window.first + len(legs.q))
         for i, s in enumerate(FIGURE):
             self.q[s][at], self.p[s][at] = legs.q[:, i], legs.p[:, i]
+        give_pages_back((*self.q.values(), *self.p.values()))
         self.seen.append(SeenWalk.of(window.inputs, window.track))
         length = self._model.thigh + self._model.shank
         self._passes = max(self._passes, window.passes)

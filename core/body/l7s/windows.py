@@ -19,8 +19,8 @@ from core.body.l7s.foot_place import find_sensor_offsets
 from core.body.l7s.inputs import L7sTake
 from core.body.l7s.legs import LEGS
 from core.body.l7s.smoother import NODE_S, find_hop, smooth_track
-from core.body.poses import SHORT
 from core.frames import Bools, Floats
+from core.held_samples import SHORT
 
 WHOLE: Final = SHORT
 """Samples up to which a take is one window, and 200 MB."""

@@ -151,7 +151,8 @@ def test_the_order_of_the_files_does_not_change_the_signals() -> None:
 
 def test_a_take_is_too_long_by_what_its_analysis_needs() -> None:
     hour = 3600.0 * 100.0
-    assert not is_too_long(6.0 * hour, 2)
+    assert not is_too_long(14.0 * hour, 2)
+    assert is_too_long(15.0 * hour, 2)
     assert not is_too_long(5.5 * hour, 7)
     assert is_too_long(7.0 * hour, 7)
     assert not is_too_long(5.5 * hour, 1)

@@ -17,7 +17,7 @@ from core.fusion.orientations import Orientations
 from core.norms import adult_kinematics
 from core.parameters import cycle_curves, foot_pitch, gait_parameters, mean_curve, summarise_angles
 from core.parameters.catalogue import list_curve_figures
-from core.parameters.kinematic import measure_curves, per_stride_figures, stride_figures
+from core.parameters.kinematic import measure_cycles, per_stride_figures, stride_figures
 from core.parameters.result import CycleCurves
 from tests.core.events.foot_signal import orientations
 from tests.data import data_folder
@@ -257,7 +257,7 @@ def test_figures_of_half_the_curves_at_a_time_are_those_of_all() -> None:
         bounds={"knee_flexion_r": 0.1},
     )
     curves = cycle_curves(take, strides())
-    known, figures = measure_curves(take, strides())
+    known, figures = measure_cycles(take, strides())
     expected = stride_figures(curves)
     assert [(name, *x) for name, x in figures.items()] == [(name, *x) for name, x in expected.items()]
     for name, sides in expected.items():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from core import held_samples
 from core.body import poses
 from core.body.l7s import windows
 from core.body.l7s.windows import cut_windows
@@ -17,6 +18,7 @@ from tests.core.body.l7s.test_poses import poses_of
 def short_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(windows, "WHOLE", 1000)
     monkeypatch.setattr(poses, "SHORT", 1000)
+    monkeypatch.setattr(held_samples, "SHORT", 1000)
     monkeypatch.setattr(windows, "LONG", 1000)
 
 
