@@ -125,15 +125,53 @@ def score_curves(
     estimated : variables no two sensors measure; they are not scored.
     age : years; below 18 there is no score against adults (`no_norm_for_age`). None = an adult.
     """
+    means = CurveMeans(standing_deg or {})
+    means.add(curves)
+    return score_means(means, curves, reference, estimated, age)
+
+
+class CurveMeans:
+    """Means of the counted strides as scores need them, of curves that are added as they come.
+
+    Parameters
+    ----------
+    standing_deg : goniometer angles in standing.
+    """
+
+    def __init__(self, standing_deg: Mapping[str, float]) -> None:
+        self.standing_deg = standing_deg
+        self.there: set[Key] = set()
+        self.own: dict[Key, MeanCurve] = {}
+        self.level: dict[Key, MeanCurve] = {}
+
+    def add(self, curves: CycleCurves) -> None:
+        """Take in some or all curves, from standing."""
+        self.there.update((v, side) for v, sides in curves.curves.items() for side in sides)
+        self.own |= _means(curves)
+        self.level |= _means(anatomical_curves(curves, self.standing_deg))
+
+
+def score_means(
+    means: CurveMeans,
+    known: CycleCurves,
+    reference: CurveReference | None = None,
+    estimated: Collection[str] = (),
+    age: float | None = None,
+) -> Scores:
+    """Score means, otherwise as `score_curves`.
+
+    Parameters
+    ----------
+    known : what is known beside the curves; it need not have any.
+    """
     child = reference is None and wbds_group(age) is None
     reference = adult_reference() if reference is None else reference
-    level = anatomical_curves(curves, standing_deg or {}) if reference.zero == "anatomical" else curves
-    means = _means(curves)
+    level = means.level if reference.zero == "anatomical" else means.own
     found: list[Score] = []
     for mode in MODES:
-        own = _means(level) if mode == "raw" else means
+        own = level if mode == "raw" else means.own
         single = [
-            _gvs(v, side, mode, own.get((v, side)), means.get((v, side)), curves, reference, v in estimated)
+            _gvs(v, side, mode, own.get((v, side)), means, known, reference, v in estimated)
             for side in SIDES
             for v in NINE
         ]
@@ -168,8 +206,8 @@ def _gvs(
     side: Side,
     mode: Mode,
     own: MeanCurve | None,
-    standing: MeanCurve | None,
-    curves: CycleCurves,
+    means: CurveMeans,
+    known: CycleCurves,
     reference: CurveReference,
     estimated: bool,
 ) -> Score:
@@ -177,13 +215,12 @@ def _gvs(
     reason = None
     if variable not in reference.mean_deg:
         reason = "no_reference"
-    elif standing is None:
-        there = side in curves.curves.get(variable, {})
-        why = curves.why.get(variable, {}).get(side)
-        reason = why or ("no_strides" if there else "joint_missing")
+    elif (variable, side) not in means.own:
+        why = known.why.get(variable, {}).get(side)
+        reason = why or ("no_strides" if (variable, side) in means.there else "joint_missing")
     elif estimated:
         reason = "estimated"
-    elif curves.zero == "walking" and mode == "raw" and variable not in MEAN_ZERO:
+    elif known.zero == "walking" and mode == "raw" and variable not in MEAN_ZERO:
         reason, own = NO_STANDING, None
     elif own is None:
         reason = "no_level" if variable in MEAN_ZERO else "angle_zero_standing"

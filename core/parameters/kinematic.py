@@ -6,7 +6,7 @@ The windows of the figures are those of the reference table (core/norms/data), s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Final
@@ -68,9 +68,7 @@ class MeanCurve:
     n: int
 
 
-def cycle_curves(
-    angles: JointAngles, strides: Strides, variables: Collection[str] | None = None
-) -> CycleCurves:
+def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
     """Cut angles into gait cycles.
 
     Pelvis angles appear once per side, over that side's cycles; obliquity is positive with that side up.
@@ -78,17 +76,13 @@ def cycle_curves(
     the stride: against the walking direction they have no level (`MEAN_ZERO`).
     A stride in which the angle is not known throughout is a row of NaN; one in which a knee bends the wrong
     way as no knee can (`LEAST_KNEE`) as well.
-
-    Parameters
-    ----------
-    variables : what is cut, None = every angle.
     """
     curves: dict[str, dict[Side, Floats]] = {}
 
-    def keep(variable: str, side: Side, rows: Floats) -> None:
+    def keep(known: CycleCurves, variable: str, side: Side, rows: Floats) -> None:
         curves.setdefault(variable, {})[side] = rows
 
-    return replace(_cut_cycles(angles, strides, keep, variables), curves=curves)
+    return replace(read_cycles(angles, strides, keep), curves=curves)
 
 
 def measure_cycles(
@@ -101,22 +95,30 @@ def measure_cycles(
     """
     figures, found = list_curve_figures(), dict[str, dict[Side, Floats]]()
 
-    def read(variable: str, side: Side, rows: Floats) -> None:
+    def read(known: CycleCurves, variable: str, side: Side, rows: Floats) -> None:
         for name, figure in figures.items():
             if figure.variable == variable:
                 found.setdefault(name, {})[side] = _read_figure(figure, rows)
 
-    known = _cut_cycles(angles, strides, read)
+    known = read_cycles(angles, strides, read)
     return known, {name: found[name] for name in figures if name in found}
 
 
-def _cut_cycles(
+def read_cycles(
     angles: JointAngles,
     strides: Strides,
-    take: Callable[[str, Side, Floats], None],
-    variables: Collection[str] | None = None,
+    take: Callable[[CycleCurves, str, Side, Floats], None],
 ) -> CycleCurves:
-    """Hand every curve (strides, 101) to `take`; what is known beside the curves."""
+    """Hand every curve of `cycle_curves` to `take`, which lets it go or keeps it.
+
+    Parameters
+    ----------
+    take : is given what is known beside the curves, variable, side and curve (strides, 101), rad.
+
+    Returns
+    -------
+    What is known beside the curves.
+    """
     index = {side: tuple(i for i, s in enumerate(strides.strides) if s.side == side) for side in SIDES}
     ends: dict[str, dict[Side, float]] = {}
     why: dict[str, dict[Side, str]] = {}
@@ -125,41 +127,7 @@ def _cut_cycles(
         own_sides = [s for s in SIDES if SUFFIX[s] == suffix]
         for side in own_sides or SIDES:
             why.setdefault(base if own_sides else name, {})[side] = reason
-    for side in SIDES:
-        own = [strides.strides[i] for i in index[side]]
-        bounds = np.array([(s.start_s, s.end_s) for s in own]).reshape(-1, 2)
-        names = {}
-        for name in angles.angles:
-            base, _, suffix = name.rpartition("_")
-            if suffix == SUFFIX[side]:
-                names[name] = base
-            elif suffix not in SUFFIX.values():
-                names[name] = name
-        wanted = names if variables is None else {n: base for n, base in names.items() if base in variables}
-        courses = {
-            variable: angles.headings[segment]
-            for segment, variable in (("pelvis", "pelvis_rotation"), (FOOT[side], "foot_progression"))
-            if segment in angles.headings and (variables is None or variable in variables)
-        }
-        signals = chain(courses.values(), (angles.angles[name] for name in wanted))
-        rows = resample_in_turn(signals, angles.t_s, bounds, POINTS)
-        for variable, row in zip(courses, rows):  # noqa: B905 - the angles follow
-            row -= row[:, :-1].mean(axis=1, keepdims=True)
-            take(variable, side, np.negative(row, out=row) if side == "left" else row)
-        for (name, base), row in zip(wanted.items(), rows, strict=True):
-            sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
-            # from the mean of walking nobody knows where straight is
-            if base == "knee_flexion" and angles.zero == "standing":
-                least = LEAST_KNEE - np.radians(angles.standing_deg.get(name, 0.0))
-                torn = (row < least).any(axis=1)
-                row = np.where(torn[:, None], np.nan, row)
-                if torn.any():
-                    why.setdefault(base, {})[side] = IMPOSSIBLE
-            row *= sign
-            take(base, side, row)
-            if name in angles.bounds:
-                ends.setdefault(base, {})[side] = angles.bounds[name]
-    return CycleCurves(
+    known = CycleCurves(
         curves={},
         stride_index=index,
         used={
@@ -173,6 +141,40 @@ def _cut_cycles(
         bounds=ends,
         zero=angles.zero,
     )
+    for side in SIDES:
+        own = [strides.strides[i] for i in index[side]]
+        bounds = np.array([(s.start_s, s.end_s) for s in own]).reshape(-1, 2)
+        names = {}
+        for name in angles.angles:
+            base, _, suffix = name.rpartition("_")
+            if suffix == SUFFIX[side]:
+                names[name] = base
+            elif suffix not in SUFFIX.values():
+                names[name] = name
+        courses = {
+            variable: angles.headings[segment]
+            for segment, variable in (("pelvis", "pelvis_rotation"), (FOOT[side], "foot_progression"))
+            if segment in angles.headings
+        }
+        signals = chain(courses.values(), (angles.angles[name] for name in names))
+        rows = resample_in_turn(signals, angles.t_s, bounds, POINTS)
+        for variable, row in zip(courses, rows):  # noqa: B905 - the angles follow
+            row -= row[:, :-1].mean(axis=1, keepdims=True)
+            take(known, variable, side, np.negative(row, out=row) if side == "left" else row)
+        for (name, base), row in zip(names.items(), rows, strict=True):
+            sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
+            # from the mean of walking nobody knows where straight is
+            if base == "knee_flexion" and angles.zero == "standing":
+                least = LEAST_KNEE - np.radians(angles.standing_deg.get(name, 0.0))
+                torn = (row < least).any(axis=1)
+                row = np.where(torn[:, None], np.nan, row)
+                if torn.any():
+                    why.setdefault(base, {})[side] = IMPOSSIBLE
+            row *= sign
+            if name in angles.bounds:
+                ends.setdefault(base, {})[side] = angles.bounds[name]
+            take(known, base, side, row)
+    return known
 
 
 def mean_curve(curves: CycleCurves, variable: str, side: Side) -> MeanCurve:

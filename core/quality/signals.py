@@ -74,13 +74,15 @@ def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
     k = int(np.argmin(spread))
     at = slice(k, k + width)
     still_norm = float(norm[at].mean())
-    speed = None if gyr is None else np.linalg.norm(gyr, axis=1)
     calm = np.union1d([k], np.flatnonzero(spread < STILL * np.sqrt((mean**2).sum(axis=0))))
+    still = bool(spread[k] < STILL * np.linalg.norm(mean[:, k]))
+    del a, rows, mean, away, spread  # of a day each is half a gigabyte
+    speed = None if gyr is None else np.linalg.norm(gyr, axis=1)
     if gyr is not None:
         calm = _without_turns(gyr[good], calm, width)
     known = None if speed is None else speed[np.isfinite(speed)]
     return Facts(
-        still=bool(spread[k] < STILL * np.linalg.norm(mean[:, k])),
+        still=still,
         still_norm=still_norm,
         still_gyro=None if speed is None else _least(speed[good], calm, width),
         still_slice=slice(int(good[at][0]), int(good[at][-1]) + 1),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -12,14 +12,13 @@ import numpy as np
 from core.angles import JointAngles
 from core.body.health import find_worst_verdict
 from core.body.model import LENGTHS
-from core.frames import SEGMENTS, Side
+from core.frames import SEGMENTS, Floats, Side
 from core.norms.controls import mean_curves
-from core.norms.profile import NINE, MeanCurves
-from core.parameters import cycle_curves
-from core.parameters.result import Parameter
+from core.parameters.kinematic import read_cycles
+from core.parameters.result import CycleCurves, Parameter
 from core.quality import concern_paths_alone, find_shown_level
 from core.quality.devices import check_device, is_serial
-from core.scores import Scores, score_curves
+from core.scores import CurveMeans, Scores, score_means
 from server.report.columns import SCHEMA, list_turns, reduce_to_plain
 from server.report.estimator import list_estimated_variables
 
@@ -143,26 +142,24 @@ def _summarise_curves(analysis: TakeAnalysis) -> dict[str, object]:
     """Scores and mean curves, so that a trend over many visits and a group of controls read no angles.
 
     Profiles and indices are over several curves. Mean curves are side → variable → 101 degrees from standing,
-    with the decimals of angles.parquet's single precision. Nine curves are held at a time, then the others.
+    with the decimals of angles.parquet's single precision. One curve is held at a time.
     """
     angles, measured = analysis.angles, analysis.measured
     if angles is None or measured is None:
         return {"scores": [], "mean_curves": {}}
     unsure = list_estimated_variables(_estimator(analysis))
-    curves = cycle_curves(angles, measured.strides, NINE)
-    scores = score_rows(score_curves(curves, angles.standing_deg, estimated=unsure))
-    means: dict[Side, dict[str, object]] = {}
-    if angles.zero == "standing":
-        _add_means(means, mean_curves(curves, unsure))
-        del curves
-        others = {name.removesuffix("_l").removesuffix("_r") for name in angles.angles}.difference(NINE)
-        _add_means(means, mean_curves(cycle_curves(angles, measured.strides, others), unsure))
-    return {"scores": scores, "mean_curves": means}
+    scored, means = CurveMeans(angles.standing_deg), dict[Side, dict[str, object]]()
 
-
-def _add_means(means: dict[Side, dict[str, object]], found: MeanCurves) -> None:
-    for side, own in found.items():
+    def read(known: CycleCurves, variable: str, side: Side, rows: Floats) -> None:
+        curve = replace(known, curves={variable: {side: rows}})
+        scored.add(curve)
+        # of somebody who never stood still the curves have no level
+        own = mean_curves(curve, unsure).get(side, {}) if known.zero == "standing" else {}
         means.setdefault(side, {}).update({v: reduce_to_plain(np.round(c, 5)) for v, c in own.items()})
+
+    known = read_cycles(angles, measured.strides, read)
+    found = score_means(scored, known, estimated=unsure)
+    return {"scores": score_rows(found), "mean_curves": {side: own for side, own in means.items() if own}}
 
 
 def score_rows(found: Scores) -> list[dict[str, object]]:

@@ -8,7 +8,7 @@ of core/simulate and on neura_walk, right and with sensors exchanged; limits are
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -67,15 +67,20 @@ class SeenWalk:
         return cls(inputs.step, forward, track.p[:, 1:, :2].copy(), pelvis)
 
     @classmethod
-    def join(cls, blocks: Sequence[SeenWalk]) -> SeenWalk:
-        """Successive blocks as one."""
-        pelvis = [x.pelvis for x in blocks if x.pelvis is not None]
+    def make_room(cls, samples: int, *, pelvis: bool) -> SeenWalk:
+        """Of a take whose blocks are still to be put in."""
         return cls(
-            np.concatenate([x.step for x in blocks]),
-            np.concatenate([x.forward for x in blocks]),
-            np.concatenate([x.feet for x in blocks]),
-            np.concatenate(pelvis) if pelvis else None,
+            np.empty((samples, 2), np.bool_),
+            np.empty((samples, 2)),
+            np.empty((samples, 2, 2)),
+            np.empty((samples, 3)) if pelvis else None,
         )
+
+    def put(self, at: slice, block: SeenWalk) -> None:
+        """Write a block to its samples."""
+        self.step[at], self.forward[at], self.feet[at] = block.step, block.forward, block.feet
+        if self.pelvis is not None:
+            self.pelvis[at] = block.pelvis
 
 
 def walking_checks(seen: SeenWalk, model: LegModel, rate_hz: float) -> dict[str, float]:

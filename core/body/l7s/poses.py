@@ -85,28 +85,30 @@ def l7s_poses(
         figure.add(window)
         P = window.P
         del window
-    seen = SeenWalk.join(figure.seen)
-    figure.seen.clear()
+    known = KnownSamples().push([orientations.valid[s] for s in measured], take.step)
+    shown = figure.measure()
+    del take, windows
+    checks = walking_checks(figure.seen, model, rate)
     variances = np.diag(P)[:18].reshape(3, 6)[:, :3]
     poses = Poses(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
         q=figure.q,
         p=figure.p,
-        valid=KnownSamples().push([orientations.valid[s] for s in measured], take.step),
+        valid=known,
         contact={FOOT[s]: np.asarray(steps[s], bool) for s in LEGS},
         body=body,
         method=(L7S_3I if worn == "3I" else L7S_2I).method,
         notices=_never_still(steps),
         diagnostics={
             "adjoint": params.adjoint,
-            **figure.measure(),
+            **shown,
             "step_share": {s: float(np.mean(steps[s])) for s in LEGS},
             "sensor_ahead_m": {s: float(-offsets[i, 2]) for i, s in enumerate(LEGS)},
             "position_sd_m": {s: float(np.sqrt(x.max())) for s, x in zip(BODIES, variances, strict=True)},
             "min_eigenvalue": float(np.linalg.eigvalsh(P)[0]),
             "gap_s": longest_gaps({s: orientations.valid[s] for s in measured}, rate),
-            **walking_checks(seen, model, rate),
+            **checks,
         },
     )
     health = l7s_health(poses)
@@ -116,7 +118,7 @@ def l7s_poses(
 class _Figure:
     """The seven segments of a take, window by window, and what is measured on them.
 
-    q, p : as in `Poses`. seen : of each window.
+    q, p : as in `Poses`. seen : what the checks look at.
     """
 
     def __init__(self, take: L7sTake) -> None:
@@ -124,7 +126,7 @@ class _Figure:
         kind = figure_precision(n)
         self.q: dict[Segment, Floats] = {s: make_room(n, 4, kind=kind) for s in FIGURE}
         self.p: dict[Segment, Floats] = {s: make_room(n, 3, kind=kind) for s in FIGURE}
-        self.seen: list[SeenWalk] = []
+        self.seen = SeenWalk.make_room(n, pelvis=take.worn == "3I")
         self._model = take.model
         both = take.step.all(axis=1)
         self._moving: Bools = np.asarray(~both | both.all())
@@ -139,7 +141,7 @@ class _Figure:
         for i, s in enumerate(FIGURE):
             self.q[s][at], self.p[s][at] = legs.q[:, i], legs.p[:, i]
         give_pages_back((*self.q.values(), *self.p.values()))
-        self.seen.append(SeenWalk.of(window.inputs, window.track))
+        self.seen.put(at, SeenWalk.of(window.inputs, window.track))
         length = self._model.thigh + self._model.shank
         self._passes = max(self._passes, window.passes)
         self._straight += np.count_nonzero(legs.reach[self._moving[at]] > length - STRETCHED_M, axis=0)
@@ -151,6 +153,7 @@ class _Figure:
     def measure(self) -> dict[str, object]:
         """The diagnostics of `l7s_poses` that the windows give."""
         turned, moving = np.concatenate(self._turned), np.count_nonzero(self._moving)
+        self._turned.clear()
         return {
             "passes": self._passes,
             "knee_straight_share": {s: float(self._straight[i] / moving) for i, s in enumerate(LEGS)},
