@@ -75,10 +75,8 @@ def measure_quietness(signals: SensorSignals, rate_hz: float, params: RestParams
         return Quietness(never, never, np.zeros(len(signals.valid), bool))
     # axis by axis: all at once are as large again as the take
     rate, force = (partial(_read_axis, signals, name) for name in ("gyr", "acc"))
-    mean_rate = np.array([_moving_mean(rate(k), width) for k in range(3)])
-    spread = _sum_axes(lambda k: _moving_mean(rate(k) ** 2, width) - mean_rate[k] ** 2)
     whole = _moving_mean(signals.valid.astype(np.float64), width) > 1 - 0.5 / width
-    offset = mean_rate[:, int(np.argmin(np.where(whole, spread, np.inf)))]
+    offset = _steadiest_rate(rate, whole, width)
     if np.linalg.norm(offset) > params.gyro_limit:
         offset = np.zeros(3)
     gyro = _moving_mean(np.sqrt(_sum_axes(lambda k: (rate(k) - offset[k]) ** 2)), width)
@@ -88,6 +86,15 @@ def measure_quietness(signals: SensorSignals, rate_hz: float, params: RestParams
     quiet = whole & (gyro < params.gyro_limit) & (acc < params.acc_std_limit)
     n = len(norm)
     return Quietness(_centred(gyro, n, width), _centred(acc, n, width), _centred(quiet, n, width))
+
+
+def _steadiest_rate(rate: Callable[[int], Floats], whole: Bools, width: int) -> Floats:
+    """Mean rate (3,) of the whole window in which it varies least; `rate` gives an axis (n,)."""
+    mean = np.empty((3, len(whole)))
+    for axis in range(3):
+        mean[axis] = _moving_mean(rate(axis), width)
+    spread = _sum_axes(lambda k: _moving_mean(rate(k) ** 2, width) - mean[k] ** 2)
+    return mean[:, int(np.argmin(np.where(whole, spread, np.inf)))].copy()
 
 
 def _read_axis(signals: SensorSignals, name: str, axis: int) -> Floats:

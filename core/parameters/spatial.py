@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from core.body.feet import FootTracks
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Bools, Floats, Protocol, Side
+from core.held_samples import give_pages_back
 from core.parameters.catalogue import list_names
 from core.parameters.catalogue.entry import DISTANCES
 from core.parameters.clearance import SoleHeights, measure_floor_heights, sole_heights, toe_clearance
@@ -35,6 +36,9 @@ NAMES: Final[tuple[str, ...]] = (*list_names(DISTANCES, of="stride"), "toe_out_d
 
 STEP_M: Final = 0.05
 """Two rests of a foot closer than this are one place (our choice: below the error of a stride)."""
+
+AT_ONCE: Final = 512
+"""Strides after which the paths are let go of."""
 
 Reason = Literal[
     "treadmill", "no_foot_track", "no_foot_flat", "gap", "packets_lost", "feet_not_linked",
@@ -82,7 +86,11 @@ def spatial_rows(strides: Strides, feet: FootTracks | None, surface: Surface = G
     if surface.protocol == "treadmill":
         return tuple(_on_belt(s, surface.belt_speed_mps) for s in strides.strides)
     paths = None if feet is None else _paths(strides, feet)
-    return tuple(_row(s, feet, paths) for s in strides.strides)
+    rows: list[Row] = []
+    for first in range(0, len(strides.strides), AT_ONCE):
+        rows += (_row(s, feet, paths) for s in strides.strides[first : first + AT_ONCE])
+        _let_go(feet, *(() if feet is None else feet.p))
+    return tuple(rows)
 
 
 def spatial_row(stride: Stride, strides: Strides, feet: FootTracks | None, surface: Surface = GROUND) -> Row:
@@ -181,12 +189,15 @@ class _Paths:
 def _paths(strides: Strides, feet: FootTracks) -> _Paths:
     found = find_flats(strides.strides, feet)
     heading: dict[tuple[Side, int], float] = {}
+    heights: dict[Side, SoleHeights | None] = {}
     for side in feet.p:
         flats = [at for (foot, _), at in found.items() if foot == side and at is not None]
         heading |= {(side, at): v for at, v in zip(flats, yaw(feet.q[side][flats]).tolist(), strict=True)}
+        heights[side] = sole_heights(feet, side)
+        _let_go(feet, side)
     return _Paths(
         places=found,
-        heights={side: sole_heights(feet, side) for side in feet.p},
+        heights=heights,
         lost={side: _count_before(~feet.valid[side]) for side in feet.p},
         patched={
             side: _count_before(feet.patched.get(side, np.zeros(len(feet.t_s), np.bool_))) for side in feet.p
@@ -194,6 +205,12 @@ def _paths(strides: Strides, feet: FootTracks) -> _Paths:
         heading=heading,
         known=feet.body.standing_width is not None,
     )
+
+
+def _let_go(feet: FootTracks | None, *sides: Side) -> None:
+    """Keep none of the paths of a long take in memory, which lie in a file."""
+    if feet is not None:
+        give_pages_back(path for side in sides for path in (feet.p[side], feet.q[side]))
 
 
 def _count_before(mask: Bools) -> NDArray[np.int32]:

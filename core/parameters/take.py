@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from core.angles import JointAngles
 from core.events.result import Strides
 from core.frames import Floats, Oriented, Segment, Side
-from core.held_samples import give_pages_back
 from core.parameters.kinematic import (
     foot_pitch,
     measure_cycles,
@@ -76,8 +75,6 @@ def take_figures(
     pitch = {} if orientations is None else foot_pitches(orientations)
     flat = find_stances(strides, angles.t_s, pitch)
     rows = spatial_rows(strides, feet, surface)
-    if feet is not None:
-        give_pages_back((*feet.p.values(), *feet.q.values()))
     phases = phase_rows(strides, flat, angles, pitch, feet)
     curves, of_curves = measure_cycles(angles, strides)
     of_feet = turning_angle(strides)

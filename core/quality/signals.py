@@ -65,18 +65,21 @@ def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
     a = acc[good]
     norm = np.linalg.norm(a, axis=1)
     width = int(min(len(a), max(2, round(rate_hz))))
-    rows = np.ascontiguousarray(a.T)
-    mean = _moving_mean(rows, width)
-    away = rows - a.mean(axis=0)[:, None]
-    spread = np.sqrt(
-        np.maximum((_moving_mean(away**2, width) - _moving_mean(away, width) ** 2).sum(axis=0), 0.0)
-    )
+    # axis by axis: of a day each array is half a gigabyte
+    mean, spread, middle = np.empty((3, len(a) - width + 1)), np.zeros(len(a) - width + 1), a.mean(axis=0)
+    for axis in range(3):
+        row = a[:, axis].copy()
+        mean[axis] = _moving_mean(row, width)
+        row -= middle[axis]
+        spread += _moving_mean(row**2, width) - _moving_mean(row, width) ** 2
+    del a, row
+    spread = np.sqrt(np.maximum(spread, 0.0))
     k = int(np.argmin(spread))
     at = slice(k, k + width)
     still_norm = float(norm[at].mean())
     calm = np.union1d([k], np.flatnonzero(spread < STILL * np.sqrt((mean**2).sum(axis=0))))
     still = bool(spread[k] < STILL * np.linalg.norm(mean[:, k]))
-    del a, rows, mean, away, spread  # of a day each is half a gigabyte
+    del mean, spread
     speed = None if gyr is None else np.linalg.norm(gyr, axis=1)
     if gyr is not None:
         calm = _without_turns(gyr[good], calm, width)
@@ -166,8 +169,11 @@ def magnetic_share(mag: Floats, still: slice, limit: float) -> float | None:
 
 
 def _moving_mean(x: Floats, width: int) -> Floats:
-    """Means (c, n − width + 1) of every full window of x (c, n)."""
-    centre = np.cumsum(x, axis=1)[:, -1:] / x.shape[1]
-    total = np.zeros((len(x), x.shape[1] + 1))
-    np.cumsum(x - centre, axis=1, out=total[:, 1:])
-    return np.asarray((total[:, width:] - total[:, :-width]) / width + centre)
+    """Means (n − width + 1,) of every full window of x (n,)."""
+    centre = np.cumsum(x)[-1] / len(x)
+    total = np.zeros(len(x) + 1)
+    np.cumsum(x - centre, out=total[1:])
+    mean = total[width:] - total[:-width]
+    mean /= width
+    mean += centre
+    return np.asarray(mean)
