@@ -57,6 +57,8 @@ RUNNING_S = 16.0
 """Calibration of this walk is over by then."""
 WALKED_S = 48.0
 """End of the walk; a longer run repeats what lies between."""
+FIRST_MINUTE_MB: Final = 4.0
+"""So much of its first minute a session holds, to tell sensors that were exchanged; then no more."""
 BUSY: Final = 4.0
 """The aims hold on a machine of one's own; elsewhere only gross losses fail."""
 STRIDE_S = 1.07
@@ -320,7 +322,7 @@ def test_twenty_sessions_are_acknowledged_estimated_and_coached_in_time(tmp_path
                     1e3 * float(np.quantile(cues, 0.95)), "ms")  # fmt: skip
     assert counts == [batches] * len(all_of)
     assert seen[-1][0].memory < 1.1 * seen[0][0].memory
-    assert seen[-1][1].memory < 1.1 * seen[0][1].memory
+    assert seen[-1][1].memory < 1.1 * seen[0][1].memory + FIRST_MINUTE_MB * 1e6 * len(all_of)
     assert all(s.recording for s in all_of)
     assert np.quantile(acks, 0.99) <= BUSY * 0.4
     assert np.quantile(told, 0.95) <= BUSY * 0.06
