@@ -43,6 +43,14 @@ def cut_blocks(samples: int) -> Iterator[slice]:
         yield slice(first, min(first + AT_A_TIME, samples))
 
 
+def compare_neighbours(x: Floats, of: Callable[[Floats, Floats], Floats]) -> Floats:
+    """What `of` gives of every sample of x (n, k) and the next one, (n − 1,), block by block."""
+    found = np.empty(max(0, len(x) - 1))
+    for part in cut_blocks(len(found)):
+        found[part] = of(x[part], x[part.start + 1 : part.stop + 1])
+    return found
+
+
 def make_room(rows: int, *more: int, kind: type[np.floating[Any]] = np.float64) -> Any:
     """An array (rows, more) to be written, of a long take in a file without a name that goes with it.
 

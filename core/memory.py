@@ -22,12 +22,13 @@ def make_pages(*shape: int) -> Floats:
 
     What is never written takes none.
     """
-    size = 8 * math.prod(shape)
+    count = math.prod(shape)
+    size = 8 * max(1, count)  # a map of nothing cannot be made
     if hasattr(mmap, "MAP_ANONYMOUS"):
         pages = mmap.mmap(-1, size, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
     else:  # Windows
         pages = mmap.mmap(-1, size)
-    return np.frombuffer(pages, np.float64).reshape(shape)
+    return np.frombuffer(pages, np.float64, count).reshape(shape)
 
 
 def give_memory_back() -> None:

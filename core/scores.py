@@ -108,28 +108,6 @@ class Scores:
         return tuple(s for s in self.scores if s.mode == mode and s.unit == "deg")
 
 
-def score_curves(
-    curves: CycleCurves,
-    standing_deg: Mapping[str, float] | None = None,
-    reference: CurveReference | None = None,
-    estimated: Collection[str] = (),
-    age: float | None = None,
-) -> Scores:
-    """Score the mean curves of the counted strides.
-
-    Parameters
-    ----------
-    curves : from standing. standing_deg : goniometer angles in standing (`core.parameters.anatomical_zero`).
-    reference : None = 42 healthy adults at their comfortable speed; at the person's own:
-        `core.norms.adult_reference_at_speed`.
-    estimated : variables no two sensors measure; they are not scored.
-    age : years; below 18 there is no score against adults (`no_norm_for_age`). None = an adult.
-    """
-    means = CurveMeans(standing_deg or {})
-    means.add(curves)
-    return score_means(means, curves, reference, estimated, age)
-
-
 class CurveMeans:
     """Means of the counted strides as scores need them, of curves that are added as they come.
 
@@ -151,19 +129,28 @@ class CurveMeans:
         self.level |= _means(anatomical_curves(curves, self.standing_deg))
 
 
-def score_means(
-    means: CurveMeans,
-    known: CycleCurves,
+def score_curves(
+    curves: CycleCurves,
+    standing_deg: Mapping[str, float] | None = None,
     reference: CurveReference | None = None,
     estimated: Collection[str] = (),
     age: float | None = None,
+    means: CurveMeans | None = None,
 ) -> Scores:
-    """Score means, otherwise as `score_curves`.
+    """Score the mean curves of the counted strides.
 
     Parameters
     ----------
-    known : what is known beside the curves; it need not have any.
+    curves : from standing. standing_deg : goniometer angles in standing (`core.parameters.anatomical_zero`).
+    reference : None = 42 healthy adults at their comfortable speed; at the person's own:
+        `core.norms.adult_reference_at_speed`.
+    estimated : variables no two sensors measure; they are not scored.
+    age : years; below 18 there is no score against adults (`no_norm_for_age`). None = an adult.
+    means : where the curves are not held any more; then `curves` has only what is known beside them.
     """
+    if means is None:
+        means = CurveMeans(standing_deg or {})
+        means.add(curves)
     child = reference is None and wbds_group(age) is None
     reference = adult_reference() if reference is None else reference
     level = means.level if reference.zero == "anatomical" else means.own
@@ -171,7 +158,7 @@ def score_means(
     for mode in MODES:
         own = level if mode == "raw" else means.own
         single = [
-            _gvs(v, side, mode, own.get((v, side)), means, known, reference, v in estimated)
+            _gvs(v, side, mode, own.get((v, side)), means, curves, reference, v in estimated)
             for side in SIDES
             for v in NINE
         ]

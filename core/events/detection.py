@@ -25,7 +25,7 @@ from core.events.foot_movement import FootMovement, FootMovements
 from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
 from core.events.result import EventKind, GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
-from core.held_samples import cut_blocks
+from core.held_samples import compare_neighbours, cut_blocks
 from core.rotation import angle_between
 
 if TYPE_CHECKING:
@@ -194,9 +194,7 @@ def _quiet_level(q: Floats, s: Floats, valid: Bools, rate_hz: float, params: Foo
     whole = len(s) // second
     if whole == 0:
         return None
-    speed = np.zeros(len(q))
-    for part in cut_blocks(len(q) - 1):
-        speed[part] = angle_between(q[part], q[part.start + 1 : part.stop + 1]) * rate_hz
+    speed = np.append(compare_neighbours(q, angle_between) * rate_hz, 0.0)
     seconds = (whole, second)
     quiet = speed[: whole * second].reshape(seconds).mean(axis=1) < params.quiet_rad_s
     quiet &= valid[: whole * second].reshape(seconds).all(axis=1)

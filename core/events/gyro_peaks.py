@@ -23,7 +23,7 @@ from core.errors import Notice, SignalError
 from core.events.result import GaitEvent, GaitEvents
 from core.filtering import low_pass
 from core.frames import FOOT, SHANK, SIDES, Bools, Floats, Oriented, Segment, Side
-from core.held_samples import cut_blocks
+from core.held_samples import compare_neighbours
 from core.peaks import find_peaks
 from core.rotation import conjugate, log, multiply
 
@@ -160,13 +160,8 @@ def gyro_peak_events(take: Oriented, rate_hz: float, params: GyroPeakParams | No
 
 def sagittal_rate(q: Floats, rate_hz: float) -> Floats:
     """Angular rate (n,) in rad/s about the segment's own rightward axis: the lower end forward positive."""
-    rate = np.zeros(len(q))
-    for part in cut_blocks(len(q) - 1):
-        after = slice(part.start + 1, part.stop + 1)
-        rate[part] = log(multiply(conjugate(q[part]), q[after]))[:, 2] * rate_hz
-    if len(q) > 1:
-        rate[-1] = rate[-2]
-    return rate
+    step = compare_neighbours(q, lambda a, b: log(multiply(conjugate(a), b))[:, 2] * rate_hz)
+    return np.append(step, step[-1:] if len(step) else 0.0)
 
 
 def _events(

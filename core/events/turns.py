@@ -20,7 +20,7 @@ import numpy as np
 
 from core.filtering import low_pass
 from core.frames import Bools, Floats, Oriented, Segment
-from core.held_samples import cut_blocks
+from core.held_samples import compare_neighbours
 from core.rest import find_runs
 from core.rotation import conjugate, log, multiply
 
@@ -141,13 +141,8 @@ def _share(valid: Mapping[Segment, Bools], worn: tuple[Segment, ...]) -> float:
 
 def _vertical_rate(q: Floats) -> Floats:
     """World z component (n,) of the rotation from each sample to the next, rad."""
-    rate = np.zeros(len(q))
-    for part in cut_blocks(len(q) - 1):
-        after = slice(part.start + 1, part.stop + 1)
-        rate[part] = log(multiply(q[after], conjugate(q[part])))[:, 2]
-    if len(q) > 1:
-        rate[-1] = rate[-2]
-    return rate
+    step = compare_neighbours(q, lambda a, b: log(multiply(b, conjugate(a)))[:, 2])
+    return np.append(step, step[-1:] if len(step) else 0.0)
 
 
 def _half_height(rate: Floats, height: float) -> tuple[int, int]:

@@ -142,11 +142,15 @@ def control_group(
 def mean_curves(curves: CycleCurves, estimated: Collection[str] = ()) -> MeanCurves:
     """Mean curves of the counted strides in degrees, as a control session keeps them; none of too few.
 
+    Of somebody who never stood still the curves have no level, and there are none.
+
     Parameters
     ----------
     estimated : variables that no two sensors measure: nobody's reference.
     """
     found: dict[Side, dict[str, Floats]] = {}
+    if curves.zero != "standing":
+        return found
     for variable, sides in curves.curves.items():
         for side in () if variable in estimated else sides:
             mean = mean_curve(curves, variable, side)

@@ -6,17 +6,14 @@ Conventions and sources: `core/rotation/__init__.py`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from core.frames import Floats
+from core.held_samples import AT_A_TIME, cut_blocks
 
 _SMALL = 1e-8
-
-_ROWS: Final = 1 << 14
-"""Rows of a long array that are worked on together: what is made on the way stays in the processor's cache,
-and an hour of a sensor is not held several times."""
 
 Angle = TypeVar("Angle", float, Floats)
 
@@ -170,14 +167,14 @@ def wrap_angle(angle: Angle) -> Angle:
 
 def _are_long(a: Floats, b: Floats) -> bool:
     """One of both is (n, k) of many rows, and none has more axes."""
-    return (a.size > 4 * _ROWS or b.size > 4 * _ROWS) and max(a.ndim, b.ndim) == 2
+    return max(a.size, b.size) > 4 * AT_A_TIME and max(a.ndim, b.ndim) == 2
 
 
 def _by_rows(of: Callable[[Floats, Floats], Floats], width: int, a: Floats, b: Floats) -> Floats:
-    """Rows (n, width) that a function makes of those of a and b, (n, k) or the same for all."""
+    """Rows (n, width) that a function makes of those of a and b, (n, k) or the same for all, block by block:
+    what is made on the way stays in the processor's cache."""
     found = np.empty((max(len(x) for x in (a, b) if x.ndim == 2), width))
-    for first in range(0, len(found), _ROWS):
-        part = slice(first, first + _ROWS)
+    for part in cut_blocks(len(found)):
         found[part] = of(*(x[part] if x.ndim == 2 and len(x) == len(found) else x for x in (a, b)))
     return found
 

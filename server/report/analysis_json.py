@@ -18,7 +18,7 @@ from core.parameters.kinematic import read_cycles
 from core.parameters.result import CycleCurves, Parameter
 from core.quality import concern_paths_alone, find_shown_level
 from core.quality.devices import check_device, is_serial
-from core.scores import CurveMeans, Scores, score_means
+from core.scores import CurveMeans, Scores, score_curves
 from server.report.columns import SCHEMA, list_turns, reduce_to_plain
 from server.report.estimator import list_estimated_variables
 
@@ -153,13 +153,12 @@ def _summarise_curves(analysis: TakeAnalysis) -> dict[str, object]:
     def read(known: CycleCurves, variable: str, side: Side, rows: Floats) -> None:
         curve = replace(known, curves={variable: {side: rows}})
         scored.add(curve)
-        # of somebody who never stood still the curves have no level
-        own = mean_curves(curve, unsure).get(side, {}) if known.zero == "standing" else {}
-        means.setdefault(side, {}).update({v: reduce_to_plain(np.round(c, 5)) for v, c in own.items()})
+        for of, own in mean_curves(curve, unsure).items():
+            means.setdefault(of, {}).update({v: reduce_to_plain(np.round(c, 5)) for v, c in own.items()})
 
     known = read_cycles(angles, measured.strides, read)
-    found = score_means(scored, known, estimated=unsure)
-    return {"scores": score_rows(found), "mean_curves": {side: own for side, own in means.items() if own}}
+    found = score_curves(known, estimated=unsure, means=scored)
+    return {"scores": score_rows(found), "mean_curves": means}
 
 
 def score_rows(found: Scores) -> list[dict[str, object]]:

@@ -15,7 +15,7 @@ from core.parameters.result import CycleCurves, Parameter
 from core.parameters.rows import Column
 from core.standing_angles import JOINTS, PELVIS
 from server.report.table import ParameterRow, parameter_rows
-from server.report.wording import ZERO_WORDS
+from server.report.wording import title_of
 
 GROUP = "Angles from the anatomical zero"
 
@@ -40,10 +40,11 @@ def define_parameter(name: str) -> str:
 
 def label_parameter(name: str) -> str:
     """What a figure is called, the name itself where the catalogue has none; a level says its zero."""
-    entry = CATALOGUE.get(from_standing(name) or name)
+    standing = from_standing(name)
+    entry = CATALOGUE.get(standing or name)
     if entry is None:
         return name
-    return entry.label if from_standing(name) is None else f"{entry.label}, {ZERO_WORDS['anatomical']}"
+    return entry.label if standing is None else title_of(standing, entry.label, "anatomical")
 
 
 def level_column(

@@ -60,8 +60,7 @@ def read_means(content: bytes) -> WalkMeans | None:
 def means_of(bundle: Bundle) -> WalkMeans:
     """The means of an analysis that was read with its curves."""
     parameters = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
-    # of somebody who never stood still the curves have no level
-    if bundle.angles is None or bundle.angles.zero != "standing":
+    if bundle.angles is None:
         return WalkMeans(parameters, {})
     curves = cycle_curves(bundle.angles, bundle.strides)
     return WalkMeans(parameters, mean_curves(curves, list_estimated_variables(bundle.estimator)))

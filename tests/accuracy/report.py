@@ -123,7 +123,9 @@ def tell_goal(what: str, goal: float, ours: float, unit: str, *, at_least: bool 
     met = ours >= goal if at_least else ours <= goal
     shown = f"{ours:.0f}" if ours >= 100.0 else f"{ours:.3g}"
     sign = "≥" if at_least else "≤"
-    return _line((what, f"{sign} {goal:g} {unit}", f"{shown} {unit}", "yes" if met else "no"))
+    return _line(
+        (what, f"{sign} {goal:g} {unit}".rstrip(), f"{shown} {unit}".rstrip(), "yes" if met else "no")
+    )
 
 
 def put_goal(text: str, row: str) -> str:

@@ -47,7 +47,7 @@ async def test_a_page_beside_two_hundred_controls_asks_no_more_and_reads_them_on
     first, later = took[0], min(took[1:])
     sys.stdout.write(f"first {first:.3f} s, later {later:.4f} s of CPU, {len(sent)} statements\n")
     record_goal(f"first session page beside {CONTROLS} visits of controls, CPU", FIRST_S, first, "s")
-    record_goal("statements of it", MOST, len(sent), "")
+    record_goal(f"statements of a session page beside {CONTROLS} visits of controls", MOST, len(sent), "")
     assert len(sent) <= MOST
     assert first <= BUSY * FIRST_S
     assert later <= first

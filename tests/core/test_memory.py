@@ -28,3 +28,7 @@ def test_pages_are_taken_when_written_and_go_back_with_the_last_who_holds_them()
     np.testing.assert_array_equal(part, 1.0)
     del part
     assert held_mb() - before < 8.0
+
+
+def test_nothing_takes_a_page_and_is_an_array_all_the_same() -> None:
+    assert make_pages(7, 0).shape == (7, 0)
