@@ -130,7 +130,7 @@ class ImuStream(HoldsSamples):
     quat : (n, 4) vendor orientation, scalar first, kept for comparison only, or None.
     rate_hz : nominal sampling rate.
     clock : what `t_s` was made from: "counter" (shared packet counter), "device" (own clock), "index".
-    digest : sha256 of the signal values, to find the same stream under two ids.
+    digest : made of the signal values, to find the same stream under two ids.
     notices : what the reader had to decide or could not read.
     """
 
@@ -158,7 +158,7 @@ class ImuStream(HoldsSamples):
             ("quat", self.held("quat"), (n, 4)),
         ):
             _frozen(a, name, shape, self.source)
-        if np.any(np.diff(self.t_s) <= 0):
+        if np.any(self.t_s[1:] <= self.t_s[:-1]):
             raise SignalError(
                 "time_not_increasing", f"{self.source}: time does not increase.", sensor=self.device_id
             )

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from core.errors import FormatError, Notice
 from core.frames import Floats, Segment
+from core.held_samples import SOME_ROWS, cut_blocks
 from core.recording import ImuStream
 
 WRAP_16: Final = 1 << 16
@@ -25,6 +26,9 @@ ASSUMED_RATE_HZ: Final = 100.0
 """Shown, never used for results: the notice `rate_unknown` is an error."""
 MOST_OUT_OF_ORDER: Final = 0.01
 """Share of rows that may run backwards before we say that the file holds two takes [our choice]."""
+
+
+_SUMMED: Final = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +79,7 @@ def make_draft(
     ------
     FormatError `missing_acc`.
     """
-    if not np.isfinite(acc).all(axis=1).any():
+    if not has_whole_row(acc):
         raise FormatError(
             "missing_acc",
             f"{source}: the acceleration of {device} holds no numbers; export it again with acceleration.",
@@ -197,7 +201,7 @@ def _in_order(d: Draft) -> Draft:
             t_s=t,
         )
     keep = np.flatnonzero(good)[rising]
-    if not np.isfinite(d.acc[keep]).all(axis=1).any():
+    if not has_whole_row(d.acc[keep]):
         raise FormatError(
             "empty",
             f"{d.source} has no row with both a valid counter and a complete acceleration; export it again.",
@@ -274,25 +278,42 @@ def _turned(d: Draft, start: float, wrap: float) -> Draft:
 
 
 def digest(d: Draft) -> str:
-    """sha256 over the signals as float32, so that a stored and re-read stream keeps its digest."""
+    """Of the signals in single precision, so that a stored and re-read stream keeps its digest."""
     return signal_digest(d.acc, d.gyr, d.mag)
 
 
 def signal_digest(acc: Floats, gyr: Floats | None, mag: Floats | None) -> str:
-    """SHA-256 of what a sensor measured, (n, 3) each, as 32-bit floats, for `digest`."""
+    """What tells the samples of one sensor from those of another, (n, 3) each, for `digest`.
+
+    SHA-256 over sums of `_SUMMED` words of 64 bits, in a fifth of the time that it takes over the words. Who
+    wants to can make two takes with one digest; a copy is found by it, nothing is secured.
+    """
     h = hashlib.sha256()
     for name, a in (("acc", acc), ("gyr", gyr), ("mag", mag)):
         if a is not None:
-            h.update(name.encode())
-            h.update(_bits(a).tobytes())
+            h.update(f"{name}{len(a)}".encode())
+            for part in cut_blocks(len(a)):
+                bits = _bits(a[part]).ravel()
+                end = len(bits) - len(bits) % (2 * _SUMMED)
+                h.update(np.add.reduce(bits[:end].view(np.uint64).reshape(_SUMMED, -1), axis=0))
+                h.update(bits[end:].tobytes())
     return h.hexdigest()
 
 
 def _bits(a: Floats) -> NDArray[np.float32]:
     """float32 in C order with one bit pattern for NaN and one for zero."""
-    b = np.ascontiguousarray(a, np.float32) + np.float32(0)
-    b[np.isnan(b)] = np.nan
+    b = np.add(a, np.float32(0), order="C", dtype=np.float32, casting="same_kind")
+    missing = np.isnan(b)
+    if missing.any():
+        b[missing] = np.nan
     return b
+
+
+def has_whole_row(signal: Floats) -> bool:
+    """Whether any sample of (n, axes) is finite in all axes."""
+    return any(
+        np.isfinite(signal[i : i + SOME_ROWS]).all(axis=1).any() for i in range(0, len(signal), SOME_ROWS)
+    )
 
 
 def _stream(d: Draft, t_s: Floats) -> ImuStream:

@@ -102,6 +102,34 @@ def test_the_columns_are_stored_as_the_specification_says() -> None:
     assert "RLE_DICTIONARY" not in column.encodings
 
 
+def test_a_column_may_be_null_only_where_its_sensor_has_holes() -> None:
+    acc, gyr = signals(50)
+    late = stream("late", acc[:40], gyr[:40], t_s=0.1 + np.arange(40) / 100.0)
+    data = write_recording(Recording({"whole": stream("whole", acc, gyr), "late": late}, {}))
+    fields = pq.read_schema(pa.BufferReader(data))
+    assert {name: fields.field(name).nullable for name in ("t_us", "whole.acc_x", "late.gyr_z")} == {
+        "t_us": False,
+        "whole.acc_x": False,
+        "late.gyr_z": True,
+    }
+
+
+def test_many_sensors_with_and_without_holes_keep_their_own_samples() -> None:
+    """More than fit into one piece of memory, and some that are read into an array of their own."""
+    n, rng = 20_000, np.random.default_rng(0)
+    streams = {}
+    for i in range(40):
+        t = np.arange(n - 100 * (i % 3 == 0)) / 100.0
+        acc = rng.normal(0, 10, (len(t), 3)).astype(np.float32).astype(np.float64)
+        streams[f"s{i}"] = stream(f"s{i}", acc, acc[::-1].copy(), t_s=t)
+    again = back(Recording(streams, {})).streams
+    for device, s in streams.items():
+        np.testing.assert_array_equal(again[device].acc, s.acc)
+        np.testing.assert_array_equal(again[device].gyr, s.gyr)
+        assert again[device].digest == s.digest
+    assert len({s.digest for s in again.values()}) == 40
+
+
 def test_a_foreign_and_a_damaged_file_are_refused() -> None:
     out = pa.BufferOutputStream()
     pq.write_table(pa.table({"x": [1.0, 2.0]}), out)
