@@ -44,7 +44,8 @@ def read_json(data: bytes | str, most_bytes: int | None = None) -> object:
         root: object = json.loads(
             text, parse_constant=_refuse_constant, parse_int=_read_whole, object_pairs_hook=_make_object
         )
-        _check_values(root)
+        # what is decoded from UTF-8 has a lone surrogate only where one is escaped
+        _check_values(root, has_surrogates=isinstance(data, str) or "\\u" in text)
     except RecursionError:
         raise _too_deep() from None
     except UnicodeError:
@@ -76,14 +77,20 @@ def _shorten_key(key: str) -> str:
     return shown if len(shown) <= MOST_SHOWN else f"{shown[:MOST_SHOWN]}…"
 
 
-def _check_values(root: object) -> None:
-    """Refuse what Python reads but is not JSON: numbers beyond a float, lone surrogates; and great depth."""
+def _check_values(root: object, *, has_surrogates: bool) -> None:
+    """Refuse what Python reads but is not JSON: numbers beyond a float, lone surrogates; and great depth.
+
+    Parameters
+    ----------
+    has_surrogates : whether there may be any.
+    """
     level: list[object] = [[root]]
     for _ in range(MOST_DEPTH + 1):
         inner: list[object] = []
         for container in level:
             if isinstance(container, dict):
-                "".join(container).encode()
+                if has_surrogates:
+                    "".join(container).encode()
                 container = container.values()
             for value in container:  # type: ignore[attr-defined]  # a list, or values of an object
                 kind = type(value)
@@ -91,7 +98,7 @@ def _check_values(root: object) -> None:
                     inner.append(value)
                 elif kind is float and not isfinite(value):
                     raise ValueError("a number is too large")
-                elif kind is str:
+                elif has_surrogates and kind is str:
                     value.encode()
         if not inner:
             return

@@ -62,10 +62,6 @@ def _refuse_dtd(name: str, system_id: str | None, public_id: str | None, _: bool
     raise DTDForbidden(name, system_id, public_id)
 
 
-def _local(tag: str) -> str:
-    return tag.rsplit(":", 1)[-1]
-
-
 class _Reader:
     """Collects labels, the rate and the frames of a file."""
 
@@ -77,18 +73,18 @@ class _Reader:
         self._broken = 0
         self._frame: Mapping[str, str] | None = None
         self._said: dict[str, list[str]] = {}
-        self._part: str | None = None
+        self._part: list[str] | None = None
         self._depth = 0
 
     def begin(self, tag: str, given: Mapping[str, str]) -> None:
         """An element begins."""
-        name = _local(tag)
+        name = tag.rsplit(":", 1)[-1] if ":" in tag else tag
         if self._frame is not None:
             self._depth += 1
             # what is inside of a part of a frame is not read
-            self._part = name if self._depth == 1 and name in _WIDTHS else None
-            if self._part is not None:
-                self._said[name] = []
+            self._part = None
+            if self._depth == 1 and name in _WIDTHS:
+                self._said[name] = self._part = []
         elif name == "frame":
             self._frame, self._said, self._part, self._depth = given, {}, None, 0
         elif name == "sensor" and (label := given.get("label")):
@@ -101,7 +97,7 @@ class _Reader:
     def add_text(self, content: str) -> None:
         """Text of the innermost element."""
         if self._part is not None:
-            self._said[self._part].append(content)
+            self._part.append(content)
 
     def end(self, tag: str) -> None:
         """An element ends."""
@@ -116,10 +112,10 @@ class _Reader:
             self._take_frame(_number(frame.get("index")))
 
     def _take_frame(self, index: float | None) -> None:
-        # an empty part is none
-        said = {name: split for name, pieces in self._said.items() if (split := "".join(pieces).split())}
-        said.setdefault("sensorMagneticField", ["NaN"] * (3 * len(self._labels)))
-        cells = [cell for name in _WIDTHS for cell in said.get(name, ())]
+        orientation, free, field = ("".join(self._said.get(name, ())) for name in _WIDTHS)
+        if not field.strip():
+            field = "NaN " * (3 * len(self._labels))
+        cells = f"{orientation} {free} {field}".split()
         if index is None or len(cells) != len(self._labels) * sum(_WIDTHS.values()):
             self._broken += 1
             return
