@@ -47,7 +47,7 @@ def sniff(data: bytes) -> tuple[Kind, str]:
     ----------
     data : all bytes, after unpacking; text already as UTF-8.
     """
-    if not data.strip():
+    if not data or data.isspace():
         return "empty", "an empty file"
     if parquet.looks_like(data):
         return "parquet", "Parquet"

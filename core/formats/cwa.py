@@ -210,13 +210,12 @@ def _read_blocks(source: str, opener: Opener, origin_s: float) -> Iterator[Sampl
 
 def _decode(heads: NDArray[Any], raw: NDArray[np.uint8], source: str) -> _Decoded:
     """Samples of whole blocks of one kind."""
-    kinds = np.unique(np.stack((heads["axes"], heads["rate"]), axis=1), axis=0)
-    if len(kinds) > 1:
+    if any((heads[name] != heads[name][0]).any() for name in ("axes", "rate")):
         raise FormatError(
             "bad_cwa",
             f"{source} changes its rate or its sensors in the middle; split it with the maker's program.",
         )
-    axes, packing = int(kinds[0, 0]) >> 4, int(kinds[0, 0]) & 15
+    axes, packing = divmod(int(heads["axes"][0]), 16)
     count = heads["count"].astype(np.int64)
     room = 480 // 4 if packing == 0 else 480 // (2 * axes)
     if axes not in (3, 6) or packing not in (0, 2) or count.max() > room:

@@ -187,10 +187,11 @@ def read_columns(
 
 def _as_utf8(body: memoryview) -> memoryview:
     """The same where it is UTF-8; a text with NUL in its head may be anything behind it."""
+    if np.frombuffer(body, np.uint8).max(initial=0) < 128:
+        return body
     data = bytes(body)
     try:
-        if not data.isascii():
-            data.decode()
+        data.decode()
     except UnicodeDecodeError:
         return memoryview(data.decode("utf-8", "replace").encode())
     return body
