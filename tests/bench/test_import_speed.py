@@ -121,8 +121,6 @@ def test_a_stored_take_costs_at_most_three_times_what_its_columns_do(files: list
         f"{values / 1e6 / ours:.0f}; pyarrow's columns alone at {len(data) / 1e6 / theirs:.0f} and "
         f"{values / 1e6 / theirs:.0f}: {ratio:.2f} times its CPU\n"
     )
-    what = "import of Parquet, speed beside that of pyarrow's columns alone"
-    record_goal(what, 0.58, 1.0 / ratio, "", at_least=True)
     assert ratio <= 3.0
 
 
