@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import inspect
 import re
+from contextlib import aclosing
 from operator import attrgetter
 from pathlib import Path
 from queue import Queue
@@ -140,16 +142,21 @@ def test_a_picture_is_sent_whole_and_at_once_however_long_viser_would_gather() -
         taken: Queue[list[str]] = Queue()
 
         async def take() -> None:
-            async for window in buffer.window_generator(1):
-                taken.put([m.name for m in window if isinstance(m, ArraysChanged)])
+            try:
+                async with aclosing(buffer.window_generator(1)) as windows:
+                    async for window in windows:
+                        taken.put([m.name for m in window if isinstance(m, ArraysChanged)])
+            finally:
+                taken.put(["nothing more"])
 
-        loop = buffer.event_loop
-        loop.call_soon_threadsafe(lambda: loop.create_task(take()))
+        taking = asyncio.run_coroutine_threadsafe(take(), buffer.event_loop)
         assert taken.get(timeout=30) == []  # what was there before
         for frame in range(1, 4):
             with show_at_once(server):
                 for part in drawn.values():
                     part.move(part.batch.wxyz[frame], part.batch.position[frame])
             assert taken.get(timeout=30) == ["/room/thighs", "/room/shanks"]
+        taking.cancel()
+        assert taken.get(timeout=30) == ["nothing more"]
     finally:
         server.stop()
