@@ -11,7 +11,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
+from itertools import groupby
 from math import exp, hypot, log, sqrt
+from operator import itemgetter
 from typing import Final
 
 import numpy as np
@@ -20,7 +22,7 @@ from core.frames import GRAVITY, Floats
 from core.norms.kinematics import NormBand, adult_kinematics
 from core.norms.profile import MODES, PROFILES, CurveReference, ScoreSpread
 from core.norms.speed import COMFORTABLE, SLOWEST
-from core.norms.tables import read_rows
+from core.norms.tables import read_columns, read_rows
 from core.norms.values import NormValue, angle_values, explain_difference, single_side_sd
 
 ASKED: Final = "healthy adults asked to walk at this speed"
@@ -72,9 +74,10 @@ class CurveModel:
 def curve_models() -> Mapping[str, CurveModel]:
     """Models by variable: knee and ankle (52 adults), hip, its adduction and the pelvis (22)."""
     spreads: dict[str, dict[float, list[float]]] = {}
-    for r in read_rows("norm_speed_matched_adult"):
-        at = spreads.setdefault(r["variable"], {}).setdefault(float(r["dimensionless_speed"]), [])
-        at.append(float(r["sd_deg"]))
+    table = read_columns("norm_speed_matched_adult", "variable", "dimensionless_speed", "sd_deg")
+    for (variable, speed), cells in groupby(table, key=itemgetter(0, 1)):
+        at = spreads.setdefault(variable, {}).setdefault(float(speed), [])
+        at.extend(float(sd) for _, _, sd in cells)
     found: dict[str, tuple[list[list[float]], int]] = {}
     for r in read_rows("speed_model_coefficients"):
         if r["variable"] in spreads:

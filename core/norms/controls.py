@@ -17,7 +17,7 @@ from core.events.result import COMPARED
 from core.frames import SIDES, Floats, Side
 from core.norms.kinematics import NormBand
 from core.norms.lookup import Norms
-from core.norms.profile import SAGITTAL, CurveReference, MeanCurves, leave_one_out, person_mean
+from core.norms.profile import SAGITTAL, CurveReference, MeanCurves, gather_curves, leave_one_out
 from core.norms.speed import walking_speed
 from core.norms.values import NormValue, Sex
 from core.parameters.kinematic import MEAN_ZERO, mean_curve
@@ -187,15 +187,19 @@ def _mean_curves(sessions: Sequence[ControlSession]) -> MeanCurves:
 
 def _values(people: Sequence[Values], group: str, source: str) -> dict[str, NormValue]:
     """Mean over people and sides; sd of one side between people; sd of left − right."""
+    # name → side → person → value
+    by_name: dict[str, dict[Side | None, dict[int, float]]] = {}
+    for who, p in enumerate(people):
+        for (name, side), value in p.items():
+            by_name.setdefault(name, {}).setdefault(side, {})[who] = value
     found: dict[str, NormValue] = {}
-    for name in dict.fromkeys(name for p in people for name, _ in p):
-        columns = [[p[name, s] for p in people if (name, s) in p] for s in (None, *SIDES)]
-        columns = [c for c in columns if len(c) >= FEWEST]
+    for name, by_side in by_name.items():
+        sides = [by_side.get(s, {}) for s in (None, *SIDES)]
+        columns = [np.array(list(of.values())) for of in sides if len(of) >= FEWEST]
         if not columns:
             continue
-        differences = [
-            p[name, "left"] - p[name, "right"] for p in people if (name, "left") in p and (name, "right") in p
-        ]
+        _, left, right = sides
+        differences = [x - right[who] for who, x in left.items() if who in right]
         found[name] = NormValue(
             name=name,
             mean=float(np.mean([np.mean(c) for c in columns])),
@@ -211,10 +215,11 @@ def _values(people: Sequence[Values], group: str, source: str) -> dict[str, Norm
 def _bands(people: Sequence[MeanCurves], group: str, source: str) -> dict[str, NormBand]:
     found: dict[str, NormBand] = {}
     for variable in dict.fromkeys(v for p in people for own in p.values() for v in own):
-        means = [m for p in people if (m := person_mean(p, variable)) is not None]
+        gathered = gather_curves(people, variable)
+        means = gathered.means()
         if len(means) < FEWEST:
             continue
-        sides = [[p[s][variable] for p in people if variable in p.get(s, {})] for s in SIDES]
+        sides = [gathered.curves[gathered.there[:, k], k] for k in range(len(SIDES))]
         spread = [np.var(rows, axis=0, ddof=1) for rows in sides if len(rows) > 1]
         found[variable] = NormBand(
             variable=variable,

@@ -14,7 +14,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.frames import SIDES, Floats, Side
+from core.frames import SIDES, Bools, Floats, Side
 
 PELVIS: Final = ("pelvis_tilt", "pelvis_obliquity", "pelvis_rotation")
 NINE: Final = (
@@ -73,7 +73,7 @@ class CurveReference:
 
 
 def gvs(curve: Floats, reference: Floats, mode: Mode) -> Floats:
-    """Gait variable score of curves (..., 101) against one (101,): RMS over the cycle, same unit."""
+    """Gait variable score of curves (..., 101) against one or as many: RMS over the cycle, same unit."""
     difference = curve - reference
     if mode == "offset_removed":
         difference = difference - difference.mean(axis=-1, keepdims=True)
@@ -84,7 +84,7 @@ def side_profile(scores: Mapping[str, float], variables: Sequence[str]) -> float
     """RMS of the GVS of one side, None unless all `variables` are there."""
     if any(v not in scores for v in variables):
         return None
-    return _rms([scores[v] for v in variables])
+    return float(_rms(np.array([scores[v] for v in variables])))
 
 
 def overall_profile(scores: Mapping[Side, Mapping[str, float]], variables: Sequence[str]) -> float | None:
@@ -93,13 +93,37 @@ def overall_profile(scores: Mapping[Side, Mapping[str, float]], variables: Seque
     rest = [v for v in variables if v not in PELVIS]
     if any(v not in left for v in variables) or any(v not in right for v in rest):
         return None
-    return _rms([left[v] for v in variables] + [right[v] for v in rest])
+    return float(_rms(np.array([left[v] for v in variables] + [right[v] for v in rest])))
 
 
-def person_mean(curves: MeanCurves, variable: str) -> Floats | None:
-    """Mean curve (101,) of a person's sides, of the one there is, or None."""
-    found = [curves[side][variable] for side in SIDES if variable in curves.get(side, {})]
-    return np.mean(found, axis=0) if found else None
+@dataclass(frozen=True, eq=False)
+class PeopleCurves:
+    """Mean curves of one variable of many people.
+
+    Parameters
+    ----------
+    curves : (people, 2, 101) of the left and the right side, 0 where there is none. there : (people, 2).
+    """
+
+    curves: Floats
+    there: Bools
+
+    def means(self) -> Floats:
+        """Mean curve (n, 101) of the sides, of the one there is, of everybody who has any, in their order."""
+        known = self.there.sum(axis=1)
+        return np.asarray(self.curves.sum(axis=1)[known > 0] / known[known > 0, None])
+
+
+def gather_curves(people: Sequence[MeanCurves], variable: str) -> PeopleCurves:
+    """Lay the curves of one variable out; where nobody has it they have no samples."""
+    rows = [[person.get(side, {}).get(variable) for side in SIDES] for person in people]
+    known = [row for pair in rows for row in pair if row is not None]
+    shape = len(people), len(SIDES)
+    there = np.array([[row is not None for row in pair] for pair in rows], np.bool_).reshape(shape)
+    curves = np.zeros((*shape, len(known[0]) if known else 0))
+    if known:
+        curves[there] = known
+    return PeopleCurves(curves, there)
 
 
 def leave_one_out(people: Sequence[MeanCurves]) -> dict[Mode, dict[str, ScoreSpread]]:
@@ -107,36 +131,42 @@ def leave_one_out(people: Sequence[MeanCurves]) -> dict[Mode, dict[str, ScoreSpr
 
     A side counts by itself; percentiles are linear between order statistics, sd with n − 1.
     """
-    own = [{v: m for v in NINE if (m := person_mean(p, v)) is not None} for p in people]
-    means = {v: [m[v] for m in own if v in m] for v in NINE}
-    totals = {v: (np.sum(rows, axis=0), len(rows)) for v, rows in means.items() if len(rows) > 1}
-    others = [{v: (t - m[v]) / (n - 1) for v, (t, n) in totals.items() if v in m} for m in own]
-    spreads: dict[Mode, dict[str, ScoreSpread]] = {}
-    for mode in MODES:
-        values: dict[str, list[float]] = {}
-        for person, rest in zip(people, others, strict=True):
-            found: dict[Side, dict[str, float]] = {}
-            for variable, reference in rest.items():
-                for side in SIDES:
-                    if variable in person.get(side, {}):
-                        score = float(gvs(person[side][variable], reference, mode))
-                        found.setdefault(side, {})[variable] = score
-                        values.setdefault(variable, []).append(score)
-            for name, variables in PROFILES.items():
-                for side in SIDES:
-                    _append(values, f"{name}_side", side_profile(found.get(side, {}), variables))
-                _append(values, f"{name}_overall", overall_profile(found, variables))
-        spreads[mode] = {name: _spread(np.array(v)) for name, v in values.items() if len(v) > 1}
-    return spreads
+    shape = len(people), len(SIDES), len(NINE)
+    scores, known = {mode: np.zeros(shape) for mode in MODES}, np.zeros(shape, np.bool_)
+    for k, variable in enumerate(NINE):
+        gathered = gather_curves(people, variable)
+        own, who = gathered.means(), gathered.there.any(axis=1)
+        if len(own) < 2:
+            continue
+        known[..., k] = gathered.there
+        others = (own.sum(axis=0) - own) / (len(own) - 1)
+        for mode in MODES:
+            scores[mode][who, :, k] = gvs(gathered.curves[who], others[:, None], mode)
+    return {mode: _find_spreads(scores[mode], known) for mode in MODES}
 
 
-def _rms(values: Sequence[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
+def _find_spreads(scores: Floats, known: Bools) -> dict[str, ScoreSpread]:
+    """Spreads of every variable and profile of scores (people, 2, 9), where they are known."""
+    values = {variable: scores[..., k][known[..., k]] for k, variable in enumerate(NINE)}
+    flat = len(scores), len(SIDES) * len(NINE)
+    for name, variables in PROFILES.items():
+        left = [NINE.index(v) for v in variables]
+        right = [len(NINE) + NINE.index(v) for v in variables if v not in PELVIS]
+        values[f"{name}_side"] = _find_profiles(scores, known, left)
+        values[f"{name}_overall"] = _find_profiles(scores.reshape(flat), known.reshape(flat), left + right)
+    return {name: _spread(x) for name, x in values.items() if len(x) > 1}
 
 
-def _append(values: dict[str, list[float]], name: str, value: float | None) -> None:
-    if value is not None:
-        values.setdefault(name, []).append(value)
+def _find_profiles(scores: Floats, known: Bools, columns: Sequence[int]) -> Floats:
+    """RMS of some columns (..., n) wherever all of them are known."""
+    # `take` lays them side by side, so that each is added up as the profile of one person is
+    found = _rms(np.take(scores, columns, axis=-1))
+    return np.asarray(found[np.take(known, columns, axis=-1).all(axis=-1)])
+
+
+def _rms(values: Floats) -> Floats:
+    """Root mean square over the last axis."""
+    return np.asarray(np.sqrt(np.mean(np.square(values), axis=-1)))
 
 
 def _spread(x: Floats) -> ScoreSpread:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.resources import files
+from operator import itemgetter
 
 WBDS = "Fukuchi, Fukuchi & Duarte 2018 (PeerJ 6:e4640), WBDS data set, CC BY 4.0"
 """Source line of everything computed from the WBDS strides; printed wherever a norm is shown."""
@@ -23,8 +24,20 @@ ADULT_AGE = 18.0
 @cache
 def read_rows(name: str) -> tuple[Mapping[str, str], ...]:
     """Rows of one table by column name."""
+    header, *rows = _read_cells(name)
+    return tuple(dict(zip(header, row, strict=True)) for row in rows)
+
+
+def read_columns(name: str, *columns: str) -> Iterator[tuple[str, ...]]:
+    """Some columns of one table, row by row; of a large one less is kept than all its rows by name."""
+    rows = _read_cells(name)
+    header = next(rows)
+    return map(itemgetter(*map(header.index, columns)), rows)
+
+
+def _read_cells(name: str) -> Iterator[list[str]]:
     text = files("core.norms").joinpath("data", f"{name}.csv").read_text(encoding="utf-8")
-    return tuple(csv.DictReader(text.splitlines()))
+    return csv.reader(text.splitlines())
 
 
 def wbds_group(age: float | None) -> str | None:

@@ -7,7 +7,7 @@ import io
 import json
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, cast
 
@@ -129,8 +129,12 @@ def read_repetitions(data: bytes) -> tuple[StoredRepetition, ...]:
 
 def read_warnings(data: Mapping[str, Any]) -> tuple[Notice, ...]:
     """Notices of analysis.json about the take; of files that hold nothing for it the upload page has told."""
+    return keep_told(Notice(**row) for row in data["warnings"])
+
+
+def keep_told(notices: Iterable[Notice]) -> tuple[Notice, ...]:
+    """Those that are told of an analysis."""
     told = {*ABOUT_FILES, "duplicate_stream"}
-    notices = (Notice(**row) for row in data["warnings"])
     return tuple(n for n in notices if n.severity == "error" or n.code not in told)
 
 

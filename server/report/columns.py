@@ -119,8 +119,9 @@ def _lay_out(t_s: Floats, columns: Mapping[str, ParquetColumn], rows: slice) -> 
 
 def read_table(data: bytes) -> tuple[pa.Table, dict[str, Any]]:
     """A Parquet file of ours and what `parquet_file` wrote beside its columns."""
-    # a file of ours is small: threads cost more than they read
-    table = pq.read_table(pa.BufferReader(data), use_threads=False)
+    # a file of ours is small: threads cost more than they read, and `pq.read_table` brings in all of
+    # pyarrow.dataset
+    table = pq.ParquetFile(pa.BufferReader(data)).read(use_threads=False)
     meta: dict[str, Any] = json.loads((table.schema.metadata or {})[b"sagittal"])
     return table, meta
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
 import numpy as np
 
+from core.errors import Notice
+from core.frames import Side
 from core.norms.controls import mean_curves
 from core.norms.profile import MeanCurves, ScoreSpread
 from core.parameters import cycle_curves
 from core.parameters.result import Parameter
 from core.parameters.uncertainty import mark_estimated
 from core.scores import Score, score_curves
-from server.report.bundle import Bundle, read_warnings
+from server.report.bundle import Bundle, keep_told
 from server.report.estimator import list_estimated_angles, list_estimated_variables
 from server.report.quality_box import data_verdict
 
@@ -43,18 +45,39 @@ class WalkMeans:
     curves: MeanCurves
 
 
+class _StoredParameters(msgspec.Struct):
+    """What of analysis.json says which parameters there are; all else is passed over."""
+
+    parameters: tuple[Parameter, ...]
+    estimator: dict[str, Any] | None = None
+
+    def mark(self) -> tuple[Parameter, ...]:
+        """Mark what is estimated: files of earlier versions say so only of the angles."""
+        return mark_estimated(self.parameters, list_estimated_angles(self.estimator))
+
+
+class _StoredMeans(_StoredParameters):
+    mean_curves: dict[Side, dict[str, list[float]]] | None = None
+
+
+class _StoredNumbers(_StoredParameters, kw_only=True):
+    quality: dict[str, Any]
+    warnings: tuple[Notice, ...]
+    walking: dict[str, Any] | None = None
+    scores: list[dict[str, Any]] | None = None
+
+
+_read_means = msgspec.json.Decoder(_StoredMeans).decode
+_read_numbers = msgspec.json.Decoder(_StoredNumbers).decode
+
+
 def read_means(content: bytes) -> WalkMeans | None:
     """The means in analysis.json; None if it is of a version that wrote no mean curves."""
-    data = json.loads(content)
-    if "mean_curves" not in data:
+    stored = _read_means(content)
+    if stored.mean_curves is None:
         return None
-    return WalkMeans(
-        _mark_parameters(data),
-        {
-            side: {v: np.array(c, dtype=np.float64) for v, c in own.items()}
-            for side, own in data["mean_curves"].items()
-        },
-    )
+    curves = {side: {v: np.array(c) for v, c in own.items()} for side, own in stored.mean_curves.items()}
+    return WalkMeans(stored.mark(), curves)
 
 
 def means_of(bundle: Bundle) -> WalkMeans:
@@ -68,15 +91,14 @@ def means_of(bundle: Bundle) -> WalkMeans:
 
 def read_numbers(content: bytes) -> Numbers | None:
     """The numbers in analysis.json; None if it is of a version that wrote no scores."""
-    data = json.loads(content)
-    if "scores" not in data:
+    stored = _read_numbers(content)
+    if stored.scores is None:
         return None
-    parameters = _mark_parameters(data)
-    judged = data_verdict(
-        data["quality"], data.get("estimator"), {n.severity for n in read_warnings(data)}, parameters
-    )
-    contacts_s = (data.get("walking") or {}).get("contact_uncertainty_s")
-    return Numbers(parameters, tuple(_score(row) for row in data["scores"]), judged, contacts_s)
+    parameters = stored.mark()
+    severities = {n.severity for n in keep_told(stored.warnings)}
+    judged = data_verdict(stored.quality, stored.estimator, severities, parameters)
+    contacts_s = (stored.walking or {}).get("contact_uncertainty_s")
+    return Numbers(parameters, tuple(_score(row) for row in stored.scores), judged, contacts_s)
 
 
 def numbers_of(bundle: Bundle) -> Numbers:
@@ -93,12 +115,6 @@ def numbers_of(bundle: Bundle) -> Numbers:
     found = score_curves(curves, bundle.angles.standing_deg, estimated=unsure)
     scores = tuple(s for s in found.scores if s.variable is None)
     return Numbers(parameters, scores, judged, contacts_s)
-
-
-def _mark_parameters(data: Mapping[str, Any]) -> tuple[Parameter, ...]:
-    """Parameters of analysis.json; files of earlier versions say only of the angles which are estimated."""
-    unsure = list_estimated_angles(data.get("estimator"))
-    return mark_estimated([Parameter(**row) for row in data["parameters"]], unsure)
 
 
 def _score(row: Mapping[str, Any]) -> Score:

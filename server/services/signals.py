@@ -219,7 +219,7 @@ def _raw(
     def read() -> tuple[Floats, Mapping[str, Floats]]:
         names = {c: f"{segment}_{kind}_{c}{_ENDING[kind]}" for c in AXES}
         content = analyses.file_bytes(reviewed.blobs, found, file.NAME)
-        table = pq.read_table(BufferReader(content), columns=["t_s", *names.values()])
+        table = pq.ParquetFile(BufferReader(content)).read(columns=["t_s", *names.values()])
         return floats_of(table, "t_s"), {c: floats_of(table, name) for c, name in names.items()}
 
     return reviewed.keep_part((found.id, segment, kind), read)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
-from viser._messages import EntityLifecycle, SceneNodeUpdateMessage
 
 from server.viewer.body_parts import PartName
 from server.viewer.colours import GHOST, TINTS, to_linear_rgb
 from server.viewer.layout import MeshBatch
 from server.viewer.room import ROOM
+from server.viewer.sending import move_copies
 from server.viewer.steps import Single
 
 PALE: Final = 0.5
@@ -29,39 +29,6 @@ RAISED_M: Final = 1.0
 """Height of the origins of see-through nodes over that of the floor. The browser draws such nodes from far
 to near by their origins, and each hides what is drawn later behind it: at the floor's height they would cut
 holes into its lines."""
-
-
-_MOVED: Final = ("batched_wxyzs", "batched_positions")
-
-
-class CopiesMoved(  # type: ignore[call-arg]  # viser's types are not looked at
-    SceneNodeUpdateMessage,  # type: ignore[misc]
-    entity=EntityLifecycle("scene", "update_dict", "name"),
-    include_in_scene_serialization=True,
-):
-    """viser's message of new properties, of which it is known that they are two arrays of float32.
-
-    viser asks of every field of every message what it is: a third of the time a frame takes.
-    """
-
-    def redundancy_key(self) -> str:
-        """The newest of a node replaces the one before."""
-        return f"scene:{self.name}:moved"
-
-    def as_serializable_dict(self, binary_buffers: list[memoryview] | None = None) -> dict[str, Any]:
-        """Say the same as viser's own message."""
-        buffers = [] if binary_buffers is None else binary_buffers
-        first = len(buffers)
-        buffers += [self.updates[name].data for name in _MOVED]
-        arrays: list[Any] = buffers[first:]
-        if binary_buffers is not None:
-            arrays = [{"__binary_index": first + k, "dtype": "<f4"} for k in range(len(_MOVED))]
-        return {
-            "name": self.name,
-            "updates": dict(zip(_MOVED, arrays, strict=True)),
-            "owner": self.owner,
-            "type": "SceneNodeUpdateMessage",
-        }
 
 
 class DrawnBatch:
@@ -84,24 +51,46 @@ class DrawnBatch:
         self.batch = batch
         faint = np.where(batch.measured, 1.0, FAINT).astype(np.float32)
         see_through = opacity is not None or bool((faint < 1.0).any())
-        self._origin = np.array((*middle, RAISED_M) if see_through else (0.0, 0.0, 0.0), np.float32)
+        self.origin = np.array((*middle, RAISED_M) if see_through else (0.0, 0.0, 0.0), np.float32)
         self.handle = scene.add_batched_meshes_simple(
             f"{ROOM}/{name}",
             *batch.mesh,
             batch.wxyz[0],
-            batch.position[0] - self._origin,
+            batch.position[0] - self.origin,
             batched_colors=colour_copies(batch, dark=False),
             batched_opacities=faint if opacity is None and see_through else None,
             opacity=opacity,
             lod="off",
             cast_shadow=opacity is None,
             receive_shadow=False,
-            position=tuple(self._origin.tolist()),
+            position=tuple(self.origin.tolist()),
         )
 
     def move(self, wxyz: Single, position: Single) -> None:
-        """Turn (k, 4) and place (k, 3) m all copies in the room."""
-        move_copies(self.handle, wxyz, position - self._origin)
+        """Turn (k, 4) and place (k, 3) m all copies in the room; nobody may write into `wxyz` any more."""
+        move_copies(self.handle, wxyz, position - self.origin)
+
+
+class DrawnFigure:
+    """The batches of a figure, or of a ghost, which are moved together.
+
+    Parameters
+    ----------
+    copies : mesh → its copies among those of all meshes (`FigureLayout.copies`).
+    """
+
+    def __init__(self, parts: Mapping[PartName, DrawnBatch], copies: Mapping[PartName, slice]) -> None:
+        self.parts = parts
+        self._rows = [(part.handle, copies[name]) for name, part in parts.items()]
+        self._origins = np.zeros((max((rows.stop for rows in copies.values()), default=0), 3), np.float32)
+        for name, part in parts.items():
+            self._origins[copies[name]] = part.origin
+
+    def move(self, wxyz: Single, position: Single) -> None:
+        """Turn (c, 4) and place (c, 3) m the copies of all meshes; nobody may write into `wxyz` any more."""
+        inside = position - self._origins
+        for handle, rows in self._rows:
+            move_copies(handle, wxyz[rows], inside[rows])
 
 
 def draw_figure(
@@ -142,14 +131,3 @@ def colour_copies(
         return np.array([to_linear_rgb(GHOST[dark])] * len(batch.tint), np.uint8)
     tints = ["body" if grey and tint in ("left", "right") else tint for tint in batch.tint]
     return np.array([to_linear_rgb(TINTS[dark][tint]) for tint in tints], np.uint8)
-
-
-def move_copies(handle: viser.BatchedMeshHandle, wxyz: Single, position: Single) -> None:
-    """Turn (k, 4) and place (k, 3) all copies by one message; the public setters take one each.
-
-    A message is what a frame costs, not its bytes; the test of viser's contract holds what this relies on.
-    """
-    inside = handle._impl  # noqa: SLF001
-    moved = dict(zip(_MOVED, (wxyz.copy(), position.copy()), strict=True))
-    inside.props.batched_wxyzs, inside.props.batched_positions = moved.values()
-    inside.api._queue_scene_message(CopiesMoved(inside.name, moved))  # noqa: SLF001

@@ -148,8 +148,9 @@ class FigureLayout:
             middles = points[:, :, 1].astype(np.float32)
             soles = {side: middles[:, k] for k, side in enumerate(self._feet)}
         return PlacedFigure(
-            np.concatenate(turns, axis=1, dtype=np.float32)[:, self._of_copies],
-            np.concatenate(places, axis=1, dtype=np.float32)[:, self._of_copies],
+            # `take` lays the copies of a mesh side by side in memory
+            np.concatenate(turns, axis=1, dtype=np.float32).take(self._of_copies, axis=1),
+            np.concatenate(places, axis=1, dtype=np.float32).take(self._of_copies, axis=1),
             soles,
         )
 

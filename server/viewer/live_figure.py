@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import atan2
 from typing import Final
 
@@ -9,15 +10,15 @@ import numpy as np
 import viser
 
 from core.body.model import BodyModel
-from core.frames import FOOT, SIDES
-from server.viewer.batches import DrawnBatch, colour_copies, draw_figure, draw_ghost
-from server.viewer.body_parts import PartName
+from core.frames import FOOT, SIDES, Segment
+from server.viewer.batches import DrawnFigure, colour_copies, draw_figure, draw_ghost
 from server.viewer.layout import FigureLayout, PlacedFigure
 from server.viewer.live_floor import LiveFloor
 from server.viewer.live_path import GAP_S, LivePath
 from server.viewer.moment import FigureMoment
 from server.viewer.reference import SEGMENTS, ReferenceWalk, stand_upright
 from server.viewer.room import SceneRoom, frame_person
+from server.viewer.sending import show_at_once
 
 _BURIED: Final = np.array([0.0, 0.0, -100.0])
 """Where a ghost is that has no phase."""
@@ -39,8 +40,7 @@ class LiveFigure:
         self._reference: ReferenceWalk | None = None
         self._layout: FigureLayout | None = None
         self._key: tuple[object, ...] = ()
-        self._drawn: dict[PartName, DrawnBatch] = {}
-        self._ghost: dict[PartName, DrawnBatch] = {}
+        self._drawn, self._ghost = DrawnFigure({}, {}), DrawnFigure({}, {})
         self._times = 0
         self._grey = True
         self._t_s: float | None = None
@@ -83,10 +83,9 @@ class LiveFigure:
             self._set_grey(True)
             self._server.flush()
             return
-        with self._server.atomic():
+        with show_at_once(self._server):
             self._show(moment)
             self._set_grey(late)
-        self._server.flush()
 
     def set_stale(self) -> None:
         """Turn the figure grey until the next moment, since nothing has come for a while."""
@@ -103,26 +102,25 @@ class LiveFigure:
         lead = segments.index("pelvis") if "pelvis" in segments else 0
         x, y, _ = moment.p[lead].tolist()
         root_x, root_y, heading = self._path.push(moment.t_s, x, y, _yaw(*moment.q[lead].tolist()))
-        ghost = self._reference is not None and all(s in segments for s in SEGMENTS)
-        # the ghost is one frame more of the same layout
-        q, p = (np.stack([of] * (1 + ghost)) for of in (moment.q, moment.p))
-        if ghost and self._reference is not None:
+        q, p = moment.q[np.newaxis], moment.p[np.newaxis]
+        rows = None if self._reference is None else _find_rows(segments)
+        if rows is not None and self._reference is not None:
+            # the ghost is one frame more of the same layout
+            q, p = np.concatenate((q, q)), np.concatenate((p, p))
             other = self._reference.at(moment.phase, (x, y), heading)
-            own = [segments.index(s) for s in SEGMENTS]
             # a trunk that only the person has hangs on the ghost's pelvis as on the person's
             p[1] = _BURIED if other is None else other[1][0]
             if other is not None:
-                q[1, own], p[1, own] = other
+                q[1, rows], p[1, rows] = other
+        ghost = rows is not None
         key = (segments, moment.method, ghost)
         layout = self._layout
         if layout is None or key != self._key:
             layout = FigureLayout(segments, self._body, moment.method)
             self._draw(layout, layout.place(q, p), key, ghost=ghost)
-        placed, copies = layout.place(q, p), layout.copies
-        drawings = (self._drawn, self._ghost)
+        placed, drawings = layout.place(q, p), (self._drawn, self._ghost)
         for wxyz, position, drawn in zip(placed.wxyz, placed.position, drawings, strict=False):
-            for name, part in drawn.items():
-                part.move(wxyz[copies[name]], position[copies[name]])
+            drawn.move(wxyz, position)
         for side in SIDES:
             if side in placed.soles:
                 sole, foot = placed.soles[side][0], moment.q[segments.index(FOOT[side])]
@@ -139,15 +137,15 @@ class LiveFigure:
         ghost: bool = False,
     ) -> None:
         """Draw other parts than before."""
-        for part in (*self._drawn.values(), *self._ghost.values()):
+        for part in (*self._drawn.parts.values(), *self._ghost.parts.values()):
             part.handle.remove()
         self._layout, self._key = layout, key
         # a new name each time: under the old one the client keeps its shader, which does not fit copies that
         # have opacities now (GL_INVALID_OPERATION, and nothing is drawn)
         self._times += 1
         scene, suffix, batches = self._server.scene, f"_{self._times}", layout.divide(placed)
-        self._drawn = draw_figure(scene, batches, suffix)
-        self._ghost = draw_ghost(scene, batches, suffix) if ghost else {}
+        self._drawn = DrawnFigure(draw_figure(scene, batches, suffix), layout.copies)
+        self._ghost = DrawnFigure(draw_ghost(scene, batches, suffix) if ghost else {}, layout.copies)
         self._paint()
 
     def _set_grey(self, grey: bool) -> None:
@@ -156,10 +154,16 @@ class LiveFigure:
             self._paint()
 
     def _paint(self) -> None:
-        for part in self._drawn.values():
+        for part in self._drawn.parts.values():
             part.handle.batched_colors = colour_copies(part.batch, self._dark, grey=self._grey)
-        for part in self._ghost.values():
+        for part in self._ghost.parts.values():
             part.handle.batched_colors = colour_copies(part.batch, self._dark, ghost=True)
+
+
+@lru_cache(maxsize=32)
+def _find_rows(segments: tuple[Segment, ...]) -> tuple[int, ...] | None:
+    """Where those of a ghost are among the segments with a pose; None where one has none."""
+    return tuple(map(segments.index, SEGMENTS)) if set(SEGMENTS) <= set(segments) else None
 
 
 def _yaw(w: float, x: float, y: float, z: float) -> float:

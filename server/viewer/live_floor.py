@@ -15,9 +15,9 @@ import viser
 from core import rotation
 from core.frames import SIDES, Floats, Side
 from server.viewer import shapes
-from server.viewer.batches import move_copies
 from server.viewer.colours import TINTS, to_linear_rgb
 from server.viewer.room import ROOM, Vector
+from server.viewer.sending import draw_lines, move_copies
 from server.viewer.steps import CLEAR_M, PIECE_M, REST_MPS, SAME_M, Single
 
 TRAIL_S: Final = 6.0
@@ -60,7 +60,7 @@ class LiveFloor:
         for side in SIDES:
             self._trails[side] = _Trail()
             self._steps[side].clear()
-        self._line.points = self._points(0.0)
+        draw_lines(self._line, self._points(0.0))
         self._sent_s = 0.0
 
     def push(self, t_s: float, side: Side, sole: Floats, q: Floats, contact: bool | None) -> None:
@@ -80,7 +80,7 @@ class LiveFloor:
         """Send the trails when the last time is `EVERY_S` ago."""
         if t_s - self._sent_s >= EVERY_S:
             self._sent_s = t_s
-            self._line.points = self._points(t_s)
+            draw_lines(self._line, self._points(t_s))
 
     def set_dark(self, dark: bool) -> None:
         """Change the colours to the theme of the page around."""
@@ -192,7 +192,7 @@ class _Steps:
         place, turn = self._rest[0], float(rotation.yaw(self._rest[1]))
         self._position[k] = (place[0], place[1], CLEAR_M)
         self._wxyz[k] = rotation.about(2, turn)
-        move_copies(self.node, self._wxyz, self._position)
+        move_copies(self.node, self._wxyz.copy(), self._position.copy())
         if self._scale[k] == 0.0:
             self._scale[k] = 1.0
             self.node.batched_scales = self._scale

@@ -7,6 +7,7 @@ out once, so that a moment is a look-up, one rotation and the floor.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from typing import Final
 
 import numpy as np
@@ -50,7 +51,8 @@ class ReferenceWalk:
             turn.append(np.stack([leg[s] for s in (THIGH[side], SHANK[side], FOOT[side])], axis=1))
             points.append(np.stack(np.broadcast_arrays(hip, knee, ankle, *sole), axis=1))
         self._pelvis = [(float(w), float(x), float(y), float(z)) for w, x, y, z in pelvis]
-        self._turn, self._points = np.stack(turn), np.stack(points)
+        # side → row → orientations (3, 4) of a leg, and its points (n, 3)
+        self._turns, self._points = ([list(of) for of in both] for both in (turn, points))
 
     def at(self, phases: Phases, place: tuple[float, float], heading: float) -> tuple[Floats, Floats] | None:
         """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS`, the lower sole on the floor.
@@ -72,12 +74,15 @@ class ReferenceWalk:
         pelvis = turn_about_z(heading, self._pelvis[left if self.lead == "left" else right])
         q, p = np.empty((len(SEGMENTS), 4)), np.zeros((len(SEGMENTS), 3))
         q[0] = pelvis
-        # pelvis ⊗ turn and R(pelvis) point, for all of them at once
-        legs = (0, 1), (left, right)
-        q[1:] = (self._turn[legs] @ _before(*pelvis)).reshape(6, 4)
-        points = self._points[legs] @ find_matrices(q[0]).T
-        p[1:] = points[:, :3].reshape(6, 3)
-        p += (*place, -points[..., 2].min())
+        before, matrix, lowest = _before(*pelvis), find_matrices(q[0]).T, inf
+        for k, row in enumerate((left, right)):
+            # pelvis ⊗ turn and R(pelvis) point, of a leg at once
+            leg = slice(1 + 3 * k, 4 + 3 * k)
+            np.matmul(self._turns[k][row], before, out=q[leg])
+            points = self._points[k][row] @ matrix
+            p[leg] = points[:3]
+            lowest = min(lowest, *points[:, 2].tolist())
+        p += (*place, -lowest)
         return q, p
 
 

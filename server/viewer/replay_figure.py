@@ -21,6 +21,7 @@ from server.viewer.room import (
     frame_person,
     turn_about_vertical,
 )
+from server.viewer.sending import show_at_once
 
 
 class ReplayFigure:
@@ -64,7 +65,7 @@ class ReplayFigure:
         self._t_s = float(m.t_s[i])
         valid = bool(m.valid[i])
         ghost = valid and self._matched is not None and self._matched.frames[i] >= 0
-        with self._server.atomic():
+        with show_at_once(self._server):
             for drawn, visible in ((self._drawn, valid), (self._ghost, ghost)):
                 for part in drawn.values():
                     part.handle.visible = bool(visible)
@@ -72,7 +73,6 @@ class ReplayFigure:
                         part.move(part.batch.wxyz[i], part.batch.position[i])
             self._room.bring(*(m.root[i] if self._follow else self._middle).tolist())
             self._ground.show(self._t_s, recent=self._follow)
-        self._server.flush()
         return self._t_s
 
     def set_dark(self, dark: bool) -> None:

@@ -16,6 +16,7 @@ from viser._messages import SetPositionMessage
 
 from core.frames import Floats
 from server.viewer.colours import BACKGROUND, FLOOR
+from server.viewer.sending import gather_longer
 
 ROOM: Final = "/room"
 """Name of the node that everything hangs on."""
@@ -62,6 +63,7 @@ class SceneRoom:
         self, server: viser.ViserServer, floor_m: float = FLOOR_M, middle: tuple[float, float] = (0.0, 0.0)
     ) -> None:
         self._server = server
+        gather_longer(server)
         scene = server.scene
         scene.set_up_direction("+z")
         scene.world_axes.visible = False

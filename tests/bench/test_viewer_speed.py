@@ -29,7 +29,7 @@ PICTURES, WINDOWS = round(RATE_HZ), 8
 """Of a window of walking, a second; how many windows: the first is for settling."""
 NO_DEARER: Final = 1.6
 """Live / replay: measured 1.1 to 1.3. The aim is 4 % of a core for a figure that somebody looks at: measured
-4.7 % on a busy machine, 2.8 % of it to pose; the replay 3.7 %. Each further viewer: 0.6 %."""
+3.4 to 3.7 % on a busy machine, 2.2 % of it to pose; the replay 2.9 %. Each further viewer: 0.5 %."""
 
 DRAIN = """
 import sys, threading, viser

@@ -18,7 +18,7 @@ from core.frames import SIDES
 from server.viewer.client import client_version
 from server.viewer.colours import TINTS
 from tests.browser import filling
-from tests.browser.conftest import DESK, PACED, Filled, Opener, RunningServer, is_ours
+from tests.browser.conftest import DESK, PACED, REST, Filled, Opener, RunningServer, is_ours
 from tests.browser.picture import wait_for_picture, wait_until_still
 from tests.data import data_folder
 from tests.server.viewer.seeing import pixels_of, shot
@@ -212,6 +212,28 @@ def test_a_picture_of_the_figure_can_be_saved(figure: Page) -> None:
     found = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
     for side in SIDES:
         assert pixels_of(found, TINTS[False][side]).sum() > 200, side
+
+
+EMPTY_AT_FIRST = """async () => {
+  const { savePicture } = await import('/static/js/figure-export.js');
+  const canvas = Object.assign(document.createElement('canvas'), { width: 64, height: 48 });
+  const draw = canvas.getContext('2d');
+  let asked = 0;
+  await savePicture(canvas, () => {
+    draw.clearRect(0, 0, 64, 48);
+    draw.fillStyle = 'orange';
+    if (++asked > 2) draw.fillRect(0, 0, 32, 48);
+  }, 'figure.png');
+}"""
+"""A stream of a canvas that is empty in its first two frames, as that of a busy computer may be."""
+
+
+def test_a_picture_of_an_empty_canvas_is_not_saved(opened: Opener) -> None:
+    page = opened(REST)
+    with page.expect_download(timeout=30_000) as waiting:
+        page.evaluate(EMPTY_AT_FIRST)
+    found = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
+    assert found[24, 16].tolist() == pytest.approx([255, 165, 0], abs=12)
 
 
 def test_a_video_of_the_walking_figure_can_be_saved(figure: Page) -> None:

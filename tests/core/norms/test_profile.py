@@ -5,8 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from core.frames import SIDES, Floats, Side
 from core.norms import adult_reference
-from core.norms.profile import MODES, NINE, SAGITTAL, gvs, leave_one_out, overall_profile, side_profile
+from core.norms.profile import (
+    MODES,
+    NINE,
+    PROFILES,
+    SAGITTAL,
+    gvs,
+    leave_one_out,
+    overall_profile,
+    side_profile,
+)
 from core.norms.tables import read_rows
 from tests.wbds import people
 
@@ -66,6 +76,45 @@ def test_a_profile_without_one_of_its_variables_does_not_exist() -> None:
     assert side_profile(scores, NINE) is None
     assert side_profile(scores, SAGITTAL) == pytest.approx(1.0)
     assert overall_profile({"left": scores}, SAGITTAL) is None
+
+
+def test_people_who_lack_a_side_or_a_joint_are_scored_by_what_they_have() -> None:
+    """Against one person after the other: the mean of the others, and the profiles of that person alone."""
+    rng = np.random.default_rng(0)
+    group: list[dict[Side, dict[str, Floats]]] = [
+        {
+            side: {v: rng.normal(0.0, 10.0, 101) for v in NINE if rng.random() < share}
+            for side in SIDES
+            if rng.random() < share
+        }
+        for share in (1.0, 1.0, 0.9, 0.7, 1.0, 0.9, 0.0, 1.0)
+    ]
+    for mode in MODES:
+        expected: dict[str, list[float]] = {}
+        for this in group:
+            scores: dict[Side, dict[str, float]] = {side: {} for side in SIDES}
+            for side, own in this.items():
+                for variable, curve in own.items():
+                    others = [
+                        np.mean([of[variable] for of in person.values() if variable in of], axis=0)
+                        for person in group
+                        if person is not this and any(variable in of for of in person.values())
+                    ]
+                    scores[side][variable] = float(gvs(curve, np.mean(others, axis=0), mode))
+                    expected.setdefault(variable, []).append(scores[side][variable])
+            for name, variables in PROFILES.items():
+                values = {
+                    f"{name}_side": [side_profile(scores[side], variables) for side in SIDES],
+                    f"{name}_overall": [overall_profile(scores, variables)],
+                }
+                for part, found in values.items():
+                    expected.setdefault(part, []).extend(x for x in found if x is not None)
+        assert 1 < len(expected["gps_side"]) < 2 * len(expected["gps_overall"]) + 4 < 2 * len(group)
+        spreads = leave_one_out(group)[mode]
+        assert set(spreads) == set(expected)
+        for what, x in expected.items():
+            assert spreads[what].mean_deg == pytest.approx(np.mean(x), rel=1e-12), what
+            assert spreads[what].sd_deg == pytest.approx(np.std(x, ddof=1), rel=1e-12), what
 
 
 def test_one_person_alone_has_nobody_to_be_compared_with() -> None:

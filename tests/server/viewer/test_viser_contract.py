@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import inspect
 import re
+from contextlib import aclosing
 from operator import attrgetter
 from pathlib import Path
+from queue import Queue
 
 import numpy as np
 import pytest
@@ -15,9 +18,17 @@ from viser._messages import SceneNodeUpdateMessage
 from viser.infra import _infra
 
 from server.viewer import pipe
-from server.viewer.batches import DrawnBatch, move_copies
+from server.viewer.batches import DrawnBatch
 from server.viewer.client import client_page, unpack_page
 from server.viewer.motion import ReplayMotion, prepare_motion
+from server.viewer.sending import (
+    WINDOW_S,
+    ArraysChanged,
+    draw_lines,
+    gather_longer,
+    move_copies,
+    show_at_once,
+)
 from server.viewer.views import FigureViews
 from tests.server import walk
 
@@ -97,9 +108,55 @@ def test_one_message_turns_and_places_a_batch_as_the_public_setters_would() -> N
         ]
         assert len(later) == 1
         np.testing.assert_array_equal(later[0].updates["batched_wxyzs"], drawn.wxyz[6])
-        handle.batched_positions = drawn.position[7]
-        np.testing.assert_array_equal(
-            drawn.position[6], prepare_motion(walk.poses(1.0)).batches["thighs"].position[6]
-        )
+    finally:
+        server.stop()
+
+
+def test_lines_are_sent_as_the_public_setter_would_and_only_when_they_are_others() -> None:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        before, after = (np.full((4, 2, 3), x, np.float32) for x in (1.0, 2.0))
+        handle = server.scene.add_line_segments("/lines", before, (0, 0, 0))
+        kept = server._websock_server._broadcast_buffer.message_from_id
+        known = set(kept)
+        draw_lines(handle, before.copy())
+        assert set(kept) == known
+        draw_lines(handle, after)
+        (sent,) = [kept[k] for k in set(kept) - known]
+        plain = SceneNodeUpdateMessage("/lines", {"points": after}, sent.owner)
+        assert sent.as_serializable_dict() == plain.as_serializable_dict()
+        np.testing.assert_array_equal(handle.points, after)
+    finally:
+        server.stop()
+
+
+def test_a_picture_is_sent_whole_and_at_once_however_long_viser_would_gather() -> None:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        gather_longer(server)
+        buffer = server._websock_server._broadcast_buffer
+        assert buffer.window_duration_sec == WINDOW_S
+        buffer.window_duration_sec = 60.0
+        shown = dict.fromkeys(("thighs", "shanks"), prepare_motion(walk.poses(1.0)).batches["thighs"])
+        drawn = {name: DrawnBatch(server.scene, name, batch, None) for name, batch in shown.items()}
+        taken: Queue[list[str]] = Queue()
+
+        async def take() -> None:
+            try:
+                async with aclosing(buffer.window_generator(1)) as windows:
+                    async for window in windows:
+                        taken.put([m.name for m in window if isinstance(m, ArraysChanged)])
+            finally:
+                taken.put(["nothing more"])
+
+        taking = asyncio.run_coroutine_threadsafe(take(), buffer.event_loop)
+        assert taken.get(timeout=30) == []  # what was there before
+        for frame in range(1, 4):
+            with show_at_once(server):
+                for part in drawn.values():
+                    part.move(part.batch.wxyz[frame], part.batch.position[frame])
+            assert taken.get(timeout=30) == ["/room/thighs", "/room/shanks"]
+        taking.cancel()
+        assert taken.get(timeout=30) == ["nothing more"]
     finally:
         server.stop()

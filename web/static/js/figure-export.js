@@ -13,25 +13,37 @@ function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-// What is on a WebGL canvas is gone after it was shown, so a frame is taken from its stream. viser draws only when
-// something changed: `redraw` shows the same moment again.
+// Whether a picture is of one colour, as that of a canvas is that was cleared and not drawn on yet.
+function isEmpty({ data }) {
+  const points = new Uint32Array(data.buffer);
+  return points.every((point) => point === points[0]);
+}
+
+// What is on a WebGL canvas is gone after it was shown, so a frame is taken from its stream: the first that has
+// something on it, for a stream may begin with the empty canvas. viser draws only when something changed: `redraw`
+// shows the same moment again.
 export async function savePicture(canvas, redraw, name) {
   const stream = canvas.captureStream();
   const video = document.createElement("video");
   video.muted = true;
   video.srcObject = stream;
   try {
-    const frame = new Promise((done, fail) => {
-      video.requestVideoFrameCallback(done);
+    const picture = document.createElement("canvas");
+    const taken = new Promise((done, fail) => {
       setTimeout(() => fail(new Error(speak`No picture came from the 3D view.`)), PATIENCE_MS);
+      const take = () => {
+        [picture.width, picture.height] = [video.videoWidth, video.videoHeight];
+        const context = picture.getContext("2d");
+        context.drawImage(video, 0, 0);
+        if (!isEmpty(context.getImageData(0, 0, picture.width, picture.height))) return done();
+        video.requestVideoFrameCallback(take);
+        redraw();
+      };
+      video.requestVideoFrameCallback(take);
     });
     redraw();
     video.play();
-    await frame;
-    const picture = document.createElement("canvas");
-    picture.width = video.videoWidth;
-    picture.height = video.videoHeight;
-    picture.getContext("2d").drawImage(video, 0, 0);
+    await taken;
     save(await new Promise((done) => picture.toBlob(done, "image/png")), name);
   } finally {
     for (const track of stream.getTracks()) track.stop();
