@@ -152,10 +152,14 @@ def _values(
     return _Values(plain, _figures(curves), _figures(anatomical_curves(curves, standing_deg)))
 
 
+_JUDGED: Final = {rule.measure: CURVES[rule.measure] for rule in RULES if rule.measure in CURVES}
+"""What the rules read of the curves."""
+
+
 def _figures(curves: CycleCurves) -> dict[tuple[str, Side], _Value]:
-    """Mean over the counted strides of what `CURVES` reads."""
+    """Mean over the counted strides of what rules read."""
     found: dict[tuple[str, Side], _Value] = {}
-    for name, sides in stride_figures(curves, CURVES).items():
+    for name, sides in stride_figures(curves, _JUDGED).items():
         level = CURVES[name].statistic != "range"
         for side, values in sides.items():
             if level and curves.zero == "walking":

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Annotated, Any
 
+import msgspec
 from fastapi import APIRouter, Query
 from fastapi.responses import JSONResponse
 from starlette.responses import Response
@@ -162,4 +163,4 @@ def _review(
         ],
         "parameters": [parameter_row(p) for p in bundle.parameters],
     }
-    return JSONResponse(content, status_code=status)
+    return Response(msgspec.json.encode(content), status, media_type="application/json")

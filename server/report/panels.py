@@ -205,9 +205,9 @@ def _side(curves: CycleCurves, name: str, side: Side) -> SideCurve:
         off = off[np.isfinite(off)]
         if len(counted) > DRAWN_STRIDES:
             counted = counted[np.linspace(0, len(counted) - 1, DRAWN_STRIDES).round().astype(np.int64)]
-        index = curves.stride_index[side]
-        shown = np.where(rest_at_bound(curves, name, side, rows), np.nan, np.degrees(rows))
-        strides = {index[i]: shown[i] for i in counted}
+        drawn, index = rows[counted], curves.stride_index[side]
+        shown = np.where(rest_at_bound(curves, name, side, drawn), np.nan, np.degrees(drawn))
+        strides = {index[i]: row for i, row in zip(counted, shown, strict=True)}
     return SideCurve(
         mean_deg=None if mean.mean is None else np.degrees(mean.mean),
         sd_deg=None if mean.sd is None else np.degrees(mean.sd),
