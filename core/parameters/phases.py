@@ -126,9 +126,9 @@ def _adjacent(strides: Strides, feet: FootTracks | None) -> Floats:
         if not len(own) or any(x not in feet.p for x in SIDES):
             continue
         ok = feet.valid[side] & feet.valid[OTHER[side]]
-        signals = np.concatenate((feet.p[side][:, :2].T, feet.p[OTHER[side]][:, :2].T))
+        signals = (np.where(ok, feet.p[foot][:, k], np.nan) for foot in (side, OTHER[side]) for k in (0, 1))
         bounds = _swings(strides, own)
-        x, y, other_x, other_y = resample(np.where(ok, signals, np.nan), feet.t_s, bounds, SWING_POINTS)
+        x, y, other_x, other_y = resample(signals, feet.t_s, bounds, SWING_POINTS)
         along_x, along_y = x[:, -1:] - x[:, :1], y[:, -1:] - y[:, :1]
         ahead = (x - other_x) * along_x + (y - other_y) * along_y
         found[own] = bounds[:, 0] + first_crossing(ahead) * (bounds[:, 1] - bounds[:, 0])

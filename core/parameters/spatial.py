@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from math import atan2, hypot
 from typing import Final
 
@@ -25,7 +24,6 @@ from core.parameters.catalogue import list_names
 from core.parameters.catalogue.entry import DISTANCES
 from core.parameters.clearance import (
     SoleHeights,
-    Spans,
     lay_out,
     measure_floor_heights,
     sole_heights,
@@ -245,36 +243,37 @@ def _measure_side(
     mirror = 1.0 if side == "left" else -1.0
     outward = np.stack((-along[:, 1] * mirror, along[:, 0] * mirror), axis=1)
     out = mirror * wrap_angle(yaw(feet.q[side][first]) - _map(atan2, y, x))
-    spans = lay_out(first, last)
     return {
         "gait_speed_mps": tell_figure(length / (feet.t_s[last] - feet.t_s[first]), "gap"),
         "stride_length_m": tell_figure(length, "gap"),
-        "circumduction_m": tell_figure(_furthest(feet.p[side], spans, outward), "gap"),
+        "circumduction_m": tell_figure(_furthest(feet.p[side], first, last, outward), "gap"),
         "toe_out_deg": tell_figure(np.degrees(out), "gap")
         if feet.posture == "standing"
         else _untold(len(own), "no_standing"),
-        **_clearances(of.tc_s[own], of.end_s[own], feet, foot.heights, spans),
+        **_clearances(of.tc_s[own], of.end_s[own], feet, foot.heights, flats),
         **_steps(of.opposite_ic_s[own], feet, side, flats, along, outward),
     }
 
 
-def _furthest(p: Floats, spans: Spans, outward: Floats) -> Floats:
-    """How far (m,) a path goes in a direction (m, 2) of its own from the beginning of each span, m."""
-    way = p[spans.sample, :2] - p[spans.first, :2][spans.span]
-    off = np.empty(len(way))
-    bounds = pairwise([*spans.start.tolist(), len(way)])
-    for (a, b), direction in zip(bounds, outward, strict=True):
-        np.matmul(way[a:b], direction, out=off[a:b])
-    return np.asarray(np.maximum.reduceat(off, spans.start))
+def _furthest(p: Floats, first: NDArray[np.intp], last: NDArray[np.intp], outward: Floats) -> Floats:
+    """How far (m,) a path goes in a direction (m, 2) of its own from the first of two samples each, m."""
+    far = np.empty(len(first))
+    for length in np.unique(last - first).tolist():
+        same = np.flatnonzero(last - first == length)
+        begins = first[same, None]
+        way = p[begins + np.arange(length + 1), :2] - p[begins, :2]
+        far[same] = (way @ outward[same, :, None]).max(axis=(1, 2))
+    return far
 
 
 def _clearances(
-    tc_s: Floats, end_s: Floats, feet: FootTracks, heights: SoleHeights | None, spans: Spans
+    tc_s: Floats, end_s: Floats, feet: FootTracks, heights: SoleHeights | None, flats: Flats
 ) -> Figures:
     """Of the sole between the two flats."""
-    n = len(spans.first)
+    n = len(tc_s)
     if heights is None:
         return {name: _untold(n, "no_shoe_geometry") for name in CLEARANCES}
+    spans = lay_out(flats.first, flats.last)
     heel, tip = measure_floor_heights(heights, spans, feet.body.ankle_height)
     toe = _untold(n, "no_terminal_contact")
     swings = np.maximum(np.ceil((np.stack((tc_s, end_s)) - feet.t_s[0]) * feet.rate_hz) - spans.first, 0.0)
