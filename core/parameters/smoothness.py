@@ -53,7 +53,8 @@ def stride_smoothness(strides: Sequence[Window], t_s: Floats, trunk: Mapping[Seg
         return summarise_values(NAME, None, [], "", "no_pelvis_sensor")
     if not strides:
         return summarise_values(NAME, None, [], "", "no_strides")
-    force = np.linalg.norm(trunk["pelvis"] + (0.0, 0.0, GRAVITY), axis=1)
+    forward, left, up = trunk["pelvis"].T
+    force = np.sqrt(forward**2 + left**2 + (up + GRAVITY) ** 2)
     bounds = np.array(strides)
     pieces = resample(np.abs(force - GRAVITY)[None], t_s, bounds, POINTS + 1)[0][:, :-1]
     values = spectral_arc_length(pieces, (bounds[:, 1] - bounds[:, 0]) / POINTS)
