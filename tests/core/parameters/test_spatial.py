@@ -181,6 +181,16 @@ def test_a_stride_with_a_lost_sensor_has_no_length() -> None:
     assert np.isfinite(lengths.values[left]).sum() == 3
 
 
+def test_a_path_that_is_not_known_is_a_gap_and_no_number() -> None:
+    tracks = feet()
+    torn = tracks.p["left"].copy()
+    torn[250:260] = np.nan
+    found = measure_distances(strides(), replace(tracks, p={**tracks.p, "left": torn}))["circumduction_m"]
+    left = strides().columns.of["left"]
+    assert sorted(found.reasons[left]) == ["", "", "", "gap"]
+    assert np.isfinite(found.values[left]).sum() == 3
+
+
 def test_one_foot_alone_has_no_steps() -> None:
     tracks = feet()
     alone = replace(tracks, p={"left": tracks.p["left"]}, still={"left": tracks.still["left"]}, linked=False)
