@@ -86,12 +86,13 @@ def read_model(
 
 def view_numbers(model: ReportModel) -> dict[str, Any]:
     """What of the report stands beside the timeline and changes with every edit."""
+    used = model.used
     return {
         "first": select_first(model),
         "key_curve": draw_chart(model.key_curve, KEY_HEIGHT, x_unit=True),
-        "used": model.used,
+        "used": used,
         "norm_source": model.norm_source,
         "at_speed": model.at_speed,
-        "stride_words": f"{sum(model.used.values())} of {len(model.strides)} used",
+        "stride_words": f"{sum(used.values())} of {len(model.strides)} used",
         "empty_reason": explain_emptiness(model),
     }
