@@ -21,7 +21,7 @@ from core.parameters.catalogue.errors import LEVELS
 from core.parameters.flats import OTHER
 from core.parameters.kinematic import NO_STANDING, stride_figures
 from core.parameters.result import CycleCurves, Parameter
-from core.parameters.variability import NORMAL_95, TOO_FEW, Spread, differ
+from core.parameters.variability import NORMAL_95, TOO_FEW, Spread, differ, mean_and_sd
 
 Zero = Literal["anatomical", "standing"]
 
@@ -168,8 +168,8 @@ def _figures(curves: CycleCurves) -> dict[tuple[str, Side], _Value]:
             counted = values[curves.used[side]]
             whole = counted[np.isfinite(counted)]
             if len(whole):
-                sd = float(whole.std(ddof=1)) if len(whole) > 1 else None
-                found[name, side] = _Value(float(whole.mean()), len(whole), sd=sd, own=_own(CURVES[name]))
+                mean, sd = mean_and_sd(whole)
+                found[name, side] = _Value(mean, len(whole), sd=sd, own=_own(CURVES[name]))
             else:
                 found[name, side] = _Value(None, 0, "gap" if len(counted) else "no_strides")
     return found
