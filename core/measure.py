@@ -22,6 +22,7 @@ from core.events.strides import count_strides, stride_list
 from core.events.turns import Turn
 from core.frames import Bools, Floats, Segment
 from core.parameters import Surface, take_figures
+from core.parameters.flats import Flats, find_flats
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
 from core.parameters.smoothness import stride_smoothness
@@ -115,8 +116,10 @@ def measure_gait(tracks: Tracks, edits: Sequence[Edit] = ()) -> MeasuredGait:
         core/events/edits.py.
     """
     events = apply_event_edits(tracks.events, edits, tracks.duration_s)
-    strides = apply_stride_edits(_walked(tracks, events), edits)
-    figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk)
+    found = stride_list(events, tracks, tracks.turning, tracks.params)
+    flats = None if tracks.feet is None else find_flats(found, tracks.feet)
+    strides = apply_stride_edits(_walked(tracks, found, flats), edits)
+    figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk, flats)
     # contacts, found or set by a person, say more than the trunk
     steps = None if events.events else tracks.steps
     if steps is None:
@@ -137,15 +140,15 @@ def _find_feet_lag(tracks: Tracks, events: GaitEvents) -> float:
     return abs(measure_foot_lag(events, AlternationParams()) or 0.0)
 
 
-def _walked(tracks: Tracks, events: GaitEvents) -> Strides:
+def _walked(tracks: Tracks, found: Strides, flats: Flats | None) -> Strides:
     """The stride list, without strides that lead nowhere where the feet's paths are known."""
-    found = stride_list(events, tracks, tracks.turning, tracks.params)
-    marching = in_place(found, tracks.feet, tracks.surface)
+    marching = in_place(found, tracks.feet, tracks.surface, flats).tolist()
     if not marching:
         return found
-    return count_strides(
-        [add_flag(s, "in_place") if i in marching else s for i, s in enumerate(found.strides)], tracks.params
-    )
+    listed = list(found.strides)
+    for i in marching:
+        listed[i] = add_flag(listed[i], "in_place")
+    return count_strides(listed, tracks.params)
 
 
 def _of_steps(tracks: Tracks, steps: Steps, figures: tuple[Parameter, ...]) -> tuple[Parameter, ...]:

@@ -34,8 +34,8 @@ from core.norms.profile import (
 )
 from core.norms.tables import wbds_group
 from core.parameters.anatomical_zero import anatomical_curves
-from core.parameters.kinematic import MEAN_ZERO, NO_STANDING, MeanCurve, mean_curve
-from core.parameters.result import CycleCurves
+from core.parameters.kinematic import MEAN_ZERO, NO_STANDING, mean_curve
+from core.parameters.result import CycleCurves, MeanCurve
 from core.parameters.variability import TOO_FEW
 
 GDI_STAR: Final[Mapping[Profile, str]] = {"gps": "gdi_star", "gps_sagittal": "gdi_star_sagittal"}

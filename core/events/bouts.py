@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import inf
 
 import numpy as np
 
 from core.events.result import GaitEvents
+from core.frames import SIDES
 from core.rest import Window
 
 
@@ -133,9 +134,10 @@ def find_bouts(
     standing: Sequence[Window] = (),
 ) -> tuple[Bout, ...]:
     """Walking bouts of the contacts of the feet; arguments as of `walking_bouts`."""
-    contacts = sorted(e.time_s for e in events.events if e.kind == "ic")
-    leavings = sorted(e.time_s for e in events.events if e.kind == "tc")
-    feet = len({e.side for e in events.events if e.kind == "ic"})
+    of_feet = [events.times(side, "ic") for side in SIDES]
+    contacts = sorted(chain(*of_feet))
+    leavings = sorted(chain(*(events.times(side, "tc") for side in SIDES)))
+    feet = sum(bool(times) for times in of_feet)
     return walking_bouts(contacts, leavings, rests, max(1, feet), params, standing)
 
 

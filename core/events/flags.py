@@ -19,6 +19,8 @@ from core.events.result import Stride, StrideFlag
 
 ORDER: Final[tuple[StrideFlag, ...]] = get_args(StrideFlag)
 
+_BROKEN: Final = frozenset[StrideFlag]({"gap", "incomplete", "implausible_time"})
+
 YIELDING: Final[StrideFlag] = "near_turn"
 """The flag that sets a cycle aside only while enough others are left."""
 
@@ -80,10 +82,10 @@ def find_flags(own: Sequence[Stride], params: StrideParams) -> list[set[StrideFl
             more[i].add("last")
         if len(run) < params.run_strides:
             more[run[0]].add("non_periodic")
-        for place, i in enumerate(run):
-            near = run[max(0, place - params.turn_margin) : place + params.turn_margin + 1]
-            if "turn" not in own[i].flags and any("turn" in own[j].flags for j in near):
-                more[i].add("near_turn")
+        for place in (place for place, i in enumerate(run) if "turn" in own[i].flags):
+            for i in run[max(0, place - params.turn_margin) : place + params.turn_margin + 1]:
+                if "turn" not in own[i].flags:
+                    more[i].add("near_turn")
     for i in _outliers(own, params):
         more[i].add("outlier")
     return more
@@ -91,17 +93,22 @@ def find_flags(own: Sequence[Stride], params: StrideParams) -> list[set[StrideFl
 
 def add_flag(stride: Stride, *more: StrideFlag) -> Stride:
     """The cycle with these flags too, in their order."""
-    flags = tuple(f for f in ORDER if f in more or f in stride.flags)
-    return stride if flags == stride.flags else replace(stride, flags=flags)
+    if all(f in stride.flags for f in more):
+        return stride
+    return replace(stride, flags=tuple(f for f in ORDER if f in more or f in stride.flags))
 
 
 def decide_exclusions(strides: Sequence[Stride], params: StrideParams) -> tuple[list[Stride], bool]:
     """Set cycles aside by the first of their flags; True where those next to a turn had to count."""
-    strict = [replace(s, excluded_reason=next(iter(s.flags), None)) for s in strides]
+    strict = [_set_aside(s, next(iter(s.flags), None)) for s in strides]
     left = Counter(s.side for s in strict if s.excluded_reason is None)
     if all(left[s.side] >= params.min_kept for s in strict if s.excluded_reason == YIELDING):
         return strict, False
-    return [replace(s, excluded_reason=_but_near_turn(s)) for s in strides], True
+    return [_set_aside(s, _but_near_turn(s)) for s in strides], True
+
+
+def _set_aside(stride: Stride, reason: StrideFlag | None) -> Stride:
+    return stride if stride.excluded_reason == reason else replace(stride, excluded_reason=reason)
 
 
 def _but_near_turn(stride: Stride) -> StrideFlag | None:
@@ -121,7 +128,7 @@ def _runs(own: Sequence[Stride], params: StrideParams) -> list[list[int]]:
 
 def _outliers(own: Sequence[Stride], params: StrideParams) -> list[int]:
     """Places of whole cycles whose time is far from the foot's median."""
-    whole = [i for i, s in enumerate(own) if not {"gap", "incomplete", "implausible_time"} & set(s.flags)]
+    whole = [i for i, s in enumerate(own) if _BROKEN.isdisjoint(s.flags)]
     if len(whole) < params.outlier_from:
         return []
     times = [own[i].duration_s for i in whole]

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Final, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from core.errors import Notice
-from core.frames import Side
+from core.frames import SIDES, Bools, Floats, Side
 
 EventKind = Literal["ic", "tc"]
 """ic = initial contact (foot strike), tc = terminal contact (foot off)."""
@@ -78,7 +82,14 @@ class GaitEvents:
 
     def times(self, side: Side, kind: EventKind) -> tuple[float, ...]:
         """Event times in s of one side and kind, increasing."""
-        return tuple(e.time_s for e in self.events if e.side == side and e.kind == kind)
+        return self._times.get((side, kind), ())
+
+    @cached_property
+    def _times(self) -> Mapping[tuple[Side, EventKind], tuple[float, ...]]:
+        found: dict[tuple[Side, EventKind], list[float]] = {}
+        for e in self.events:
+            found.setdefault((e.side, e.kind), []).append(e.time_s)
+        return {key: tuple(times) for key, times in found.items()}
 
 
 @dataclass(frozen=True)
@@ -119,12 +130,69 @@ class Stride:
         return self.end_s - self.start_s
 
 
+def list_known(values: Floats) -> list[float | None]:
+    """The numbers (n,), None where there is none."""
+    listed: list[float | None] = values.tolist()
+    for i in np.flatnonzero(np.isnan(values)).tolist():
+        listed[i] = None
+    return listed
+
+
+@dataclass(frozen=True, eq=False)
+class StrideColumns:
+    """A stride list by columns (strides,): times and turn as in `Stride`, NaN where not known.
+
+    Parameters
+    ----------
+    counted : whether the stride counts.
+    of, used : side → places in the list of all its strides, and of those that count, in order.
+    """
+
+    start_s: Floats
+    tc_s: Floats
+    end_s: Floats
+    opposite_tc_s: Floats
+    opposite_ic_s: Floats
+    turn_rad: Floats
+    counted: Bools
+    of: Mapping[Side, NDArray[np.intp]]
+    used: Mapping[Side, NDArray[np.intp]]
+
+    @property
+    def duration_s(self) -> Floats:
+        """Stride times (strides,), s."""
+        return self.end_s - self.start_s
+
+
 @dataclass(frozen=True, eq=False)
 class Strides:
     """The stride list of a take: the one mechanism every later figure reads."""
 
     strides: tuple[Stride, ...]
     notices: tuple[Notice, ...] = ()
+
+    @cached_property
+    def columns(self) -> StrideColumns:
+        """The list by columns."""
+        rows = [
+            (s.start_s, s.tc_s, s.end_s, s.opposite_tc_s, s.opposite_ic_s, s.turn_rad) for s in self.strides
+        ]
+        table = np.ascontiguousarray(np.array(rows, np.float64).reshape(-1, 6).T)
+        counted = np.array([s.excluded_reason is None for s in self.strides], np.bool_)
+        left = np.array([s.side == "left" for s in self.strides], np.bool_)
+        of = {side: np.flatnonzero(left if side == "left" else ~left) for side in SIDES}
+        start_s, tc_s, end_s, opposite_tc_s, opposite_ic_s, turn_rad = table
+        return StrideColumns(
+            start_s=start_s,
+            tc_s=tc_s,
+            end_s=end_s,
+            opposite_tc_s=opposite_tc_s,
+            opposite_ic_s=opposite_ic_s,
+            turn_rad=turn_rad,
+            counted=counted,
+            of=of,
+            used={side: own[counted[own]] for side, own in of.items()},
+        )
 
     def select_used(self, side: Side | None = None) -> tuple[Stride, ...]:
         """Strides that count, of one side or both."""

@@ -5,10 +5,8 @@ Nothing is deleted: later stages and the therapist see every cycle and why it wa
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -16,8 +14,8 @@ from numpy.typing import NDArray
 
 from core.errors import Notice
 from core.events.flags import StrideParams, decide_exclusions, flag_cycles
-from core.events.result import COMPARED, GaitEvents, Stride, StrideFlag, Strides
-from core.frames import FOOT, SIDES, Bools, Oriented, Side
+from core.events.result import COMPARED, GaitEvents, Stride, StrideFlag, Strides, list_known
+from core.frames import FOOT, SIDES, Bools, Floats, Oriented, Side
 from core.rotation import wrap_angle, yaw
 
 NOTICES: Final = ("short_walk", "no_strides")
@@ -69,39 +67,43 @@ def side_strides(
 ) -> list[Stride]:
     """Cycles of one foot with every reason that needs no neighbours; arguments as of `stride_list`."""
     other: Side = "right" if side == "left" else "left"
-    contacts, leavings = events.times(side, "ic"), events.times(side, "tc")
-    other_contacts, other_leavings = events.times(other, "ic"), events.times(other, "tc")
+    contacts, leavings = np.array(events.times(side, "ic")), np.array(events.times(side, "tc"))
     n = len(orientations.t_s)
     places = np.searchsorted(orientations.t_s, contacts)
+    first, past = places[:-1], places[1:]
     foot = FOOT[side]
     lost = _total(~orientations.valid[foot] if foot in orientations.q else np.zeros(n, np.bool_))
-    turned = _total(np.zeros(n, np.bool_) if turning is None else turning)
-    heading = yaw(orientations.q[foot][np.minimum(places, n - 1)]) if foot in orientations.q else None
-    strides = []
-    for i, (start, end) in enumerate(pairwise(contacts)):
-        left = _between(leavings, start, end)
-        landings = _between(other_contacts, start, end)
-        opposite_ic = landings[0] if len(landings) == 1 else None
-        opposite_tc = _first(other_leavings, start, end if opposite_ic is None else opposite_ic)
-        first, past = places[i : i + 2]
-        gap = lost[past] > lost[first]
-        turn = None
-        if heading is not None and not gap:
-            turn = wrap_angle(heading[i + 1] - heading[i])
-        flags: list[StrideFlag] = []
-        if gap:
-            flags.append("gap")
-        if len(left) != 1 or len(landings) > 1:
-            flags.append("incomplete")
-        if not params.min_s <= end - start <= params.max_s:
-            flags.append("implausible_time")
-        if (turn is not None and abs(turn) > params.turn_rad) or (
-            turned[past] - turned[first] > params.turn_share * (past - first)
-        ):
-            flags.append("turn")
-        tc = left[0] if left else None
-        strides.append(Stride(side, start, tc, end, opposite_tc, opposite_ic, turn, flags=tuple(flags)))
-    return strides
+    in_turn = _total(np.zeros(n, np.bool_) if turning is None else turning)
+    start, end = contacts[:-1], contacts[1:]
+    tc, left = _inside(leavings, start, end)
+    landed, landings = _inside(np.array(events.times(other, "ic")), start, end)
+    opposite_ic = np.where(landings == 1, landed, np.nan)
+    opposite_tc, _ = _inside(
+        np.array(events.times(other, "tc")), start, np.where(landings == 1, opposite_ic, end)
+    )
+    gap = lost[past] > lost[first]
+    turn = np.full(len(start), np.nan)
+    if foot in orientations.q:
+        heading = yaw(orientations.q[foot][np.minimum(places, n - 1)])
+        turn = np.where(gap, np.nan, wrap_angle(np.diff(heading)))
+    found: dict[StrideFlag, Bools] = {
+        "gap": gap,
+        "incomplete": (left != 1) | (landings > 1),
+        "implausible_time": (end - start < params.min_s) | (end - start > params.max_s),
+        "turn": (np.abs(turn) > params.turn_rad)
+        | (in_turn[past] - in_turn[first] > params.turn_share * (past - first)),
+    }
+    flags: list[tuple[StrideFlag, ...]] = [()] * len(start)
+    for flag, where in found.items():
+        for i in np.flatnonzero(where).tolist():
+            flags[i] = (*flags[i], flag)
+    known = (list_known(x) for x in (tc, opposite_tc, opposite_ic, turn))
+    return [
+        Stride(side, a, off, b, other_off, other_ic, turned, flags=own)
+        for a, b, off, other_off, other_ic, turned, own in zip(
+            start.tolist(), end.tolist(), *known, flags, strict=True
+        )
+    ]
 
 
 def _total(mask: Bools) -> NDArray[np.int64]:
@@ -109,15 +111,11 @@ def _total(mask: Bools) -> NDArray[np.int64]:
     return np.concatenate(([0], np.cumsum(mask, dtype=np.int64)))
 
 
-def _between(times: Sequence[float], after: float, before: float) -> Sequence[float]:
-    """Those of increasing times in the open range (after, before)."""
-    return times[bisect_right(times, after) : bisect_left(times, before)]
-
-
-def _first(times: Sequence[float], after: float, before: float) -> float | None:
-    """First of increasing times in the open range (after, before)."""
-    inside = _between(times, after, before)
-    return inside[0] if inside else None
+def _inside(times: Floats, after: Floats, before: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """First of increasing times in each open range (after, before), NaN without one; how many are in it."""
+    first = np.searchsorted(times, after, "right")
+    count = np.searchsorted(times, before, "left") - first
+    return np.where(count > 0, np.append(times, np.nan)[first], np.nan), count
 
 
 def _short_walk(strides: Sequence[Stride], near_turns: bool) -> list[Notice]:

@@ -21,7 +21,7 @@ from core.parameters.catalogue.errors import LEVELS
 from core.parameters.flats import OTHER
 from core.parameters.kinematic import NO_STANDING, stride_figures
 from core.parameters.result import CycleCurves, Parameter
-from core.parameters.variability import NORMAL_95, TOO_FEW, Spread, differ
+from core.parameters.variability import NORMAL_95, TOO_FEW, Spread, differ, mean_and_sd
 
 Zero = Literal["anatomical", "standing"]
 
@@ -152,10 +152,14 @@ def _values(
     return _Values(plain, _figures(curves), _figures(anatomical_curves(curves, standing_deg)))
 
 
+_JUDGED: Final = {rule.measure: CURVES[rule.measure] for rule in RULES if rule.measure in CURVES}
+"""What the rules read of the curves."""
+
+
 def _figures(curves: CycleCurves) -> dict[tuple[str, Side], _Value]:
-    """Mean over the counted strides of what `CURVES` reads."""
+    """Mean over the counted strides of what rules read."""
     found: dict[tuple[str, Side], _Value] = {}
-    for name, sides in stride_figures(curves, CURVES).items():
+    for name, sides in stride_figures(curves, _JUDGED).items():
         level = CURVES[name].statistic != "range"
         for side, values in sides.items():
             if level and curves.zero == "walking":
@@ -164,8 +168,8 @@ def _figures(curves: CycleCurves) -> dict[tuple[str, Side], _Value]:
             counted = values[curves.used[side]]
             whole = counted[np.isfinite(counted)]
             if len(whole):
-                sd = float(whole.std(ddof=1)) if len(whole) > 1 else None
-                found[name, side] = _Value(float(whole.mean()), len(whole), sd=sd, own=_own(CURVES[name]))
+                mean, sd = mean_and_sd(whole)
+                found[name, side] = _Value(mean, len(whole), sd=sd, own=_own(CURVES[name]))
             else:
                 found[name, side] = _Value(None, 0, "gap" if len(counted) else "no_strides")
     return found

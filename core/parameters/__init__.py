@@ -10,7 +10,7 @@ from core.parameters.kinematic import (
     stride_figures,
     summarise_angles,
 )
-from core.parameters.spatial import Surface, per_stride_spatial, spatial_rows, surface_of
+from core.parameters.spatial import Surface, measure_distances, surface_of
 from core.parameters.take import TakeFigures, gait_parameters, take_figures
 from core.parameters.temporal import per_stride, stride_values, summarise_times
 
@@ -21,10 +21,9 @@ __all__ = [
     "foot_pitch",
     "gait_parameters",
     "mean_curve",
+    "measure_distances",
     "per_stride",
     "per_stride_figures",
-    "per_stride_spatial",
-    "spatial_rows",
     "stride_figures",
     "stride_values",
     "summarise_angles",

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.body.feet import FootTracks
 from core.frames import Floats, Side
@@ -21,6 +22,31 @@ DIP_M: Final = 0.001
 path of a foot moves by less from sample to sample when it passes the floor."""
 
 ClearanceReason = Literal["no_swing_minimum"]
+
+
+@dataclass(frozen=True, eq=False)
+class Spans:
+    """Stretches of a signal laid one behind the other.
+
+    Parameters
+    ----------
+    first, last : (spans,) samples, both included. start : (spans,) where each begins in the row of all.
+    sample, span : (samples,) sample of the signal, and which span it is of.
+    """
+
+    first: NDArray[np.intp]
+    last: NDArray[np.intp]
+    start: NDArray[np.intp]
+    sample: NDArray[np.intp]
+    span: NDArray[np.intp]
+
+
+def lay_out(first: NDArray[np.intp], last: NDArray[np.intp]) -> Spans:
+    """Lay out the stretches between two samples each, both included, the first before the last."""
+    length = last - first + 1
+    start = np.cumsum(length) - length
+    span = np.repeat(np.arange(len(first)), length)
+    return Spans(first, last, start, np.arange(len(span)) + (first - start)[span], span)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,13 +71,12 @@ def sole_heights(feet: FootTracks, side: Side) -> SoleHeights | None:
     )
 
 
-def measure_floor_heights(
-    heights: SoleHeights, first: int, last: int, ankle_height: float
-) -> tuple[Floats, Floats]:
-    """Heights (last − first + 1,) of heel and tip over the floor between flats at two samples, m."""
-    a, b = float(heights.ankle[first]) - ankle_height, float(heights.ankle[last]) - ankle_height
-    floor = a + (b - a) / (last - first) * np.arange(last - first + 1.0)
-    return heights.heel[first : last + 1] - floor, heights.toe[first : last + 1] - floor
+def measure_floor_heights(heights: SoleHeights, spans: Spans, ankle_height: float) -> tuple[Floats, Floats]:
+    """Heights (samples,) of heel and tip over the floor between the flats at the ends of spans, m."""
+    a, b = heights.ankle[spans.first] - ankle_height, heights.ankle[spans.last] - ankle_height
+    slope = (b - a) / (spans.last - spans.first)
+    floor = a[spans.span] + slope[spans.span] * (spans.sample - spans.first[spans.span])
+    return heights.heel[spans.sample] - floor, heights.toe[spans.sample] - floor
 
 
 def toe_clearance(h: Floats) -> float | ClearanceReason:

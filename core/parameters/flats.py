@@ -6,14 +6,15 @@ stance without any (core/body/still.py).
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.body.feet import FootTracks
-from core.events.result import Stride
+from core.events.result import Strides
 from core.frames import Side
 from core.rest import find_runs
 
@@ -22,42 +23,63 @@ STANCE_SHARE: Final = 0.7
 
 OTHER: Final[Mapping[Side, Side]] = {"left": "right", "right": "left"}
 
-Places = Mapping[tuple[Side, float], int | None]
-"""Foot and initial contact → sample of the flat that follows, None when the foot never rests."""
+
+@dataclass(frozen=True, eq=False)
+class Flats:
+    """Samples of the flats of strides, −1 where the foot never rests or there is no such contact.
+
+    Parameters
+    ----------
+    first, last : (strides,) after the contacts that begin and end the stride.
+    opposite : (strides,) of the other foot, after its contact inside.
+    """
+
+    first: NDArray[np.intp]
+    last: NDArray[np.intp]
+    opposite: NDArray[np.intp]
+
+    def select(self, places: slice | NDArray[np.intp]) -> Flats:
+        """Those of some strides of the list."""
+        return Flats(self.first[places], self.last[places], self.opposite[places])
 
 
-def find_flats(strides: Sequence[Stride], feet: FootTracks) -> Places:
+def find_flats(strides: Strides, feet: FootTracks) -> Flats:
     """The flat after every initial contact that a stride begins, ends or crosses with."""
-    until: dict[tuple[Side, float], float] = {}
-    for s in strides:
-        stance = STANCE_SHARE * s.duration_s
-        until.setdefault((s.side, s.end_s), s.end_s + stance)
-        if s.opposite_ic_s is not None:
-            until.setdefault((OTHER[s.side], s.opposite_ic_s), s.opposite_ic_s + stance)
-    for s in strides:
-        off = s.start_s + STANCE_SHARE * s.duration_s if s.tc_s is None else s.tc_s
+    of = strides.columns
+    stance = STANCE_SHARE * of.duration_s
+    off = np.where(np.isnan(of.tc_s), of.start_s + stance, of.tc_s)
+    first, last, opposite = np.full((3, len(off)), -1)
+    for side in feet.p:
+        own, other = of.of[side], of.of[OTHER[side]]
+        # contacts of this foot within the list, each once per stride that ends or crosses with it
+        landed = of.opposite_ic_s.copy()
+        landed[own] = of.end_s[own]
+        told = np.flatnonzero(~np.isnan(landed))
+        times, at = np.unique(np.concatenate((landed[told], of.start_s[own])), return_inverse=True)
+        until = np.full(len(times), np.inf)
+        # the first stride in the list counts
+        until[at[: len(told)][::-1]] = (landed + stance)[told][::-1]
         # the stride before tells how long a stance is, where a small step in a turn was not found
-        until[s.side, s.start_s] = min(off, until.get((s.side, s.start_s), off))
-    rests = {side: rest_runs(feet, side) for side in feet.p}
-    spans = np.searchsorted(feet.t_s, [(start, stop) for (_, start), stop in until.items()]).tolist()
-    return {
-        key: _longest(*rests[key[0]], first, past) if key[0] in rests else None
-        for key, (first, past) in zip(until, spans, strict=True)
-    }
+        np.minimum.at(until, at[len(told) :], off[own])
+        found = _longest(feet, side, *np.searchsorted(feet.t_s, np.stack((times, until))))
+        first[own] = found[at[len(told) :]]
+        place = np.full(len(off), -1)
+        place[told] = found[at[: len(told)]]
+        last[own], opposite[other] = place[own], place[other]
+    return Flats(first, last, opposite)
 
 
-def rest_runs(feet: FootTracks, side: Side) -> tuple[list[int], list[int]]:
-    """First and past-the-last samples of every rest of a foot, in order."""
-    resting = feet.still[side] & feet.valid[side]
-    found = find_runs(resting)
-    return [start for start, _ in found], [stop for _, stop in found]
-
-
-def _longest(starts: Sequence[int], stops: Sequence[int], first: int, past: int) -> int | None:
-    """Middle of the longest run within [first, past)."""
-    best, middle = 0, None
-    for i in range(bisect_right(stops, first), bisect_left(starts, past)):
-        a, b = max(starts[i], first), min(stops[i], past)
-        if b - a > best:
-            best, middle = b - a, (a + b) // 2
+def _longest(
+    feet: FootTracks, side: Side, first: NDArray[np.intp], past: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """Middle (m,) of a foot's longest rest within each range [first, past), −1 where it never rests."""
+    runs = np.array(find_runs(feet.still[side] & feet.valid[side]), np.intp).reshape(-1, 2)
+    starts, stops = runs.T
+    at, end = np.searchsorted(stops, first, "right"), np.searchsorted(starts, past, "left")
+    best, middle = np.zeros(len(first), np.intp), np.full(len(first), -1)
+    while len(left := np.flatnonzero(at < end)):
+        a, b = np.maximum(starts[at[left]], first[left]), np.minimum(stops[at[left]], past[left])
+        longer = b - a > best[left]
+        best[left[longer]], middle[left[longer]] = (b - a)[longer], (a + b)[longer] // 2
+        at[left] += 1
     return middle

@@ -7,7 +7,7 @@ The windows of the figures are those of the reference table (core/norms/data), s
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 from typing import Final
 
@@ -19,7 +19,7 @@ from core.frames import FOOT, SIDES, SUFFIX, Bools, Floats, Oriented, Segment, S
 from core.parameters.catalogue import CATALOGUE, CurveFigure, list_curve_figures
 from core.parameters.plausible import IMPOSSIBLE, LEAST_KNEE
 from core.parameters.resample import resample_in_turn
-from core.parameters.result import CycleCurves, Parameter
+from core.parameters.result import CycleCurves, MeanCurve, Parameter
 from core.parameters.rows import Column, as_column
 from core.parameters.stance import foot_pitches
 from core.parameters.variability import summarise_values
@@ -51,21 +51,6 @@ MOST: Final = 0.5
 
 FOOT_PITCH: Final = ("foot_pitch_ic_deg", "foot_pitch_tc_deg")
 """Sole to floor at the contacts, toes up positive, 0 at standing."""
-
-
-@dataclass(frozen=True, eq=False)
-class MeanCurve:
-    """Mean and standard deviation over the counted strides.
-
-    Parameters
-    ----------
-    mean, sd : (101,) rad; None without strides, sd also with fewer than two. NaN where most strides rest on
-        the bound of a leg model. n : strides behind them.
-    """
-
-    mean: Floats | None
-    sd: Floats | None
-    n: int
 
 
 def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
@@ -119,7 +104,8 @@ def read_cycles(
     -------
     What is known beside the curves.
     """
-    index = {side: tuple(i for i, s in enumerate(strides.strides) if s.side == side) for side in SIDES}
+    of = strides.columns
+    foot_off = 100.0 * (of.tc_s - of.start_s) / of.duration_s
     ends: dict[str, dict[Side, float]] = {}
     why: dict[str, dict[Side, str]] = {}
     for name, reason in angles.withheld.items():
@@ -129,21 +115,16 @@ def read_cycles(
             why.setdefault(base if own_sides else name, {})[side] = reason
     known = CycleCurves(
         curves={},
-        stride_index=index,
-        used={
-            side: np.array([strides.strides[i].excluded_reason is None for i in rows], np.bool_)
-            for side, rows in index.items()
-        },
-        foot_off_pct={
-            side: np.array([_foot_off(strides, i) for i in rows], np.float64) for side, rows in index.items()
-        },
+        stride_index={side: tuple(own.tolist()) for side, own in of.of.items()},
+        used={side: of.counted[own] for side, own in of.of.items()},
+        foot_off_pct={side: foot_off[own] for side, own in of.of.items()},
         why=why,
         bounds=ends,
         zero=angles.zero,
     )
     for side in SIDES:
-        own = [strides.strides[i] for i in index[side]]
-        bounds = np.array([(s.start_s, s.end_s) for s in own]).reshape(-1, 2)
+        own = of.of[side]
+        bounds = np.stack((of.start_s[own], of.end_s[own]), axis=1)
         names = {}
         for name in angles.angles:
             base, _, suffix = name.rpartition("_")
@@ -180,8 +161,16 @@ def read_cycles(
 def mean_curve(curves: CycleCurves, variable: str, side: Side) -> MeanCurve:
     """Mean curve of the counted strides of a side; strides with gaps in this variable are left out.
 
-    Where more than half of them rest on the bound of a leg model there is no value, as in the figures.
+    Where more than half of them rest on the bound of a leg model there is no value, as in the figures. Worked
+    out once for these curves: panels and scores ask for the same ones.
     """
+    key = variable, side
+    if key not in curves.means:
+        curves.means[key] = _mean_curve(curves, variable, side)
+    return curves.means[key]
+
+
+def _mean_curve(curves: CycleCurves, variable: str, side: Side) -> MeanCurve:
     rows = curves.curves.get(variable, {}).get(side)
     if rows is None:
         return MeanCurve(None, None, 0)
@@ -189,9 +178,17 @@ def mean_curve(curves: CycleCurves, variable: str, side: Side) -> MeanCurve:
     n = len(rows)
     if not n:
         return MeanCurve(None, None, 0)
-    held = rest_at_bound(curves, variable, side, rows).mean(axis=0) > MOST
-    sd = np.where(held, np.nan, rows.std(axis=0, ddof=1)) if n > 1 else None
-    return MeanCurve(np.where(held, np.nan, rows.mean(axis=0)), sd, n)
+    mean, sd = rows.mean(axis=0), None
+    if n > 1:
+        # to the bit what `std` gives, which would find the mean again
+        off = rows - mean
+        off *= off
+        sd = np.sqrt(off.sum(axis=0) / (n - 1))
+    if side in curves.bounds.get(variable, {}):
+        held = rest_at_bound(curves, variable, side, rows).mean(axis=0) > MOST
+        mean = np.where(held, np.nan, mean)
+        sd = None if sd is None else np.where(held, np.nan, sd)
+    return MeanCurve(mean, sd, n)
 
 
 def rest_at_bound(curves: CycleCurves, variable: str, side: Side, angle: Floats) -> Bools:
@@ -226,8 +223,10 @@ def _read_figure(figure: CurveFigure, rows: Floats) -> Floats:
     if figure.statistic == "at":
         return np.asarray(np.degrees(part[:, 0]))
     # the largest of the radians is the largest of the degrees
-    least, most = np.degrees(part.min(axis=1)), np.degrees(part.max(axis=1))
-    return np.asarray({"min": least, "max": most}.get(figure.statistic, most - least))
+    if figure.statistic == "min":
+        return np.asarray(np.degrees(part.min(axis=1)))
+    most = np.degrees(part.max(axis=1))
+    return np.asarray(most if figure.statistic == "max" else most - np.degrees(part.min(axis=1)))
 
 
 def foot_pitch(
@@ -242,24 +241,16 @@ def foot_pitch(
     values: dict[str, dict[Side, Floats]] = {name: {} for name in FOOT_PITCH}
     for foot, angle in (foot_pitches(orientations) if pitch is None else pitch).items():
         side: Side = "left" if foot == FOOT["left"] else "right"
-        own = [s for s in strides.strides if s.side == side]
-        degrees = np.degrees(angle)
-        moments = {
-            "foot_pitch_ic_deg": [s.start_s for s in own],
-            "foot_pitch_tc_deg": [np.nan if s.tc_s is None else s.tc_s for s in own],
-        }
-        for name, times in moments.items():
-            at = np.asarray(times, np.float64)
-            values[name][side] = np.interp(at, orientations.t_s, degrees)
+        own, degrees = strides.columns.of[side], np.degrees(angle)
+        for name, times in zip(FOOT_PITCH, (strides.columns.start_s, strides.columns.tc_s), strict=True):
+            values[name][side] = np.interp(times[own], orientations.t_s, degrees)
     return values
 
 
 def turning_angle(strides: Strides) -> dict[str, dict[Side, Floats]]:
     """Heading change of the foot over every stride: name → side → (strides,) degrees, left positive."""
-    turns: dict[Side, list[float]] = {side: [] for side in SIDES}
-    for s in strides.strides:
-        turns[s.side].append(np.nan if s.turn_rad is None else s.turn_rad)
-    return {"turning_angle_deg": {side: np.degrees(values) for side, values in turns.items()}}
+    turned = np.degrees(strides.columns.turn_rad)
+    return {"turning_angle_deg": {side: turned[own] for side, own in strides.columns.of.items()}}
 
 
 def summarise_angles(
@@ -287,17 +278,17 @@ def summarise_angles(
             why = curves.why.get(variable, {}).get(side)
             if side not in sides:
                 reason = why or "joint_missing"
-                values: list[float] = []
+                values = np.empty(0)
             elif curves.zero == "walking" and is_level(name):
-                reason, values = NO_STANDING, []
+                reason, values = NO_STANDING, np.empty(0)
             else:
                 reason = (why or "gap") if used.any() else "no_strides"
                 counted = sides[side][used]
                 resting = _at_bound(curves, name, side, counted)
                 if np.count_nonzero(resting) > MOST * len(counted):
                     reason, counted = AT_BOUND, counted[:0]
-                values = counted[np.isfinite(counted)].tolist()
-            parameters.append(summarise_values(name, side, values, "deg", None if values else reason))
+                values = counted[np.isfinite(counted)]
+            parameters.append(summarise_values(name, side, values, "deg", reason))
     return tuple(parameters)
 
 
@@ -327,17 +318,10 @@ def without_bounds(
 
 def per_stride_figures(strides: Strides, figures: Mapping[str, Mapping[Side, Floats]]) -> dict[str, Column]:
     """Columns of the stride table, one entry per stride of the list in its order, from values per side."""
-    places = {side: [i for i, s in enumerate(strides.strides) if s.side == side] for side in SIDES}
     columns: dict[str, Column] = {}
     for name, sides in figures.items():
         column = np.full(len(strides.strides), np.nan)
         for side, values in sides.items():
-            column[places[side]] = values
+            column[strides.columns.of[side]] = values
         columns[name] = as_column(column)
     return columns
-
-
-def _foot_off(strides: Strides, i: int) -> float:
-    """Terminal contact in % of the cycle, NaN if not found."""
-    s = strides.strides[i]
-    return float("nan") if s.tc_s is None else 100.0 * (s.tc_s - s.start_s) / s.duration_s

@@ -14,6 +14,7 @@ from core.body.feet import FootTracks
 from core.events.result import Stride, Strides
 from core.frames import Bools, Floats, Segment
 from core.parameters.catalogue import list_curve_figures
+from core.parameters.flats import find_flats
 from core.parameters.kinematic import (
     FOOT_PITCH,
     MEAN_ZERO,
@@ -23,11 +24,11 @@ from core.parameters.kinematic import (
     turning_angle,
 )
 from core.parameters.live_stride import NOT_YET
-from core.parameters.phases import phase_rows
+from core.parameters.phases import measure_phases
 from core.parameters.plausible import IMPOSSIBLE, is_impossible
-from core.parameters.rows import Value
+from core.parameters.rows import Value, read_row
 from core.parameters.spatial import NAMES as SPATIAL
-from core.parameters.spatial import Surface, spatial_row
+from core.parameters.spatial import Surface, measure_distances
 from core.parameters.stance import find_stances, foot_pitches
 from core.parameters.temporal import explain_missing, temporal_values
 
@@ -58,7 +59,7 @@ def early_figures(stride: Stride, span: StrideSpan, surface: Surface) -> Figures
     """All that is known when the contact that ends the stride is; of distances what a belt tells."""
     one = Strides((stride,))
     found: dict[str, Value] = {}
-    for name, column in temporal_values((stride,)).items():
+    for name, column in temporal_values(one).items():
         value = float(column[0])
         found[name] = explain_missing(name, (stride,)) if isnan(value) else value
         if is_impossible(name, value):
@@ -66,8 +67,7 @@ def early_figures(stride: Stride, span: StrideSpan, surface: Surface) -> Figures
     pitch = foot_pitches(span)
     flat = find_stances(one, span.t_s, pitch)
     curves = cycle_curves(span.angles or NO_ANGLES, one)
-    found |= flat.rows[0]
-    found |= phase_rows(one, flat, span.angles, pitch, span.feet)[0]
+    found |= read_row({**flat.parts, **measure_phases(one, flat, span.angles, pitch, span.feet)}, 0)
     read_from = list_curve_figures()
     worn = dict.fromkeys(read_from, "joint_missing") | dict.fromkeys(FOOT_PITCH, "no_foot_sensor")
     found |= worn | {"turning_angle_deg": "gap"}
@@ -81,7 +81,7 @@ def early_figures(stride: Stride, span: StrideSpan, surface: Surface) -> Figures
                 reason = why
             found[name] = value if isfinite(value) else reason
     if surface.protocol == "treadmill" or span.feet is None or stride.side not in span.feet.p:
-        found |= spatial_row(stride, one, span.feet, surface)
+        found |= read_row(measure_distances(one, span.feet, surface), 0)
     else:
         found |= dict.fromkeys(SPATIAL, NOT_YET)
     # courses first, as in a take with both feet
@@ -90,14 +90,16 @@ def early_figures(stride: Stride, span: StrideSpan, surface: Surface) -> Figures
     return found, {name: row for name, row in rows.items() if bool(np.isfinite(row).all())}
 
 
-def measure_distances(
+def late_figures(
     stride: Stride, context: Sequence[Stride], span: StrideSpan, surface: Surface
 ) -> dict[str, Value]:
     """Figures between the flats, once both feet have left the floor again.
 
     Parameters
     ----------
-    context : the strides around it, itself included, in order of time.
+    context : the strides around it, in order of time.
     """
-    row = spatial_row(stride, Strides(tuple(context)), span.feet, surface)
-    return {name: "gap" if isinstance(v, float) and isnan(v) else v for name, v in row.items()}
+    flats = None
+    if span.feet is not None:
+        flats = find_flats(Strides((*context, stride)), span.feet).select(slice(-1, None))
+    return read_row(measure_distances(Strides((stride,)), span.feet, surface, flats), 0)

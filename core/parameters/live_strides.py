@@ -27,7 +27,7 @@ from core.events.strides import side_strides
 from core.frames import FOOT, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.parameters.flats import OTHER
-from core.parameters.live_figures import StrideSpan, early_figures, measure_distances
+from core.parameters.live_figures import StrideSpan, early_figures, late_figures
 from core.parameters.live_history import KEPT_S, SampleHistory
 from core.parameters.live_stride import LiveStride
 from core.parameters.rows import Value
@@ -178,7 +178,7 @@ class LiveStrides:
         found: dict[str, Value] = dict.fromkeys(SPATIAL, "gap")
         if history.reaches(first, at + 1):
             span = self._span(first, at + 1, history)
-            found = measure_distances(pending.stride, context, span, self._setup.surface)
+            found = late_figures(pending.stride, context, span, self._setup.surface)
         told, (values, reasons) = pending.told, _split(found)
         if found["stride_length_m"] == "in_place":
             late = (*late, "in_place")

@@ -7,18 +7,18 @@ swinging leg is vertical. All in % of the stride, so that the seven add up to 10
 
 from __future__ import annotations
 
-from math import isnan
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.angles import JointAngles
 from core.body.feet import FootTracks
-from core.events.result import Stride, Strides
-from core.frames import FOOT, SIDES, SUFFIX, Floats, Segment
+from core.events.result import Strides
+from core.frames import FOOT, SIDES, SUFFIX, Floats, Segment, Side
 from core.parameters.flats import OTHER
 from core.parameters.resample import first_crossing, last_crossing, resample
-from core.parameters.rows import Row, Value, value_or
+from core.parameters.rows import Figure, Figures, tell_figure
 from core.parameters.stance import Stances
 
 NAMES: Final = (
@@ -34,13 +34,13 @@ SWING_POINTS: Final = 51
 """Points of a swing; between two of them a moment is found by interpolation."""
 
 
-def phase_rows(
+def measure_phases(
     strides: Strides,
     stances: Stances,
     angles: JointAngles | None,
     pitch: dict[Segment, Floats],
     feet: FootTracks | None,
-) -> tuple[Row, ...]:
+) -> Figures:
     """Phases of every stride of the list, or why not.
 
     Parameters
@@ -55,62 +55,65 @@ def phase_rows(
     "no_terminal_stance" where the heel rises outside single support; "feet_not_adjacent",
     "tibia_not_vertical" where the swing has no such moment, or not in this order.
     """
-    adjacent, vertical = _adjacent(strides, feet), _vertical(strides, angles, pitch)
-    linked = feet is not None and feet.linked
-    # where a foot passes the other is of both paths
-    doubt = next(iter(feet.withheld.values()), None) if feet is not None and linked else None
-    rows = []
-    for i, s in enumerate(strides.strides):
-        ankle = f"ankle_dorsiflexion_{SUFFIX[s.side]}"
-        upright = "joint_missing"
-        if angles is not None and angles.zero == "walking":
-            upright = "no_standing"
-        elif angles is not None:
-            known = ankle in angles.angles
-            upright = "tibia_not_vertical" if known else angles.withheld.get(ankle, upright)
-        row = _stance(s, float(stances.heel_off_s[i]), stances.rows[i]["push_pct"])
-        row |= _swing(s, float(adjacent[i]), float(vertical[i]), linked, upright, doubt)
-        rows.append(row)
-    return tuple(rows)
+    found = (*_stance(strides, stances), *_swing(strides, angles, pitch, feet))
+    return dict(zip(NAMES, found, strict=True))
 
 
-def _stance(s: Stride, heel_off_s: float, push: Value) -> dict[str, Value]:
-    if s.opposite_tc_s is None or s.opposite_ic_s is None:
-        return {"mid_stance_pct": "opposite_foot_missing", "terminal_stance_pct": "opposite_foot_missing"}
-    if isnan(heel_off_s):
-        return {"mid_stance_pct": str(push), "terminal_stance_pct": str(push)}
-    percent = 100.0 / s.duration_s
-    single = percent * (s.opposite_ic_s - s.opposite_tc_s)
-    if heel_off_s <= s.opposite_tc_s:
-        return {"mid_stance_pct": "no_mid_stance", "terminal_stance_pct": single}
-    if heel_off_s >= s.opposite_ic_s:
-        return {"mid_stance_pct": single, "terminal_stance_pct": "no_terminal_stance"}
-    mid = percent * (heel_off_s - s.opposite_tc_s)
-    return {"mid_stance_pct": mid, "terminal_stance_pct": single - mid}
+def _stance(strides: Strides, stances: Stances) -> tuple[Figure, Figure]:
+    """Mid and terminal stance: single support until the heel rises, and after."""
+    of = strides.columns
+    heel_off, begins, ends = stances.heel_off_s, of.opposite_tc_s, of.opposite_ic_s
+    percent = 100.0 / of.duration_s
+    single = percent * (ends - begins)
+    mid = percent * (heel_off - begins)
+    early, late = heel_off <= begins, heel_off >= ends
+    alone = np.isnan(begins) | np.isnan(ends)
+    why = np.where(alone, np.array("opposite_foot_missing", object), stances.parts["push_pct"].reasons)
+    no_mid, no_end = why.copy(), why.copy()
+    no_mid[early & ~alone], no_end[late & ~early & ~alone] = "no_mid_stance", "no_terminal_stance"
+    return (
+        tell_figure(np.where(alone | early, np.nan, np.where(late, single, mid)), no_mid),
+        tell_figure(np.where(early, single, np.where(late, np.nan, single - mid)), no_end),
+    )
 
 
 def _swing(
-    s: Stride, adjacent_s: float, vertical_s: float, linked: bool, upright: str, doubt: str | None
-) -> dict[str, Value]:
-    names = NAMES[2:]
-    if s.tc_s is None:
-        return dict.fromkeys(names, "no_terminal_contact")
-    passed = doubt or ("feet_not_adjacent" if linked else "feet_not_linked")
-    if vertical_s <= adjacent_s:
-        vertical_s = float("nan")
-    percent = 100.0 / s.duration_s
-    mid = percent * (vertical_s - adjacent_s)
-    return {
-        "initial_swing_pct": value_or(percent * (adjacent_s - s.tc_s), passed),
-        "mid_swing_pct": value_or(mid, passed if isnan(adjacent_s) else upright),
-        "terminal_swing_pct": value_or(percent * (s.end_s - vertical_s), upright),
-    }
+    strides: Strides, angles: JointAngles | None, pitch: dict[Segment, Floats], feet: FootTracks | None
+) -> tuple[Figure, Figure, Figure]:
+    """Initial, mid and terminal swing, between foot-off, passing ankle, vertical tibia and contact."""
+    of = strides.columns
+    adjacent, vertical = _adjacent(strides, feet), _vertical(strides, angles, pitch)
+    vertical = np.where(vertical <= adjacent, np.nan, vertical)
+    linked = feet is not None and feet.linked
+    # where a foot passes the other is of both paths
+    doubt = next(iter(feet.withheld.values()), None) if feet is not None and linked else None
+    passed = np.full(len(vertical), doubt or ("feet_not_adjacent" if linked else "feet_not_linked"), object)
+    upright = np.empty(len(vertical), object)
+    for side, own in of.of.items():
+        upright[own] = _why_not_upright(side, angles)
+    no_off = np.isnan(of.tc_s)
+    passed[no_off] = upright[no_off] = "no_terminal_contact"
+    percent = np.where(no_off, np.nan, 100.0 / of.duration_s)
+    return (
+        tell_figure(percent * (adjacent - of.tc_s), passed),
+        tell_figure(percent * (vertical - adjacent), np.where(np.isnan(adjacent), passed, upright)),
+        tell_figure(percent * (of.end_s - vertical), upright),
+    )
 
 
-def _swings(strides: Strides, own: list[int]) -> Floats:
+def _why_not_upright(side: Side, angles: JointAngles | None) -> str:
+    """Why the tibia of a side has no moment at which it is vertical."""
+    if angles is None:
+        return "joint_missing"
+    if angles.zero == "walking":
+        return "no_standing"
+    ankle = f"ankle_dorsiflexion_{SUFFIX[side]}"
+    return "tibia_not_vertical" if ankle in angles.angles else angles.withheld.get(ankle, "joint_missing")
+
+
+def _swings(strides: Strides, own: NDArray[np.intp]) -> Floats:
     """Foot-off to contact of these strides (m, 2) in s, NaN without foot-off."""
-    pairs = [(np.nan if (s := strides.strides[i]).tc_s is None else s.tc_s, s.end_s) for i in own]
-    return np.array(pairs, np.float64).reshape(-1, 2)
+    return np.stack((strides.columns.tc_s[own], strides.columns.end_s[own]), axis=1)
 
 
 def _adjacent(strides: Strides, feet: FootTracks | None) -> Floats:
@@ -119,13 +122,13 @@ def _adjacent(strides: Strides, feet: FootTracks | None) -> Floats:
     if feet is None or not feet.linked or feet.withheld:
         return found
     for side in SIDES:
-        own = [i for i, s in enumerate(strides.strides) if s.side == side]
-        if not own or any(x not in feet.p for x in SIDES):
+        own = strides.columns.of[side]
+        if not len(own) or any(x not in feet.p for x in SIDES):
             continue
         ok = feet.valid[side] & feet.valid[OTHER[side]]
-        signals = np.concatenate((feet.p[side][:, :2].T, feet.p[OTHER[side]][:, :2].T))
+        signals = (np.where(ok, feet.p[foot][:, k], np.nan) for foot in (side, OTHER[side]) for k in (0, 1))
         bounds = _swings(strides, own)
-        x, y, other_x, other_y = resample(np.where(ok, signals, np.nan), feet.t_s, bounds, SWING_POINTS)
+        x, y, other_x, other_y = resample(signals, feet.t_s, bounds, SWING_POINTS)
         along_x, along_y = x[:, -1:] - x[:, :1], y[:, -1:] - y[:, :1]
         ahead = (x - other_x) * along_x + (y - other_y) * along_y
         found[own] = bounds[:, 0] + first_crossing(ahead) * (bounds[:, 1] - bounds[:, 0])
@@ -137,8 +140,8 @@ def _vertical(strides: Strides, angles: JointAngles | None, pitch: dict[Segment,
     found = np.full(len(strides.strides), np.nan)
     for side in SIDES:
         ankle = None if angles is None else angles.angles.get(f"ankle_dorsiflexion_{SUFFIX[side]}")
-        own = [i for i, s in enumerate(strides.strides) if s.side == side]
-        if angles is None or angles.zero == "walking" or ankle is None or FOOT[side] not in pitch or not own:
+        own = strides.columns.of[side]
+        if angles is None or angles.zero == "walking" or ankle is None or FOOT[side] not in pitch:
             continue
         bounds = _swings(strides, own)
         lean = resample((pitch[FOOT[side]] - ankle)[None], angles.t_s, bounds, SWING_POINTS)[0]

@@ -27,15 +27,19 @@ def resample_in_turn(
 ) -> Iterator[Floats]:
     """The same, one signal after the other: the curves of an hour are as large as its signals."""
     place = (bounds - t_s[0]) * ((len(t_s) - 1) / (t_s[-1] - t_s[0]))
+    nowhere = ~np.isfinite(place).all(axis=1)
+    place[nowhere] = 0.0
     share = place[:, :1] + (place[:, 1:] - place[:, :1]) * _shares(points)
-    low = np.clip(np.floor(np.where(np.isfinite(share), share, 0.0)).astype(np.int64), 0, len(t_s) - 2)
+    low = share.astype(np.int64)
+    np.clip(low, 0, len(t_s) - 2, out=low)
     share -= low
+    share[nowhere] = np.nan
     if len(bounds) == 1:  # a live stride: all signals at once
         found = tuple(signals)
         yield from _interpolate(np.stack(found), low, share) if found else ()
         return
     for signal in signals:
-        (rows,) = _interpolate(np.asarray(signal)[None], low, share)
+        (rows,) = _interpolate(np.ascontiguousarray(signal)[None], low, share)
         give_pages_back((signal,))
         yield rows
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from core.frames import Bools, Floats, Posture, Side
 
@@ -46,6 +47,21 @@ class Parameter:
 
 
 @dataclass(frozen=True, eq=False)
+class MeanCurve:
+    """Mean and standard deviation over the counted strides.
+
+    Parameters
+    ----------
+    mean, sd : (101,) rad; None without strides, sd also with fewer than two. NaN where most strides rest on
+        the bound of a leg model. n : strides behind them.
+    """
+
+    mean: Floats | None
+    sd: Floats | None
+    n: int
+
+
+@dataclass(frozen=True, eq=False)
 class CycleCurves:
     """Angles over the gait cycle, used and unused strides alike.
 
@@ -66,3 +82,8 @@ class CycleCurves:
     why: Mapping[str, Mapping[Side, str]] = field(default_factory=dict)
     bounds: Mapping[str, Mapping[Side, float]] = field(default_factory=dict)
     zero: Posture = "standing"
+
+    @cached_property
+    def means(self) -> dict[tuple[str, Side], MeanCurve]:
+        """Mean curves that somebody has asked `mean_curve` for, by variable and side."""
+        return {}

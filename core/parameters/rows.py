@@ -1,12 +1,15 @@
-"""Figures of single strides: a number, or the reason why there is none, by name; and what sums them up."""
+"""Figures of single strides: numbers, or the reasons why there are none, by name; and what sums them up."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from math import isfinite, isnan
+from collections.abc import Mapping
+from dataclasses import dataclass
 
-from core.events.result import Strides
+import numpy as np
+from numpy.typing import NDArray
+
+from core.events.result import Strides, list_known
 from core.frames import SIDES, Floats, Side
 from core.parameters.catalogue import unit_of
 from core.parameters.result import Parameter
@@ -21,36 +24,65 @@ Row = Mapping[str, Value]
 Column = tuple[float | None, ...]
 """One figure of every stride of the list, counted or not."""
 
+Codes = NDArray[np.object_]
+"""Reasons (strides,), "" where there is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """One figure of every stride of a list.
+
+    Parameters
+    ----------
+    values : (strides,) NaN where there is none. reasons : why there is none, "" where there is one.
+    """
+
+    values: Floats
+    reasons: Codes
+
+
+Figures = Mapping[str, Figure]
+"""By name, all of the same strides."""
+
+NO_REASON = np.array("", np.object_)
+
+
+def tell_figure(values: Floats, reasons: Codes | str) -> Figure:
+    """The values (strides,) that are finite, and for the others these reasons, one each or one for all."""
+    known = np.isfinite(values)
+    return Figure(np.where(known, values, np.nan), np.where(known, NO_REASON, reasons))
+
 
 def as_column(values: Floats) -> Column:
     """A figure (strides,) as a column: None where it is NaN."""
-    return tuple(None if isnan(v) else v for v in values.tolist())
+    return tuple(list_known(values))
 
 
-def row_columns(rows: Sequence[Row], names: Iterable[str]) -> dict[str, Column]:
+def figure_columns(figures: Figures) -> dict[str, Column]:
     """Columns of the stride table, one entry per stride."""
-    return {n: tuple(v if isinstance(v := row[n], float) else None for row in rows) for n in names}
+    return {name: as_column(figure.values) for name, figure in figures.items()}
 
 
-def row_parameter(name: str, side: Side | None, rows: Sequence[Row]) -> Parameter:
-    """Parameter over these strides; without a value the most frequent reason, "no_strides" without any."""
-    values = [v for row in rows if isinstance(v := row[name], float)]
-    if values:
+def read_row(figures: Figures, place: int) -> dict[str, Value]:
+    """Figures of one stride, by its place in the list."""
+    return {name: x.reasons[place] or float(x.values[place]) for name, x in figures.items()}
+
+
+def figure_parameter(
+    name: str, side: Side | None, figure: Figure, chosen: NDArray[np.bool_ | np.intp]
+) -> Parameter:
+    """Parameter over chosen strides; without a value the most frequent reason, "no_strides" without any."""
+    values = figure.values[chosen]
+    values = values[~np.isnan(values)]
+    if len(values):
         return summarise_values(name, side, values, unit_of(name))
-    reasons = Counter(v for row in rows if isinstance(v := row[name], str))
+    reasons = Counter(figure.reasons[chosen].tolist())
     return summarise_values(
-        name, side, [], unit_of(name), reasons.most_common(1)[0][0] if reasons else "no_strides"
+        name, side, values, unit_of(name), reasons.most_common(1)[0][0] if reasons else "no_strides"
     )
 
 
-def side_parameters(strides: Strides, rows: Sequence[Row], names: Iterable[str]) -> tuple[Parameter, ...]:
-    """Parameters of both sides over the counted strides; `rows` are those of all strides of the list."""
-    pairs = list(zip(strides.strides, rows, strict=True))
-    counted = {s: [row for x, row in pairs if x.side == s and x.excluded_reason is None] for s in SIDES}
-    names = tuple(names)
-    return tuple(row_parameter(name, side, counted[side]) for side in SIDES for name in names)
-
-
-def value_or(number: float, reason: str) -> Value:
-    """The number, or the reason where it is not finite."""
-    return number if isfinite(number) else reason
+def side_parameters(strides: Strides, figures: Figures) -> tuple[Parameter, ...]:
+    """Parameters of both sides over the counted strides; `figures` are of all strides of the list."""
+    used = strides.columns.used
+    return tuple(figure_parameter(name, side, x, used[side]) for side in SIDES for name, x in figures.items())

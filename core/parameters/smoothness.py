@@ -53,11 +53,12 @@ def stride_smoothness(strides: Sequence[Window], t_s: Floats, trunk: Mapping[Seg
         return summarise_values(NAME, None, [], "", "no_pelvis_sensor")
     if not strides:
         return summarise_values(NAME, None, [], "", "no_strides")
-    force = np.linalg.norm(trunk["pelvis"] + (0.0, 0.0, GRAVITY), axis=1)
+    forward, left, up = trunk["pelvis"].T
+    force = np.sqrt(forward**2 + left**2 + (up + GRAVITY) ** 2)
     bounds = np.array(strides)
     pieces = resample(np.abs(force - GRAVITY)[None], t_s, bounds, POINTS + 1)[0][:, :-1]
     values = spectral_arc_length(pieces, (bounds[:, 1] - bounds[:, 0]) / POINTS)
-    known = values[np.isfinite(values)].tolist()
+    known = values[np.isfinite(values)]
     return summarise_values(NAME, None, known, "", "gap" if np.isfinite(force).any() else "no_forward")
 
 
@@ -77,7 +78,7 @@ def spectral_arc_length(pieces: Floats, step_s: Floats) -> Floats:
 
 def _measure_arcs(pieces: Floats, step_s: Floats, n: int, kept: int) -> Floats:
     """The same of some signals: padded to n points, so many frequencies looked at."""
-    spectrum = np.abs(np.fft.rfft(pieces, n, axis=1))[:, :kept]
+    spectrum = np.abs(np.fft.rfft(pieces, n, axis=1)[:, :kept])
     dc = spectrum[:, :1]
     shape = spectrum / np.where(dc > 0.0, dc, np.nan)
     frequency = np.arange(shape.shape[1]) / (n * step_s[:, None])

@@ -8,24 +8,30 @@ second.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan2, ceil, degrees, hypot
-from typing import Final, Literal
+from math import atan2, hypot
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from core.body.feet import FootTracks
-from core.events.result import Stride, Strides
-from core.frames import SIDES, Bools, Floats, Protocol, Side
+from core.events.result import Strides
+from core.frames import Bools, Floats, Protocol, Side
 from core.held_samples import give_pages_back
 from core.parameters.catalogue import list_names
 from core.parameters.catalogue.entry import DISTANCES
-from core.parameters.clearance import SoleHeights, measure_floor_heights, sole_heights, toe_clearance
-from core.parameters.flats import OTHER, Places, find_flats
+from core.parameters.clearance import (
+    SoleHeights,
+    lay_out,
+    measure_floor_heights,
+    sole_heights,
+    toe_clearance,
+)
+from core.parameters.flats import OTHER, Flats, find_flats
 from core.parameters.result import Parameter
-from core.parameters.rows import Column, Row, Value, row_columns, row_parameter
+from core.parameters.rows import Codes, Figure, Figures, figure_parameter, side_parameters, tell_figure
 from core.parameters.variability import summarise_values
 from core.recording import UniformRecording
 from core.rest import find_runs
@@ -40,11 +46,7 @@ STEP_M: Final = 0.05
 AT_ONCE: Final = 512
 """Strides after which the paths are let go of."""
 
-Reason = Literal[
-    "treadmill", "no_foot_track", "no_foot_flat", "gap", "packets_lost", "feet_not_linked",
-    "opposite_foot_missing", "no_shoe_geometry", "no_standing", "no_swing_minimum", "no_terminal_contact",
-    "standing_width_unknown", "in_place",
-]  # fmt: skip
+CLEARANCES: Final = ("max_heel_clearance_m", "min_toe_clearance_m")
 
 
 @dataclass(frozen=True)
@@ -68,12 +70,14 @@ def surface_of(recording: UniformRecording) -> Surface:
     return Surface(recording.protocol, recording.belt_speed_mps)
 
 
-def spatial_rows(strides: Strides, feet: FootTracks | None, surface: Surface = GROUND) -> tuple[Row, ...]:
+def measure_distances(
+    strides: Strides, feet: FootTracks | None, surface: Surface = GROUND, flats: Flats | None = None
+) -> Figures:
     """Figures by name of every stride of the list, counted or not, in its order.
 
     Parameters
     ----------
-    feet : None without a foot sensor.
+    feet : None without a foot sensor. flats : of `find_flats`, where somebody has them already.
 
     Returns
     -------
@@ -84,64 +88,63 @@ def spatial_rows(strides: Strides, feet: FootTracks | None, surface: Surface = G
     decimetre.
     """
     if surface.protocol == "treadmill":
-        return tuple(_on_belt(s, surface.belt_speed_mps) for s in strides.strides)
-    paths = None if feet is None else _paths(strides, feet)
-    rows: list[Row] = []
-    for first in range(0, len(strides.strides), AT_ONCE):
-        rows += (_row(s, feet, paths) for s in strides.strides[first : first + AT_ONCE])
-        _let_go(feet, *(() if feet is None else feet.p))
-    return tuple(rows)
+        return _on_belt(strides, surface.belt_speed_mps)
+    values = np.full((len(NAMES), len(strides.strides)), np.nan)
+    reasons = np.full(values.shape, "no_foot_track", object)
+    if feet is not None:
+        flats = find_flats(strides, feet) if flats is None else flats
+        for side in feet.p:
+            own = strides.columns.of[side]
+            if not len(own):
+                continue
+            foot = _lay_foot(feet, side)
+            for first in range(0, len(own), AT_ONCE):
+                part = own[first : first + AT_ONCE]
+                reasons[:, part] = _explain(flats.select(part), feet, foot)
+                part = part[reasons[0, part] == ""]
+                if len(part):
+                    measured = _measure_side(strides, part, flats.select(part), feet, foot)
+                    for i, name in enumerate(NAMES):
+                        values[i, part], reasons[i, part] = measured[name].values, measured[name].reasons
+                give_pages_back(path for s in feet.p for path in (feet.p[s], feet.q[s]))
+    return {name: Figure(*of) for name, *of in zip(NAMES, values, reasons, strict=True)}
 
 
-def spatial_row(stride: Stride, strides: Strides, feet: FootTracks | None, surface: Surface = GROUND) -> Row:
-    """The figures of one stride of a list, as `spatial_rows` gives them."""
-    if surface.protocol == "treadmill":
-        return _on_belt(stride, surface.belt_speed_mps)
-    return _row(stride, feet, None if feet is None else _paths(strides, feet))
-
-
-def in_place(strides: Strides, feet: FootTracks | None, surface: Surface = GROUND) -> frozenset[int]:
+def in_place(
+    strides: Strides, feet: FootTracks | None, surface: Surface = GROUND, flats: Flats | None = None
+) -> NDArray[np.intp]:
     """Places in the list of strides that end where they began: weight was shifted, nobody walked on.
 
-    Empty on a treadmill, where every stride does.
+    Empty on a treadmill, where every stride does. Arguments as of `measure_distances`.
     """
+    short = np.zeros(len(strides.strides), np.bool_)
     if feet is None or surface.protocol == "treadmill":
-        return frozenset()
-    found = find_flats(strides.strides, feet)
-    return frozenset(
-        i
-        for i, s in enumerate(strides.strides)
-        if (at := found.get((s.side, s.start_s))) is not None
-        and (then := found.get((s.side, s.end_s))) is not None
-        and then > at
-        and hypot(*(feet.p[s.side][then, :2] - feet.p[s.side][at, :2]).tolist()) < STEP_M
-    )
-
-
-def per_stride_spatial(rows: Sequence[Row]) -> dict[str, Column]:
-    """Columns of the stride table, one entry per stride."""
-    return row_columns(rows, NAMES)
+        return np.flatnonzero(short)
+    flats = find_flats(strides, feet) if flats is None else flats
+    moved = (flats.first >= 0) & (flats.last > flats.first)
+    for side in feet.p:
+        own = strides.columns.of[side]
+        own = own[moved[own]]
+        short[own] = _way(feet.p[side], flats.first[own], flats.last[own])[2] < STEP_M
+    return np.flatnonzero(short)
 
 
 def summarise_distances(
-    strides: Strides, feet: FootTracks | None, rows: Sequence[Row], surface: Surface = GROUND
+    strides: Strides, feet: FootTracks | None, figures: Figures, surface: Surface = GROUND
 ) -> tuple[Parameter, ...]:
     """Distances over the counted strides: speed and way of the take, the others by side.
 
     Returns
     -------
     without a value a reason: "no_strides", "estimator_bad" (the feet are withheld), "path_bad" (this
-    foot is) or one of `Reason`, the most frequent of the strides.
+    foot is) or the most frequent one of the strides.
     """
-    counted = [
-        (s.side, row) for s, row in zip(strides.strides, rows, strict=True) if s.excluded_reason is None
-    ]
-    found = [row_parameter("gait_speed_mps", None, [row for _, row in counted])]
-    found.append(_total(feet, surface))
-    for side in SIDES:
-        own = [row for s, row in counted if s == side]
-        found += [row_parameter(name, side, own) for name in NAMES[1:]]
-    return tuple(found)
+    speed, *others = NAMES
+    return (
+        figure_parameter(speed, None, figures[speed], strides.columns.counted),
+        _total(feet, surface),
+        *side_parameters(strides, {name: figures[name] for name in others}),
+    )
 
 
 def _total(feet: FootTracks | None, surface: Surface) -> Parameter:
@@ -165,52 +168,35 @@ def _total(feet: FootTracks | None, surface: Surface) -> Parameter:
     return Parameter(name, None, len(ways), float(np.mean(ways)), None, "m")
 
 
-def _on_belt(s: Stride, belt_mps: float | None) -> Row:
-    row: dict[str, Value] = dict.fromkeys(NAMES, "treadmill")
+def _untold(n: int, reason: str) -> Figure:
+    return Figure(np.full(n, np.nan), np.full(n, reason, object))
+
+
+def _on_belt(strides: Strides, belt_mps: float | None) -> Figures:
+    found = {name: _untold(len(strides.strides), "treadmill") for name in NAMES}
     if belt_mps is not None:
-        row |= {"gait_speed_mps": belt_mps, "stride_length_m": belt_mps * s.duration_s}
-    return row
+        duration = strides.columns.duration_s
+        found["gait_speed_mps"] = tell_figure(np.full(len(duration), belt_mps), "treadmill")
+        found["stride_length_m"] = tell_figure(belt_mps * duration, "treadmill")
+    return found
 
 
 @dataclass(frozen=True, eq=False)
-class _Paths:
-    """What is looked up for every stride: flats and the foot's heading there, heights, and how often the
-    foot was lost, or packets of its swing, before a sample."""
+class _Foot:
+    """What is looked up of a foot for every stride: the sole's heights, and how often the foot was lost, or
+    packets of its swing, before a sample."""
 
-    places: Places
-    heights: Mapping[Side, SoleHeights | None]
-    lost: Mapping[Side, NDArray[np.int32]]
-    patched: Mapping[Side, NDArray[np.int32]]
-    heading: Mapping[tuple[Side, int], float]
-    known: bool
-    """How far apart the feet stood, without which width is not known."""
+    side: Side
+    heights: SoleHeights | None
+    lost: NDArray[np.int32]
+    patched: NDArray[np.int32]
 
 
-def _paths(strides: Strides, feet: FootTracks) -> _Paths:
-    found = find_flats(strides.strides, feet)
-    heading: dict[tuple[Side, int], float] = {}
-    heights: dict[Side, SoleHeights | None] = {}
-    for side in feet.p:
-        flats = [at for (foot, _), at in found.items() if foot == side and at is not None]
-        heading |= {(side, at): v for at, v in zip(flats, yaw(feet.q[side][flats]).tolist(), strict=True)}
-        heights[side] = sole_heights(feet, side)
-        _let_go(feet, side)
-    return _Paths(
-        places=found,
-        heights=heights,
-        lost={side: _count_before(~feet.valid[side]) for side in feet.p},
-        patched={
-            side: _count_before(feet.patched.get(side, np.zeros(len(feet.t_s), np.bool_))) for side in feet.p
-        },
-        heading=heading,
-        known=feet.body.standing_width is not None,
-    )
-
-
-def _let_go(feet: FootTracks | None, *sides: Side) -> None:
-    """Keep none of the paths of a long take in memory, which lie in a file."""
-    if feet is not None:
-        give_pages_back(path for side in sides for path in (feet.p[side], feet.q[side]))
+def _lay_foot(feet: FootTracks, side: Side) -> _Foot:
+    patched = feet.patched.get(side, np.zeros(len(feet.t_s), np.bool_))
+    foot = _Foot(side, sole_heights(feet, side), _count_before(~feet.valid[side]), _count_before(patched))
+    give_pages_back((feet.p[side], feet.q[side]))
+    return foot
 
 
 def _count_before(mask: Bools) -> NDArray[np.int32]:
@@ -220,71 +206,115 @@ def _count_before(mask: Bools) -> NDArray[np.int32]:
     return count
 
 
-def _row(s: Stride, feet: FootTracks | None, paths: _Paths | None) -> Row:
-    if feet is None or paths is None or s.side not in feet.p:
-        return dict.fromkeys(NAMES, "no_foot_track")
-    if s.side in feet.withheld:
-        return dict.fromkeys(NAMES, feet.withheld[s.side])
-    first, last = paths.places[s.side, s.start_s], paths.places[s.side, s.end_s]
-    if first is None or last is None:
-        return dict.fromkeys(NAMES, "no_foot_flat")
-    if paths.lost[s.side][last + 1] > paths.lost[s.side][first]:
-        return dict.fromkeys(NAMES, "gap")
-    if paths.patched[s.side][last + 1] > paths.patched[s.side][first]:
-        return dict.fromkeys(NAMES, "packets_lost")
-    p = feet.p[s.side]
-    x, y = (p[last, :2] - p[first, :2]).tolist()
-    length = hypot(x, y)
-    if length < STEP_M:
-        return dict.fromkeys(NAMES, "in_place" if last > first else "no_foot_flat")
-    along = np.array([x / length, y / length])
-    mirror = 1.0 if s.side == "left" else -1.0
-    outward = np.array([-along[1], along[0]]) * mirror
-    out = mirror * wrap_angle(paths.heading[s.side, first] - atan2(y, x))
-    row: dict[str, Value] = {
-        "gait_speed_mps": length / float(feet.t_s[last] - feet.t_s[first]),
-        "stride_length_m": length,
-        "circumduction_m": float(((p[first : last + 1, :2] - p[first, :2]) @ outward).max()),
-        "toe_out_deg": degrees(out) if feet.posture == "standing" else "no_standing",
-    }
-    row |= _clearance(s, feet, paths.heights[s.side], first, last)
-    row |= _step(s, feet, paths, p[last, :2], along, outward)
-    return row
+def _way(p: Floats, first: NDArray[np.intp], last: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
+    """Way on the floor between two samples each of a path (n, 3): x, y and length (m,), m."""
+    x, y = (p[last, :2] - p[first, :2]).T
+    return x, y, _map(hypot, x, y)
 
 
-def _clearance(
-    s: Stride, feet: FootTracks, heights: SoleHeights | None, first: int, last: int
-) -> dict[str, Value]:
-    """Of the sole between the two flats."""
-    if heights is None:
-        return {"max_heel_clearance_m": "no_shoe_geometry", "min_toe_clearance_m": "no_shoe_geometry"}
-    heel, tip = measure_floor_heights(heights, first, last, feet.body.ankle_height)
-    toe: Value = "no_terminal_contact"
-    if s.tc_s is not None:
-        a, b = (max(ceil((t - feet.t_s[0]) * feet.rate_hz) - first, 0) for t in (s.tc_s, s.end_s))
-        toe = toe_clearance(tip[a:b])
-    return {"max_heel_clearance_m": float(heel.max()), "min_toe_clearance_m": toe}
+def _map(function: Callable[[float, float], float], x: Floats, y: Floats) -> Floats:
+    """A function of two numbers for each (m,): numpy's own are not those of the libraries to the bit."""
+    return np.array(list(map(function, x.tolist(), y.tolist())), np.float64)
 
 
-def _step(
-    s: Stride, feet: FootTracks, paths: _Paths, landed: Floats, along: Floats, outward: Floats
-) -> dict[str, Value]:
-    """Step that ends the stride: from the other foot's flat to this one's."""
-    reason: Reason | None = None
-    opposite = None
-    if s.opposite_ic_s is None or OTHER[s.side] not in feet.p:
-        reason = "opposite_foot_missing"
-    elif not feet.linked:
-        reason = "feet_not_linked"
-    elif OTHER[s.side] in feet.withheld:
-        return dict.fromkeys(("step_length_m", "step_width_m"), feet.withheld[OTHER[s.side]])
-    else:
-        opposite = paths.places[OTHER[s.side], s.opposite_ic_s]
-        reason = "no_foot_flat"
-    if opposite is None:
-        return {"step_length_m": reason or "no_foot_flat", "step_width_m": reason or "no_foot_flat"}
-    apart = landed - feet.p[OTHER[s.side]][opposite, :2]
+def _explain(flats: Flats, feet: FootTracks, foot: _Foot) -> Codes:
+    """Why strides of a foot with these flats have no distance, "" where they have."""
+    known = (flats.first >= 0) & (flats.last >= 0)
+    first, last = np.where(known, flats.first, 0), np.where(known, flats.last, 0)
+    short = _way(feet.p[foot.side], first, last)[2] < STEP_M
+    why = np.full(len(known), "", object)
+    why[short | (last <= first)] = "no_foot_flat"
+    why[short & (last > first)] = "in_place"
+    why[foot.patched[last + 1] > foot.patched[first]] = "packets_lost"
+    why[foot.lost[last + 1] > foot.lost[first]] = "gap"
+    why[~known] = "no_foot_flat"
+    if foot.side in feet.withheld:
+        why[:] = feet.withheld[foot.side]
+    return why
+
+
+def _measure_side(
+    strides: Strides, own: NDArray[np.intp], flats: Flats, feet: FootTracks, foot: _Foot
+) -> Figures:
+    """Figures of some strides of one foot that have a length; `flats` are theirs."""
+    of, side, first, last = strides.columns, foot.side, flats.first, flats.last
+    x, y, length = _way(feet.p[side], first, last)
+    along = np.stack((x / length, y / length), axis=1)
+    mirror = 1.0 if side == "left" else -1.0
+    outward = np.stack((-along[:, 1] * mirror, along[:, 0] * mirror), axis=1)
+    out = mirror * wrap_angle(yaw(feet.q[side][first]) - _map(atan2, y, x))
     return {
-        "step_length_m": float(apart @ along),
-        "step_width_m": float(apart @ outward) if paths.known else "standing_width_unknown",
+        "gait_speed_mps": tell_figure(length / (feet.t_s[last] - feet.t_s[first]), "gap"),
+        "stride_length_m": tell_figure(length, "gap"),
+        "circumduction_m": tell_figure(_furthest(feet.p[side], first, last, outward), "gap"),
+        "toe_out_deg": tell_figure(np.degrees(out), "gap")
+        if feet.posture == "standing"
+        else _untold(len(own), "no_standing"),
+        **_clearances(of.tc_s[own], of.end_s[own], feet, foot.heights, flats),
+        **_steps(of.opposite_ic_s[own], feet, side, flats, along, outward),
     }
+
+
+def _furthest(p: Floats, first: NDArray[np.intp], last: NDArray[np.intp], outward: Floats) -> Floats:
+    """How far (m,) a path goes in a direction (m, 2) of its own from the first of two samples each, m."""
+    far = np.empty(len(first))
+    for length in np.unique(last - first).tolist():
+        same = np.flatnonzero(last - first == length)
+        begins = first[same, None]
+        way = p[begins + np.arange(length + 1), :2] - p[begins, :2]
+        far[same] = (way @ outward[same, :, None]).max(axis=(1, 2))
+    return far
+
+
+def _clearances(
+    tc_s: Floats, end_s: Floats, feet: FootTracks, heights: SoleHeights | None, flats: Flats
+) -> Figures:
+    """Of the sole between the two flats."""
+    n = len(tc_s)
+    if heights is None:
+        return {name: _untold(n, "no_shoe_geometry") for name in CLEARANCES}
+    spans = lay_out(flats.first, flats.last)
+    heel, tip = measure_floor_heights(heights, spans, feet.body.ankle_height)
+    toe = _untold(n, "no_terminal_contact")
+    swings = np.maximum(np.ceil((np.stack((tc_s, end_s)) - feet.t_s[0]) * feet.rate_hz) - spans.first, 0.0)
+    stops = np.append(spans.start[1:], len(tip))
+    for i in np.flatnonzero(~np.isnan(tc_s)).tolist():
+        a, b = (min(spans.start[i] + int(at), stops[i]) for at in swings[:, i])
+        least = toe_clearance(tip[a:b])
+        if isinstance(least, str):
+            toe.reasons[i] = least
+        else:
+            toe.values[i], toe.reasons[i] = least, ""
+    return dict(
+        zip(CLEARANCES, (tell_figure(np.maximum.reduceat(heel, spans.start), "gap"), toe), strict=True)
+    )
+
+
+def _steps(
+    landed_s: Floats, feet: FootTracks, side: Side, flats: Flats, along: Floats, outward: Floats
+) -> Figures:
+    """Steps that end the strides: from the other foot's flat to this one's."""
+    other = OTHER[side]
+    why = np.full(len(landed_s), "", object)
+    why[flats.opposite < 0] = "no_foot_flat"
+    if other in feet.withheld:
+        why[:] = feet.withheld[other]
+    if not feet.linked:
+        why[:] = "feet_not_linked"
+    why[np.isnan(landed_s)] = "opposite_foot_missing"
+    if other not in feet.p:
+        why[:] = "opposite_foot_missing"
+    length, width = np.full((2, len(why)), np.nan)
+    told = np.flatnonzero(why == "")
+    if len(told):
+        x, y = (feet.p[side][flats.last[told], :2] - feet.p[other][flats.opposite[told], :2]).T
+        length[told] = x * along[told, 0] + y * along[told, 1]
+        width[told] = x * outward[told, 0] + y * outward[told, 1]
+        why[told] = "gap"
+    found = {"step_length_m": tell_figure(length, why), "step_width_m": tell_figure(width, why)}
+    if feet.body.standing_width is None:
+        found["step_width_m"].values[told], found["step_width_m"].reasons[told] = (
+            np.nan,
+            "standing_width_unknown",
+        )
+    return found

@@ -14,9 +14,9 @@ from typing import Final
 import numpy as np
 
 from core.events.result import Strides
-from core.frames import FOOT, SIDES, Floats, Oriented, Segment
+from core.frames import FOOT, Floats, Oriented, Segment
 from core.parameters.resample import resample
-from core.parameters.rows import Row
+from core.parameters.rows import Figures, tell_figure
 
 NAMES: Final = ("loading_pct", "foot_flat_pct", "push_pct")
 """In % of stance, in the order of the tables."""
@@ -38,13 +38,13 @@ class Stances:
 
     Parameters
     ----------
-    flat_s, heel_off_s : (strides,) s, NaN where there is no such moment. rows : their parts of the stance in
-        %, or why not: "no_foot_sensor", "no_terminal_contact", "gap", "no_foot_flat".
+    flat_s, heel_off_s : (strides,) s, NaN where there is no such moment. parts : of the stance in %, or why
+        not: "no_foot_sensor", "no_terminal_contact", "gap", "no_foot_flat".
     """
 
     flat_s: Floats
     heel_off_s: Floats
-    rows: tuple[Row, ...]
+    parts: Figures
 
 
 def foot_pitches(orientations: Oriented) -> dict[Segment, Floats]:
@@ -66,13 +66,10 @@ def find_stances(strides: Strides, t_s: Floats, pitch: dict[Segment, Floats]) ->
     ----------
     pitch : of `foot_pitches`, on `t_s` (n,).
     """
-    n = len(strides.strides)
-    part = np.full((n, 2), np.nan)
-    reason = np.full(n, "no_foot_sensor", object)
-    start = np.array([s.start_s for s in strides.strides], np.float64)
-    off = np.array([np.nan if s.tc_s is None else s.tc_s for s in strides.strides], np.float64)
-    for side in SIDES:
-        own = np.array([i for i, s in enumerate(strides.strides) if s.side == side], np.int64)
+    start, off = strides.columns.start_s, strides.columns.tc_s
+    part = np.full((len(start), 2), np.nan)
+    reason = np.full(len(start), "no_foot_sensor", object)
+    for side, own in strides.columns.of.items():
         if FOOT[side] not in pitch or not len(own):
             continue
         pieces = resample(pitch[FOOT[side]][None], t_s, np.stack((start[own], off[own]), axis=1))[0]
@@ -80,12 +77,9 @@ def find_stances(strides: Strides, t_s: Floats, pitch: dict[Segment, Floats]) ->
         reason[own] = np.where(np.isnan(off[own]), "no_terminal_contact",
                                np.where(np.isnan(pieces[:, 0]), "gap", "no_foot_flat"))  # fmt: skip
     whole = off - start
-    percent = 100.0 * np.stack((part[:, 0], part[:, 1] - part[:, 0], 1.0 - part[:, 1]), axis=1)
-    rows = (
-        dict.fromkeys(NAMES, str(why)) if np.isnan(p[0]) else dict(zip(NAMES, p, strict=True))
-        for p, why in zip(percent.tolist(), reason, strict=True)
-    )
-    return Stances(start + part[:, 0] * whole, start + part[:, 1] * whole, tuple(rows))
+    shares = (part[:, 0], part[:, 1] - part[:, 0], 1.0 - part[:, 1])
+    parts = {name: tell_figure(100.0 * x, reason) for name, x in zip(NAMES, shares, strict=True)}
+    return Stances(start + part[:, 0] * whole, start + part[:, 1] * whole, parts)
 
 
 def _flat_part(pitch: Floats) -> Floats:

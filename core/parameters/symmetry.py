@@ -125,24 +125,18 @@ def phase_coordination(strides: Strides) -> Parameter:
     (below 10, like every variation).
     """
     name = "pci_pct"
-    swings = {
-        side: [s.end_s - s.tc_s for s in strides.select_used(side) if s.tc_s is not None] for side in SIDES
-    }
-    if not strides.select_used():
+    of = strides.columns
+    swing = of.end_s - of.tc_s
+    swings = {side: swing[own][~np.isnan(swing[own])] for side, own in of.used.items()}
+    if not of.counted.any():
         return Parameter(name, None, 0, None, None, "%", "no_strides")
-    if not all(swings.values()):
-        reason = (
-            "opposite_foot_missing"
-            if not all(strides.select_used(x) for x in SIDES)
-            else "no_terminal_contact"
-        )
+    if not all(map(len, swings.values())):
+        one_foot = not all(map(len, of.used.values()))
+        reason = "opposite_foot_missing" if one_foot else "no_terminal_contact"
         return Parameter(name, None, 0, None, None, "%", reason)
-    longer = max(SIDES, key=lambda side: float(np.mean(swings[side])))
-    phi = np.array([
-        360.0 * (s.opposite_ic_s - s.start_s) / s.duration_s
-        for s in strides.select_used(longer)
-        if s.opposite_ic_s is not None
-    ])  # fmt: skip
+    own = of.used[max(SIDES, key=lambda side: float(swings[side].mean()))]
+    phi = 360.0 * (of.opposite_ic_s[own] - of.start_s[own]) / of.duration_s[own]
+    phi = phi[~np.isnan(phi)]
     cv = cv_pct(phi, "") if len(phi) >= CV_STRIDES else None
     if cv is None:
         return Parameter(name, None, len(phi), None, None, "%", "few_strides")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from core.angles import JointAngles
 from core.events.result import Strides
 from core.frames import Floats, Oriented, Segment, Side
+from core.parameters.flats import Flats
 from core.parameters.kinematic import (
     foot_pitch,
     measure_cycles,
@@ -17,13 +18,11 @@ from core.parameters.kinematic import (
     turning_angle,
     without_bounds,
 )
-from core.parameters.phases import NAMES as PHASES
-from core.parameters.phases import phase_rows
+from core.parameters.phases import measure_phases
 from core.parameters.result import Parameter
-from core.parameters.rows import Column, row_columns, side_parameters
+from core.parameters.rows import Column, figure_columns, side_parameters
 from core.parameters.smoothness import stride_smoothness
-from core.parameters.spatial import GROUND, Surface, per_stride_spatial, spatial_rows, summarise_distances
-from core.parameters.stance import NAMES as PARTS
+from core.parameters.spatial import GROUND, Surface, measure_distances, summarise_distances
 from core.parameters.stance import find_stances, foot_pitches
 from core.parameters.symmetry import phase_coordination
 from core.parameters.temporal import per_stride, summarise_times
@@ -54,6 +53,7 @@ def take_figures(
     feet: FootTracks | None = None,
     surface: Surface = GROUND,
     trunk: Mapping[Segment, Floats] | None = None,
+    flats: Flats | None = None,
 ) -> TakeFigures:
     """Temporal, spatial, parts of stance and swing, angles over the cycle, regularity of the trunk.
 
@@ -62,6 +62,7 @@ def take_figures(
     angles : None = the take was not analysed so far: times only.
     orientations : of the feet, for their pitch; None leaves it out. feet : None = there are no distances.
     trunk : pelvis → (n, 3) acceleration in the walking frame, on the axis of the angles.
+    flats : of these strides, where somebody has them already.
     """
     columns = per_stride(strides)
     times = (*summarise_times(strides), phase_coordination(strides))
@@ -74,8 +75,8 @@ def take_figures(
     )
     pitch = {} if orientations is None else foot_pitches(orientations)
     flat = find_stances(strides, angles.t_s, pitch)
-    rows = spatial_rows(strides, feet, surface)
-    phases = phase_rows(strides, flat, angles, pitch, feet)
+    distances = measure_distances(strides, feet, surface, flats)
+    phases = measure_phases(strides, flat, angles, pitch, feet)
     curves, of_curves = measure_cycles(angles, strides)
     of_feet = turning_angle(strides)
     if orientations is not None:
@@ -84,17 +85,15 @@ def take_figures(
     return TakeFigures(
         parameters=(
             *times,
-            *summarise_distances(strides, feet, rows, surface),
-            *side_parameters(strides, flat.rows, PARTS),
-            *side_parameters(strides, phases, PHASES),
+            *summarise_distances(strides, feet, distances, surface),
+            *side_parameters(strides, flat.parts),
+            *side_parameters(strides, phases),
             *summarise_angles(curves, figures),
             *of_trunk,
         ),
         columns={
             **columns,
-            **per_stride_spatial(rows),
-            **row_columns(flat.rows, PARTS),
-            **row_columns(phases, PHASES),
+            **figure_columns({**distances, **flat.parts, **phases}),
             **per_stride_figures(strides, without_bounds(curves, figures)),
         },
     )

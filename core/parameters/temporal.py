@@ -6,7 +6,7 @@ the foot that lands.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import inf, isnan
 
@@ -23,19 +23,23 @@ from core.parameters.variability import summarise_values
 
 def stride_values(stride: Stride) -> dict[str, float | None]:
     """Temporal parameters of one stride by name, s or % of the stride; None where undefined."""
-    return {name: None if isnan(v := float(x[0])) else v for name, x in temporal_values((stride,)).items()}
+    return {
+        name: None if isnan(v := float(x[0])) else v
+        for name, x in temporal_values(Strides((stride,))).items()
+    }
 
 
 def per_stride(strides: Strides) -> dict[str, Column]:
     """Columns of the stride table, one entry per stride of the list (counted or not), in its order."""
-    return {name: as_column(x) for name, x in possible_values(strides.strides).items()}
+    return {name: as_column(x) for name, x in possible_values(temporal_values(strides)).items()}
 
 
-def temporal_values(strides: Sequence[Stride]) -> dict[str, Floats]:
+def temporal_values(strides: Strides) -> dict[str, Floats]:
     """Temporal parameters (strides,) by name, s or % of the stride; NaN where undefined."""
-    start, tc, end, opposite_tc, opposite_ic = np.array(
-        [(s.start_s, s.tc_s, s.end_s, s.opposite_tc_s, s.opposite_ic_s) for s in strides], np.float64
-    ).reshape(-1, 5).T  # fmt: skip
+    of = strides.columns
+    start, tc, end, opposite_tc, opposite_ic = (
+        of.start_s, of.tc_s, of.end_s, of.opposite_tc_s, of.opposite_ic_s
+    )  # fmt: skip
     initial = opposite_tc - start
     # a foot that leaves before the other lands runs: there is no double support to measure
     terminal = np.where(tc >= opposite_ic, tc - opposite_ic, np.nan)
@@ -55,14 +59,13 @@ def temporal_values(strides: Sequence[Stride]) -> dict[str, Floats]:
     return values
 
 
-def possible_values(strides: Sequence[Stride]) -> dict[str, Floats]:
-    """As `temporal_values`, (strides,) each; NaN also where no person can have the value."""
-    found = temporal_values(strides)
+def possible_values(found: Mapping[str, Floats]) -> dict[str, Floats]:
+    """The same times (strides,), NaN also where no person can have the value."""
+    possible = {}
     for name, x in found.items():
         low, high = CATALOGUE[name].plausible
-        if (low, high) != (-inf, inf):
-            found[name] = np.where((x < low) | (x > high), np.nan, x)
-    return found
+        possible[name] = x if (low, high) == (-inf, inf) else np.where((x < low) | (x > high), np.nan, x)
+    return possible
 
 
 def summarise_times(strides: Strides) -> tuple[Parameter, ...]:
@@ -74,21 +77,26 @@ def summarise_times(strides: Strides) -> tuple[Parameter, ...]:
     "opposite_foot_missing", "no_double_support" (a flight phase).
     """
     parameters: list[Parameter] = []
-    steps: list[float] = []
+    found = temporal_values(strides)
+    possible = possible_values(found)
+    steps = []
     for side in SIDES:
-        used = strides.select_used(side)
-        found = temporal_values(used)
-        for name, column in possible_values(used).items():
-            values = column[~np.isnan(column)].tolist()
-            there = not np.isnan(found[name]).all()
-            why = None if values else IMPOSSIBLE if there else explain_missing(name, used)
+        used = strides.columns.used[side]
+        for name, column in possible.items():
+            values = column[used]
+            values = values[~np.isnan(values)]
+            why = None
+            if not len(values):
+                there = not np.isnan(found[name][used]).all()
+                why = IMPOSSIBLE if there else explain_missing(name, strides.select_used(side))
             parameters.append(summarise_values(name, side, values, unit_of(name), why))
             if name == "step_time_s":
-                steps.extend(values)
-    reason = "opposite_foot_missing" if strides.select_used() else "no_strides"
-    if not steps and any(p.reason == IMPOSSIBLE and p.name == "step_time_s" for p in parameters):
+                steps.append(values)
+    both = np.concatenate(steps)
+    reason = "opposite_foot_missing" if strides.columns.counted.any() else "no_strides"
+    if not len(both) and any(p.reason == IMPOSSIBLE and p.name == "step_time_s" for p in parameters):
         reason = IMPOSSIBLE
-    parameters.append(cadence(summarise_values("step_time_s", None, steps, "s", reason)))
+    parameters.append(cadence(summarise_values("step_time_s", None, both, "s", reason)))
     return tuple(parameters)
 
 

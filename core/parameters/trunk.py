@@ -52,7 +52,8 @@ NAMES: Final = (
 
 def choose_foot(strides: Strides) -> tuple[Window, ...]:
     """Counted strides of the foot that has more of them: those of both overlap, one foot's tell all once."""
-    return tuple((s.start_s, s.end_s) for s in max((strides.select_used(side) for side in SIDES), key=len))
+    own = max((strides.columns.used[side] for side in SIDES), key=len)
+    return tuple(zip(strides.columns.start_s[own].tolist(), strides.columns.end_s[own].tolist(), strict=True))
 
 
 def trunk_regularity(
@@ -82,7 +83,7 @@ def trunk_regularity(
 
 def harmonic_ratios(pieces: Floats) -> dict[str, Floats]:
     """Ratios (strides,) by axis of accelerations (3, strides, points) over whole strides, end left out."""
-    amplitude = np.abs(np.fft.rfft(pieces, axis=-1))[..., 1 : HARMONICS + 1]
+    amplitude = np.abs(np.fft.rfft(pieces, axis=-1)[..., 1 : HARMONICS + 1])
     odd, even = amplitude[..., ::2].sum(axis=-1), amplitude[..., 1::2].sum(axis=-1)
     found = {}
     for axis, column in AXES.items():
@@ -100,7 +101,7 @@ def _harmonic_ratios(own: Sequence[Window], t_s: Floats, acceleration: Floats) -
     pieces = np.stack(resample(acceleration.T, t_s, np.array(own), POINTS + 1))[..., :-1]
     for axis, values in harmonic_ratios(pieces).items():
         known = values[np.isfinite(values)]
-        yield summarise_values(f"harmonic_ratio_{axis}", None, known.tolist(), "", _why(acceleration, axis))
+        yield summarise_values(f"harmonic_ratio_{axis}", None, known, "", _why(acceleration, axis))
 
 
 def _regularity(own: Sequence[Window], t_s: Floats, acceleration: Floats) -> Iterator[Parameter]:

@@ -91,7 +91,7 @@ def state_uncertainty(
     goniometer : a standing angle was added to the levels.
     feet_lag_s : what one foot's clock may be late by, standard, where nothing between the feet shows it.
     """
-    contacts = {side: _contact_errors(events, side) for side in SIDES}
+    contacts = _contact_errors(events)
     strides = {p.side: p.mean for p in parameters if p.name == "stride_time_s"}
     return tuple(
         _stated(p, contacts, strides, estimated, feet_lag_s, goniometer=goniometer)
@@ -187,19 +187,24 @@ def _of_contacts(
     return hypot(contact, foot_off), hypot(*own), random
 
 
-def _contact_errors(events: GaitEvents | None, side: Side) -> ContactErrors:
-    """Of the events of a foot: by what they state themselves, else of the pitch rule.
+def _contact_errors(events: GaitEvents | None) -> dict[Side, ContactErrors]:
+    """Of the events of each foot: by what they state themselves, else of the pitch rule.
 
     An event set by a person counts as `TYPICAL_S`: people who mark the same signal differ by as much.
     """
-    found: dict[EventKind, list[float]] = {"ic": [], "tc": []}
+    known: dict[tuple[Side, EventKind], list[float]] = {}
     for e in () if events is None else events.events:
-        known = TYPICAL_S if e.source == MANUAL else e.uncertainty_s
-        if e.side == side and known is not None:
-            found[e.kind].append(known)
-    if not all(found.values()):
+        stated = TYPICAL_S if e.source == MANUAL else e.uncertainty_s
+        if stated is not None:
+            known.setdefault((e.side, e.kind), []).append(stated)
+    return {side: _foot_errors(known.get((side, "ic")), known.get((side, "tc"))) for side in SIDES}
+
+
+def _foot_errors(contacts: Sequence[float] | None, leavings: Sequence[float] | None) -> ContactErrors:
+    """Of a foot, from what its contacts and foot-offs state in s."""
+    if not contacts or not leavings:
         return PITCH_RULE
-    ic, tc = (float(np.sqrt(np.mean(np.square(found[kind])))) / TYPICAL_S for kind in ("ic", "tc"))
+    ic, tc = (float(np.sqrt(np.mean(np.square(x)))) / TYPICAL_S for x in (contacts, leavings))
     both = hypot(ic, tc) / sqrt(2.0)
     foot = REFINED.foot if both * TYPICAL_S <= WITHOUT_FOOT_S else REFINED.contact
     return ContactErrors(REFINED.contact * ic, REFINED.foot_off * tc, foot * both, REFINED.random * both)

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from core.events.result import COMPARED
-from core.frames import Side
+from core.frames import Floats, Side
 from core.parameters.catalogue import name_counted
 from core.parameters.result import Parameter
 
@@ -41,15 +41,14 @@ def has_enough_values(p: Parameter) -> bool:
 
 
 def summarise_values(
-    name: str, side: Side | None, values: Sequence[float], unit: str, reason: str | None = None
+    name: str, side: Side | None, values: Sequence[float] | Floats, unit: str, reason: str | None = None
 ) -> Parameter:
     """One parameter from its values; without values the reason stands instead."""
     if not len(values):
         return Parameter(name, side, 0, None, None, unit, reason or "no_strides")
     x = np.asarray(values, np.float64)
-    n, mean = len(x), float(x.mean())
-    sd = float(x.std(ddof=1)) if n > 1 else None
-    half = None if sd is None else t_quantile(n - 1) * sd / float(np.sqrt(n))
+    n, (mean, sd) = len(x), mean_and_sd(x)
+    half = None if sd is None else t_quantile(n - 1) * sd / sqrt(n)
     return Parameter(
         name,
         side,
@@ -57,23 +56,38 @@ def summarise_values(
         mean,
         sd,
         unit,
-        cv_pct=cv_pct(x, unit),
+        cv_pct=_vary(x, mean, sd, unit),
         ci_low=None if half is None else mean - half,
         ci_high=None if half is None else mean + half,
         note="few_strides" if n < STEADY_STRIDES else None,
     )
 
 
-def cv_pct(values: Sequence[float] | np.ndarray, unit: str) -> float | None:
+def mean_and_sd(x: Floats) -> tuple[float, float | None]:
+    """Mean of values (n ≥ 1,) and their standard deviation (n − 1), None of one.
+
+    As `x.mean()` and `x.std(ddof=1)`, to the bit, without what those spend on axes and masks.
+    """
+    n = len(x)
+    mean = np.add.reduce(x) / n
+    off = x - mean
+    return float(mean), sqrt(np.add.reduce(off * off) / (n - 1)) if n > 1 else None
+
+
+def cv_pct(values: Sequence[float] | Floats, unit: str) -> float | None:
     """Coefficient of variation 100 sd / mean, sd with n − 1.
 
     None below `CV_STRIDES` values, for angles, and for values that are not all positive: a quantity whose
     zero is a convention, or which passes through it, has no ratio.
     """
     x = np.asarray(values, np.float64)
-    if len(x) < CV_STRIDES or unit == "deg" or not (x > 0.0).all():
+    return _vary(x, *mean_and_sd(x), unit) if len(x) else None
+
+
+def _vary(x: Floats, mean: float, sd: float | None, unit: str) -> float | None:
+    if len(x) < CV_STRIDES or unit == "deg" or sd is None or not x.min() > 0.0:
         return None
-    return 100.0 * float(x.std(ddof=1)) / float(x.mean())
+    return 100.0 * sd / mean
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Annotated, Any
 
+import msgspec
+import numpy as np
 from fastapi import APIRouter, Query
 from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
 from core.events.edits import read_edit
+from core.events.result import list_known
 from server.api import review_schemas as schemas
 from server.api.documents import refusals
 from server.api.downloads import BINARY, attachment
@@ -132,6 +135,9 @@ def _review(
 ) -> Response:
     """Written without a model: two thousand events would be checked longer than they are measured."""
     bundle = reviewed.read_bundle(found, edits)
+    events, strides, of = bundle.events.events, bundle.strides.strides, bundle.strides.columns
+    times = np.round(np.array([e.time_s for e in events], np.float64), 6).tolist()
+    starts, offs, ends = (list_known(np.round(x, 6)) for x in (of.start_s, of.tc_s, of.end_s))
     content = {
         "analysis_id": found.id,
         "editable": reviewed.open(found).tracks is not None,
@@ -141,25 +147,25 @@ def _review(
             {
                 "side": e.side,
                 "kind": e.kind,
-                "time_s": round(e.time_s, 6),
+                "time_s": time_s,
                 "source": e.source,
                 "confidence": e.confidence,
                 "uncertainty_s": e.uncertainty_s,
             }
-            for e in bundle.events.events
+            for e, time_s in zip(events, times, strict=True)
         ],
         "strides": [
             {
                 "side": s.side,
-                "start_s": round(s.start_s, 6),
-                "tc_s": None if s.tc_s is None else round(s.tc_s, 6),
-                "end_s": round(s.end_s, 6),
+                "start_s": start_s,
+                "tc_s": tc_s,
+                "end_s": end_s,
                 "flags": s.flags,
                 "excluded_by": s.excluded_by,
                 "excluded": None if s.excluded_reason is None else explain_exclusion(s.excluded_reason),
             }
-            for s in bundle.strides.strides
+            for s, start_s, tc_s, end_s in zip(strides, starts, offs, ends, strict=True)
         ],
         "parameters": [parameter_row(p) for p in bundle.parameters],
     }
-    return JSONResponse(content, status_code=status)
+    return Response(msgspec.json.encode(content), status, media_type="application/json")

@@ -12,7 +12,8 @@ from typing import Final
 
 from core.frames import SUFFIX
 from core.parameters.catalogue import CATALOGUE, name_counted, unit_of
-from core.parameters.kinematic import POINTS, MeanCurve, cycle_curves, mean_curve
+from core.parameters.kinematic import POINTS, cycle_curves, mean_curve
+from core.parameters.result import MeanCurve
 from core.parameters.uncertainty import is_estimated
 from server.export.content import ExportContent
 from server.report.level import GROUP, define_parameter, from_standing, label_parameter

@@ -19,6 +19,7 @@ from server.pages.report_rows import select_first
 from server.pages.session import explain_emptiness
 from server.pages.session_context import lead_to_days, read_measured_context
 from server.pages.shell import FRAGMENT, record_opening, render_page
+from server.report.model import ReportModel
 from server.services import analyses, edit_log, reports, signals
 from server.services.reviewed import ReviewedAnalyses
 
@@ -41,7 +42,9 @@ def show_timeline(
         latest = analyses.latest(c, sid)
         edits = edit_log.EditHistory() if latest is None else edit_log.edits_of(c, latest.id)
     if latest is not None:
-        context["numbers"] = view_numbers(reviewed, latest, edits, context)
+        model = read_model(reviewed, latest, edits, context)
+        context["numbers"] = view_numbers(model)
+        context["replay"] = {**model.replay, "curves": {}}
         context["lanes"] = [vars(lane) for lane in signals.list_lanes(reviewed, latest)]
         context["fixed_because"] = reviewed.open(latest).fixed_because
         context["editable"] = context["fixed_because"] is None and who.may(Action.REVIEW)
@@ -66,27 +69,30 @@ def show_numbers(
         latest = analyses.get_shown(c, sid)
         edits = edit_log.edits_of(c, latest.id)
     trail.record_watched(who, "numbers.opened", "session", sid)
-    numbers = view_numbers(reviewed, latest, edits, context)
+    numbers = view_numbers(read_model(reviewed, latest, edits, context))
     return render(request, "_numbers.html", {"numbers": numbers})
 
 
-def view_numbers(
+def read_model(
     reviewed: ReviewedAnalyses,
     found: analyses.AnalysisRecord,
     edits: edit_log.EditHistory,
     context: Mapping[str, Any],
-) -> dict[str, Any]:
+) -> ReportModel:
+    """The report of an analysis, compared with no visit."""
+    patient, session = context["patient"], context["session"]
+    return reports.read(reviewed, found, edits, patient, session, None, context["controls"])[1]
+
+
+def view_numbers(model: ReportModel) -> dict[str, Any]:
     """What of the report stands beside the timeline and changes with every edit."""
-    _, model = reports.read(
-        reviewed, found, edits, context["patient"], context["session"], None, context["controls"]
-    )
+    used = model.used
     return {
         "first": select_first(model),
         "key_curve": draw_chart(model.key_curve, KEY_HEIGHT, x_unit=True),
-        "used": model.used,
+        "used": used,
         "norm_source": model.norm_source,
         "at_speed": model.at_speed,
-        "stride_words": f"{sum(model.used.values())} of {len(model.strides)} used",
-        "replay": {**model.replay, "curves": {}},
+        "stride_words": f"{sum(used.values())} of {len(model.strides)} used",
         "empty_reason": explain_emptiness(model),
     }

@@ -228,5 +228,6 @@ class _CyclePlot(PlotArea):
     def _run(self, angle: Floats, step: int, first: int) -> str:
         """One piece of a curve: its first point, then where each next one lies from the last."""
         y = self._heights(angle)
-        moves = " ".join(f"{10 * step}{b - a:+d}" for a, b in pairwise(y))
+        across = 10 * step
+        moves = " ".join([f"{across}{b - a:+d}" for a, b in pairwise(y)])
         return f"M{10 * step * first} {y[0]}" + (f"l{moves}" if moves else "")

@@ -17,6 +17,7 @@ from core.parameters import mean_curve
 from core.parameters.anatomical_zero import anatomical_variables, standing_offset_deg
 from core.parameters.kinematic import MEAN_ZERO, rest_at_bound
 from core.parameters.result import CycleCurves
+from core.parameters.variability import mean_and_sd
 from server.report.bundle import Bundle
 from server.report.estimator import list_estimated_variables
 from server.report.wording import VARIABLES, ZERO_WORDS, Variable, reason_words
@@ -205,14 +206,15 @@ def _side(curves: CycleCurves, name: str, side: Side) -> SideCurve:
         off = off[np.isfinite(off)]
         if len(counted) > DRAWN_STRIDES:
             counted = counted[np.linspace(0, len(counted) - 1, DRAWN_STRIDES).round().astype(np.int64)]
-        index = curves.stride_index[side]
-        shown = np.where(rest_at_bound(curves, name, side, rows), np.nan, np.degrees(rows))
-        strides = {index[i]: shown[i] for i in counted}
+        drawn, index = rows[counted], curves.stride_index[side]
+        shown = np.where(rest_at_bound(curves, name, side, drawn), np.nan, np.degrees(drawn))
+        strides = {index[i]: row for i, row in zip(counted, shown, strict=True)}
+    foot_off, foot_off_sd = mean_and_sd(off) if len(off) else (None, None)
     return SideCurve(
         mean_deg=None if mean.mean is None else np.degrees(mean.mean),
         sd_deg=None if mean.sd is None else np.degrees(mean.sd),
         n=mean.n,
         strides=strides,
-        foot_off_pct=float(off.mean()) if len(off) else None,
-        foot_off_sd=float(off.std(ddof=1)) if len(off) > 1 else None,
+        foot_off_pct=foot_off,
+        foot_off_sd=foot_off_sd,
     )

@@ -7,6 +7,7 @@ where the walk starts and stops among them: a check of magnitude, no statistic.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
@@ -14,9 +15,8 @@ import numpy as np
 import pytest
 
 from core.body.feet import FootTracks
-from core.frames import SIDES, SUFFIX, Side
-from core.parameters import gait_parameters, spatial_rows
-from core.parameters.rows import Row
+from core.frames import SIDES, SUFFIX, Floats, Side
+from core.parameters import gait_parameters, measure_distances
 from core.pipeline import TakeAnalysis, analyse
 from tests.accuracy.neura import STRAIGHT
 from tests.accuracy.report import record
@@ -57,24 +57,19 @@ def tracks() -> tuple[FootTracks, FootTracks]:
 
 
 @cache
-def rows() -> tuple[tuple[Row, ...], tuple[Row, ...]]:
+def figures() -> tuple[Mapping[str, Floats], Mapping[str, Floats]]:
     """Figures of the whole strides ahead, ours and Vicon's."""
     strides = analysis().strides
     assert strides is not None
-    counted = [set(s.flags) <= STRAIGHT for s in strides.strides]
-    ours, vicon = (
-        tuple(r for r, c in zip(spatial_rows(strides, feet), counted, strict=True) if c) for feet in tracks()
-    )
-    return ours, vicon
+    ahead = np.array([set(s.flags) <= STRAIGHT for s in strides.strides])
+    ours, vicon = (measure_distances(strides, feet) for feet in tracks())
+    return {n: x.values[ahead] for n, x in ours.items()}, {n: x.values[ahead] for n, x in vicon.items()}
 
 
 def errors_cm(name: str) -> np.ndarray:
-    found = [
-        100 * (a - b)
-        for a, b in ((a[name], b[name]) for a, b in zip(*rows(), strict=True))
-        if isinstance(a, float) and isinstance(b, float)
-    ]
-    return np.array(found)
+    ours, vicon = (of[name] for of in figures())
+    found = 100 * (ours - vicon)
+    return np.asarray(found[np.isfinite(found)])
 
 
 def total_m(feet: FootTracks) -> float:
@@ -102,8 +97,11 @@ def test_write_down_the_figures() -> None:
     found = []
     for name, limit in LIMIT_CM.items():
         e = errors_cm(name)
-        true = [100 * x for x in (row[name] for row in rows()[1]) if isinstance(x, float)]
-        cells = [f"{np.mean(true):.0f}", f"{e.mean():+.1f} ± {e.std():.1f}", f"{np.abs(e).max():.1f}"]
+        cells = [
+            f"{100 * np.nanmean(figures()[1][name]):.0f}",
+            f"{e.mean():+.1f} ± {e.std():.1f}",
+            f"{np.abs(e).max():.1f}",
+        ]
         found.append([name.removesuffix("_m").replace("_", " "), str(len(e)), *cells, f"{limit:g}"])
     ours, vicon = (total_m(feet) for feet in tracks())
     record(

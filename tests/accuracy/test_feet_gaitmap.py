@@ -84,11 +84,8 @@ def test_parts_of_stance_are_those_of_the_markers() -> None:
     for side in SIDES:
         t, pitch = marker_pitch(side)
         own = find_stances(measured.strides, t, {FOOT[side]: pitch})
-        same = np.array([
-            [row[n] if isinstance(row[n], float) else np.nan for n in NAMES]
-            for s, row in zip(measured.strides.strides, own.rows, strict=True)
-            if s.side == side and s.excluded_reason is None
-        ], np.float64)  # fmt: skip
+        used = measured.strides.columns.used[side]
+        same = np.stack([own.parts[n].values[used] for n in NAMES], axis=1)
         ours = np.stack([counted(side, n) for n in NAMES], axis=1)
         lifted = np.array([lift_pct(side, t, s) for s in strides(side)])
         error = ours - same

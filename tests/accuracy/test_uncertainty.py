@@ -63,13 +63,12 @@ def of_angles() -> list[Pair]:
 
 
 def of_distances() -> list[Pair]:
-    ours, vicon = distances.rows()
+    ours, vicon = distances.figures()
     pairs = []
     for name in distances.LIMIT_CM:
-        both = [(a[name], b[name]) for a, b in zip(ours, vicon, strict=True)]
-        known = [(a, b) for a, b in both if isinstance(a, float) and isinstance(b, float)]
-        found = summarise_values(name, None, [a for a, _ in known], CATALOGUE[name].unit)
-        pairs.append((state_uncertainty([found])[0], float(np.mean([b for _, b in known]))))
+        known = np.isfinite(ours[name] + vicon[name])
+        found = summarise_values(name, None, ours[name][known], CATALOGUE[name].unit)
+        pairs.append((state_uncertainty([found])[0], float(vicon[name][known].mean())))
     return pairs
 
 

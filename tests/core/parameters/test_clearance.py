@@ -12,7 +12,7 @@ from core.body.kinematics import nominal_body
 from core.body.model import BodyModel
 from core.frames import FOOT, R_NEUTRAL, SIDES, Floats, Side
 from core.measure import measure_gait
-from core.parameters.clearance import SoleHeights, measure_floor_heights, sole_heights, toe_clearance
+from core.parameters.clearance import SoleHeights, lay_out, measure_floor_heights, sole_heights, toe_clearance
 from core.rotation import about, from_matrix, multiply, rotate
 from core.shoe import Shoe
 from core.simulate import simulate_scenario
@@ -65,7 +65,7 @@ def dip(depth: float = 0.02) -> Floats:
 @pytest.mark.parametrize("climb", [0.0, 0.05, -0.08])
 def test_the_least_height_in_mid_swing_is_told_whatever_the_drift(climb: float) -> None:
     found = swing(dip(), climb)
-    heel, tip = measure_floor_heights(found, 0, 100, ANKLE)
+    heel, tip = measure_floor_heights(found, lay_out(np.array([0]), np.array([100])), ANKLE)
     assert toe_clearance(tip[5:98]) == pytest.approx(0.02)
     assert heel.max() == pytest.approx(0.10)
 

@@ -16,7 +16,8 @@ from core.measure import measure_gait
 from core.parameters import stride_values, summarise_times
 from core.parameters.catalogue import unit_of
 from core.parameters.result import Parameter
-from core.parameters.spatial import spatial_rows
+from core.parameters.rows import read_row
+from core.parameters.spatial import measure_distances
 from core.parameters.symmetry import compare_sides
 from core.simulate import simulate_scenario
 from tests.true_walks import true_tracks
@@ -94,7 +95,7 @@ def feet(pause_s: float) -> FootTracks:
 def test_speed_is_length_and_time_of_the_same_window(pause: float) -> None:
     """Seen: length between flats divided by the time between contacts, another window."""
     stride = Stride("left", 0.0, 0.6, 1.0)
-    (row,) = spatial_rows(Strides((stride,)), feet(pause))
+    row = read_row(measure_distances(Strides((stride,)), feet(pause)), 0)
     # from the middle of the first rest to that of what is looked at of the second one, .7 s at most
     between = 1.0 + 0.5 * min(0.6 + pause, 0.7) - 0.3
     assert row["stride_length_m"] == pytest.approx(1.3)
@@ -103,7 +104,7 @@ def test_speed_is_length_and_time_of_the_same_window(pause: float) -> None:
 
 def test_the_lift_of_a_sensor_is_not_the_clearance_of_the_toe() -> None:
     """Seen: the highest point of the sensor given as clearance."""
-    (row,) = spatial_rows(Strides((Stride("left", 0.0, 0.6, 1.0),)), feet(0.0))
+    row = read_row(measure_distances(Strides((Stride("left", 0.0, 0.6, 1.0),)), feet(0.0)), 0)
     assert row["min_toe_clearance_m"] == "no_shoe_geometry"
 
 

@@ -14,8 +14,8 @@ from core.body.model import BodyModel
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Segment, Side
 from core.measure import measure_gait
-from core.parameters.phases import NAMES, phase_rows
-from core.parameters.rows import Row, side_parameters
+from core.parameters.phases import NAMES, measure_phases
+from core.parameters.rows import Row, read_row, side_parameters
 from core.parameters.stance import find_stances
 from core.simulate import simulate_scenario
 from tests.true_walks import true_tracks
@@ -61,7 +61,7 @@ def phases(
 ) -> Row:
     one = Strides((stride,))
     of = dict(pitch() if of_feet is None else of_feet)
-    return phase_rows(one, find_stances(one, T, of), joint or angles(), of, tracks or feet())[0]
+    return read_row(measure_phases(one, find_stances(one, T, of), joint or angles(), of, tracks or feet()), 0)
 
 
 def test_each_phase_ends_where_its_event_is() -> None:
@@ -116,9 +116,9 @@ def test_the_seven_phases_are_the_whole_stride(name: str) -> None:
 
 def test_both_sides_have_every_phase() -> None:
     one = Strides((STRIDE,))
-    rows = phase_rows(one, find_stances(one, T, pitch()), angles(), pitch(), feet())
+    measured = measure_phases(one, find_stances(one, T, pitch()), angles(), pitch(), feet())
     found: dict[tuple[str, Side | None], str | None] = {
-        (p.name, p.side): p.reason for p in side_parameters(one, rows, NAMES)
+        (p.name, p.side): p.reason for p in side_parameters(one, measured)
     }
     assert {reason for (_, side), reason in found.items() if side == "left"} == {None}
     assert {reason for (_, side), reason in found.items() if side == "right"} == {"no_strides"}

@@ -14,12 +14,12 @@ from core.body.model import BodyModel
 from core.events.result import Stride, Strides
 from core.frames import FOOT, R_NEUTRAL, SIDES, Bools, Floats, Side
 from core.parameters.result import Parameter
+from core.parameters.rows import figure_columns
 from core.parameters.spatial import (
     NAMES,
     Surface,
     in_place,
-    per_stride_spatial,
-    spatial_rows,
+    measure_distances,
     summarise_distances,
 )
 from core.rotation import about, from_matrix, multiply
@@ -88,7 +88,8 @@ def parameters(
     tracks: FootTracks | None, surface: Surface | None = None
 ) -> Mapping[tuple[str, Side | None], Parameter]:
     surface = surface or Surface()
-    return by_name(summarise_distances(strides(), tracks, spatial_rows(strides(), tracks, surface), surface))
+    figures = measure_distances(strides(), tracks, surface)
+    return by_name(summarise_distances(strides(), tracks, figures, surface))
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.7, -2.5])
@@ -130,17 +131,18 @@ def test_a_small_step_within_a_stance_does_not_move_the_flat_before_it() -> None
     turned = replace(tracks, p={**tracks.p, "left": p}, still={**tracks.still, "left": still})
     long = Stride("left", 5.5, 7.5, 8.0)
     known = Strides((*(s for s in strides().strides if s.end_s <= 5.5), long))
-    rows = spatial_rows(known, turned)
-    before = next(r for s, r in zip(known.strides, rows, strict=True) if s.side == "left" and s.end_s == 5.5)
-    assert before["stride_length_m"] == pytest.approx(1.3, abs=0.02)
+    lengths = measure_distances(known, turned)["stride_length_m"].values
+    before = next(i for i, s in enumerate(known.strides) if s.side == "left" and s.end_s == 5.5)
+    assert lengths[before] == pytest.approx(1.3, abs=0.02)
 
 
 def test_a_foot_that_comes_down_where_it_was_made_no_stride() -> None:
     """Marching on the spot has contacts like walking, and leads nowhere; on a belt every stride does."""
     tracks = feet(length=0.02)
-    assert in_place(strides(), tracks) == frozenset(range(len(strides().strides)))
-    assert in_place(strides(), feet()) == in_place(strides(), None) == frozenset()
-    assert in_place(strides(), tracks, Surface("treadmill", 1.0)) == frozenset()
+    assert in_place(strides(), tracks).tolist() == list(range(len(strides().strides)))
+    assert not len(in_place(strides(), feet()))
+    assert not len(in_place(strides(), None))
+    assert not len(in_place(strides(), tracks, Surface("treadmill", 1.0)))
     assert parameters(tracks)["stride_length_m", "left"].reason == "in_place"
 
 
@@ -164,7 +166,8 @@ def test_what_cannot_be_known_has_a_reason() -> None:
     barefoot = parameters(replace(feet(), body=replace(BODY, sole_back=None)))
     assert barefoot["min_toe_clearance_m", "left"].reason == "no_shoe_geometry"
     assert barefoot["max_heel_clearance_m", "left"].reason == "no_shoe_geometry"
-    nobody = {p.reason for p in summarise_distances(Strides(()), None, ())}
+    none = Strides(())
+    nobody = {p.reason for p in summarise_distances(none, None, measure_distances(none, None))}
     assert nobody == {"no_strides", "no_foot_track"}
 
 
@@ -172,11 +175,20 @@ def test_a_stride_with_a_lost_sensor_has_no_length() -> None:
     tracks = feet()
     valid = tracks.valid["left"].copy()
     valid[290:300] = False
-    rows = spatial_rows(strides(), replace(tracks, valid={**tracks.valid, "left": valid}))
-    pairs = zip(strides().strides, rows, strict=True)
-    lost = [row["stride_length_m"] for s, row in pairs if s.side == "left"]
-    assert lost.count("gap") == 1
-    assert sum(isinstance(x, float) for x in lost) == 3
+    found = measure_distances(strides(), replace(tracks, valid={**tracks.valid, "left": valid}))
+    lengths, left = found["stride_length_m"], strides().columns.of["left"]
+    assert sorted(lengths.reasons[left]) == ["", "", "", "gap"]
+    assert np.isfinite(lengths.values[left]).sum() == 3
+
+
+def test_a_path_that_is_not_known_is_a_gap_and_no_number() -> None:
+    tracks = feet()
+    torn = tracks.p["left"].copy()
+    torn[250:260] = np.nan
+    found = measure_distances(strides(), replace(tracks, p={**tracks.p, "left": torn}))["circumduction_m"]
+    left = strides().columns.of["left"]
+    assert sorted(found.reasons[left]) == ["", "", "", "gap"]
+    assert np.isfinite(found.values[left]).sum() == 3
 
 
 def test_one_foot_alone_has_no_steps() -> None:
@@ -199,8 +211,7 @@ def test_a_treadmill_gives_what_its_belt_gives_and_nothing_else() -> None:
 
 
 def test_strides_have_their_own_columns() -> None:
-    rows = spatial_rows(strides(), feet(linked=False))
-    columns = per_stride_spatial(rows)
+    columns = figure_columns(measure_distances(strides(), feet(linked=False)))
     assert set(columns) == set(NAMES)
     assert columns["stride_length_m"] == pytest.approx((1.3,) * 8)
     assert columns["step_length_m"] == (None,) * 8
@@ -226,19 +237,20 @@ def true_strides(truth: WalkTruth) -> Strides:
 @pytest.mark.parametrize("name", ["fast_with_turns", "hemiparetic", "drop_foot"])
 def test_true_paths_give_the_true_lengths_and_widths(name: str) -> None:
     truth = simulated(name, 5)[1]
-    rows = spatial_rows(true_strides(truth), true_tracks(truth))
-    for true, row in zip(truth.strides, rows, strict=True):
-        assert row["stride_length_m"] == pytest.approx(true.length_m, abs=1e-6)
-        if isinstance(width := row["step_width_m"], float):
-            assert abs(width) == pytest.approx(true.width_m, abs=1e-6)
+    found = measure_distances(true_strides(truth), true_tracks(truth))
+    lengths, widths = found["stride_length_m"].values, found["step_width_m"].values
+    assert lengths == pytest.approx(np.array([s.length_m for s in truth.strides]), abs=1e-6)
+    known = np.isfinite(widths)
+    true_widths = np.array([s.width_m for s in truth.strides])
+    assert known.any()
+    assert np.abs(widths[known]) == pytest.approx(true_widths[known], abs=1e-6)
 
 
 def test_an_affected_side_shows_in_sign_and_size() -> None:
     truth = simulated("hemiparetic", 5)[1]
     strides_ = true_strides(truth)
-    found = by_name(
-        summarise_distances(strides_, true_tracks(truth), spatial_rows(strides_, true_tracks(truth)))
-    )
+    figures = measure_distances(strides_, true_tracks(truth))
+    found = by_name(summarise_distances(strides_, true_tracks(truth), figures))
     steps = {s: found["step_length_m", s].mean for s in SIDES}
     assert steps["left"] is not None
     assert steps["right"] is not None
@@ -257,5 +269,6 @@ def test_the_way_of_a_walk_is_that_of_its_footprints() -> None:
         edges = np.flatnonzero(np.diff(np.concatenate(([False], flat, [False]))))
         places = [tracks.p[side][(a + b) // 2, :2] for a, b in zip(edges[::2], edges[1::2], strict=True)]
         ways.append(sum(float(np.linalg.norm(b - a)) for a, b in pairwise(places)))
-    found = by_name(summarise_distances(Strides(()), tracks, ()))["total_distance_m", None]
-    assert found.mean == pytest.approx(np.mean(ways), abs=0.05)
+    none = Strides(())
+    found = by_name(summarise_distances(none, tracks, measure_distances(none, tracks)))
+    assert found["total_distance_m", None].mean == pytest.approx(np.mean(ways), abs=0.05)

@@ -36,7 +36,7 @@ def strides(side: Side = "left", stance_s: float = 0.6) -> Strides:
 
 def parts(found: Stances) -> dict[str, float | str]:
     return {p.name: p.mean if p.mean is not None else str(p.reason)
-            for p in side_parameters(strides(), found.rows, NAMES) if p.side == "left"}  # fmt: skip
+            for p in side_parameters(strides(), found.parts) if p.side == "left"}  # fmt: skip
 
 
 @pytest.mark.parametrize("level", [0.0, 4.0, -6.0])
@@ -50,9 +50,8 @@ def test_the_three_parts_are_where_the_pitch_passes_three_degrees(level: float) 
 
 def test_the_parts_are_the_whole_stance() -> None:
     found = find_stances(strides(), T, walked())
-    for row in found.rows:
-        numbers = [v for v in row.values() if isinstance(v, float)]
-        assert sum(numbers) == pytest.approx(100.0)
+    assert list(found.parts) == list(NAMES)
+    assert sum(x.values for x in found.parts.values()) == pytest.approx(np.full(8, 100.0))
     assert found.flat_s[0] == pytest.approx(1.0833, abs=0.005)
     assert found.heel_off_s[0] == pytest.approx(1.41, abs=0.005)
 
@@ -74,10 +73,9 @@ def test_what_is_missing_has_its_own_reason() -> None:
     assert set(parts(find_stances(strides(), T, {})).values()) == {"no_foot_sensor"}
     lost = walked()
     lost["foot_l"][150:1000] = np.nan
-    rows = find_stances(strides(), T, lost).rows
-    assert rows[1]["push_pct"] == "gap"
+    assert find_stances(strides(), T, lost).parts["push_pct"].reasons[1] == "gap"
     no_tc = Strides(tuple(Stride("left", k, None, k + 1.0) for k in range(1, 9)))
-    assert find_stances(no_tc, T, walked()).rows[0]["loading_pct"] == "no_terminal_contact"
+    assert find_stances(no_tc, T, walked()).parts["loading_pct"].reasons[0] == "no_terminal_contact"
 
 
 @pytest.mark.parametrize("name", ["comfortable", "hemiparetic", "antalgic", "drop_foot"])

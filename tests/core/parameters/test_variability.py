@@ -7,7 +7,7 @@ import pytest
 
 from core.events.result import Stride, Strides
 from core.parameters import summarise_times
-from core.parameters.variability import cv_pct, summarise_values, t_quantile
+from core.parameters.variability import cv_pct, mean_and_sd, summarise_values, t_quantile
 
 
 def test_the_interval_of_the_mean_is_students() -> None:
@@ -17,6 +17,12 @@ def test_the_interval_of_the_mean_is_students() -> None:
     assert t_quantile(1000) == pytest.approx(1.962, abs=5e-4)
     found = summarise_values("stride_time_s", "left", [1.0, 1.1, 1.2, 1.3], "s")
     assert (found.ci_low, found.ci_high) == pytest.approx((0.9446, 1.3554), abs=1e-4)
+
+
+@pytest.mark.parametrize("n", [2, 7, 8, 9, 128, 129, 1111])
+def test_mean_and_deviation_are_numpys_to_the_bit(n: int) -> None:
+    x = np.random.default_rng(n).normal(1.1, 0.05, n)
+    assert mean_and_sd(x) == (x.mean(), x.std(ddof=1))
 
 
 def test_the_interval_covers_the_true_mean_as_often_as_it_says() -> None:
