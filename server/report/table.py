@@ -24,6 +24,7 @@ from server.report.wording import (
     Term,
     difference_words,
     format_number,
+    format_uncertainty,
     parameter_term,
     reason_words,
     symmetry_words,
@@ -320,7 +321,7 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
         place.percentile,
         "" if enough else f"{p.n} {what if p.n != 1 else what.removesuffix('s')}",
         p.uncertainty,
-        "" if p.uncertainty is None else f"± {format_number(p.uncertainty, term.digits)}",
+        "" if p.uncertainty is None else format_uncertainty(p.uncertainty, term.digits),
         _known_by(p, term),
     )
 

@@ -142,6 +142,14 @@ def test_a_large_number_says_what_each_side_is_known_to() -> None:
     assert _plus_minus(found) == ""
 
 
+def test_no_number_is_known_to_nothing() -> None:
+    (found,) = parameter_rows(
+        [Parameter("cadence_spm", None, 4000, 111.2, 1.9, "steps/min", uncertainty=0.08)]
+    )
+    assert found.both is not None
+    assert (found.both.text, found.both.plus_minus) == ("111", "± 0.1")
+
+
 def test_a_missing_number_gives_its_reason_never_zero() -> None:
     both = rows_of(
         of("stance_pct", "left", None, "no_terminal_contact"),
