@@ -248,14 +248,26 @@ def _needs_manifest(name: str, data: bytes) -> str:
 
 
 def _nothing_readable(upload: _Upload) -> FormatError:
-    if len(upload.problems) == 1:
-        error = upload.problems[0][1]
-        return FormatError(error.code, error.message, sensor=error.sensor, t_s=error.t_s)
-    codes = {e.code for _, e in upload.problems}
-    lines = [e.message for _, e in upload.problems] + [n.message for n in upload.notices]
+    alike: dict[tuple[str, str], list[InputError]] = {}
+    for name, e in upload.problems:
+        alike.setdefault((e.code, e.message.replace(name, "")), []).append(e)
+    if len(alike) == 1:
+        (errors,) = alike.values()
+        first = errors[0]
+        return FormatError(first.code, _tell_alike(errors), sensor=first.sensor, t_s=first.t_s)
+    codes = {code for code, _ in alike}
+    lines = [_tell_alike(errors) for errors in alike.values()] + [n.message for n in upload.notices]
     shown = " ".join(lines[:_SHOWN]) + (f" … and {len(lines) - _SHOWN} more." if len(lines) > _SHOWN else "")
-    code = codes.pop() if len(codes) == 1 and len(upload.problems) == len(lines) else "unknown_format"
+    code = codes.pop() if len(codes) == 1 and not upload.notices else "unknown_format"
     return FormatError(code, f"No sensor recording was found; tried {list_formats()}. {shown}")
+
+
+def _tell_alike(errors: Sequence[InputError]) -> str:
+    """What is wrong with one of some files that have the same fault, and how many others have it."""
+    others = len(errors) - 1
+    if not others:
+        return errors[0].message
+    return f"{errors[0].message} The same holds of {others} other file{'' if others == 1 else 's'}."
 
 
 def _stored(upload: _Upload) -> Recording:

@@ -12,6 +12,9 @@ from server.api.schemas import Line, Request
 
 Seconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False, description="s from the start")]
 
+AnySeconds = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False, description="s from the start")]
+"""Also before the recording: what is typed there is refused in words of the review, not of the form."""
+
 
 class EditNew(Request):
     """A change of an event (move, add, delete) or a decision about a stride (exclude, include)."""
@@ -20,7 +23,7 @@ class EditNew(Request):
     side: Literal["left", "right"]
     time_s: Seconds = Field(description="of the event, or a moment inside the stride")
     event: Literal["ic", "tc"] | None = Field(default=None, description="contact or foot-off; events only")
-    to_s: Seconds | None = Field(default=None, description="where the event is moved")
+    to_s: AnySeconds | None = Field(default=None, description="where the event is moved")
     reason: Line | None = Field(default=None, description="why a stride is left out")
 
 

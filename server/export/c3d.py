@@ -5,6 +5,8 @@ A C3D file counts frames in 16 bits and the entries of a list in 8; a long take 
 
 from __future__ import annotations
 
+import errno
+import os
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -31,6 +33,9 @@ ENTRIES: Final = 255
 TEXT: Final = 127
 """Characters of an entry at most."""
 
+POINT_BYTES: Final = 16
+"""Of a marker or an angle in a frame: three numbers, and what is known about them."""
+
 EVENT_NAMES: Final = {"ic": ("Foot Strike", 1), "tc": ("Foot Off", 2)}
 """Kind of contact → label and icon, as motion-capture programs write them."""
 
@@ -50,7 +55,7 @@ def write_c3d(content: ExportContent) -> bytes:
 
     Raises
     ------
-    FormatError `no_c3d_library`, `export_not_possible`.
+    FormatError `no_c3d_library`, `export_not_possible`. OSError: the folder for temporary files is full.
     """
     try:
         import ezc3d
@@ -153,7 +158,11 @@ def _write_part(file: Any, content: ExportContent, found: Trajectories, first: i
     with tempfile.TemporaryDirectory(prefix="sagittal-c3d-") as folder:
         path = Path(folder) / "walk.c3d"
         file.write(str(path))
-        return path.read_bytes()
+        written = path.read_bytes()
+    # ezc3d does not tell that the disk was full
+    if len(written) < points.shape[2] * points.shape[1] * POINT_BYTES:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+    return written
 
 
 def _add_events(file: Any, content: ExportContent, events: Sequence[GaitEvent], start_s: float) -> None:

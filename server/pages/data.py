@@ -74,6 +74,7 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
     files = [] if shown is None else [(shown.id, name, blob.size) for name, blob in shown.files.items()]
     return {
         "analysis": shown,
+        "files_changed": shown is not None and this is not None and shown.recording_id != this.id,
         "archive": None if shown is None else f"/api/v1/sessions/{session_id}/archive.zip",
         "estimator": estimator_view(stored.get("estimator")),
         "sensors": sensor_checks(stored.get("agreement")),

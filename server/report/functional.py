@@ -18,7 +18,7 @@ from core.parameters.catalogue import CATALOGUE
 from core.parameters.result import Parameter
 from server.report.bundle import Bundle
 from server.report.svg import format_coordinate, stretch
-from server.report.wording import format_number, parameter_term, place_words, reason_words
+from server.report.wording import format_number, format_uncertainty, parameter_term, place_words, reason_words
 
 TOTALS: Final = (
     "tug_duration_s",
@@ -140,7 +140,7 @@ def functional_view(
     if total is None:
         return None
     term, test = parameter_term(total.name), bundle.functional
-    sure = "" if total.uncertainty is None else f"± {format_number(total.uncertainty, term.digits)}"
+    sure = "" if total.uncertainty is None else format_uncertainty(total.uncertainty, term.digits)
     return FunctionalView(
         name=total.name,
         title=CATALOGUE[total.name].label,

@@ -24,6 +24,7 @@ from server.report.wording import (
     Term,
     difference_words,
     format_number,
+    format_uncertainty,
     parameter_term,
     reason_words,
     symmetry_words,
@@ -83,7 +84,8 @@ class ParameterRow:
         norm_group : its people in words.
     comfortable : norm of people at their comfortable speed, with its figures, where `norm` is of people at
         the person's own; else None.
-    reason : words in place of all numbers, None if there is any.
+    reason : words in place of all numbers, None if there is any. side_reason : of the only side without one.
+    whole : told of the take, not of its sides.
     low_confidence : of an angle that the estimator's model gives; it has no norm. low_side : the only side of
         which that is so, empty where it is of all that have a value.
     symmetry : left against right in numbers, None unless both sides have one of enough strides.
@@ -100,6 +102,8 @@ class ParameterRow:
     difference: str | None
     reason: str | None
     scale: tuple[float, float]
+    side_reason: str | None = None
+    whole: bool = False
     norm: str | None = None
     norm_mean: float | None = None
     norm_sd: float | None = None
@@ -195,6 +199,9 @@ def _row(
     shown = None if few else shown
     usual = None if shown is None else norms.comfortable.get(name)
     usual = usual if usual is not None and usual.comparable else None
+    absent = [side for side, cell in (("left", left), ("right", right)) if cell is None]
+    side_reason = _reason_of(sides.get(absent[0])) if len(absent) == 1 and both is None else None
+    told = None if side_reason is None else f"{absent[0]} {side_reason}"
     return ParameterRow(
         name=name,
         title=title_of(name, term.label, zero),
@@ -203,9 +210,11 @@ def _row(
         both=both,
         left=left,
         right=right,
-        difference=_difference(left, right, sides, term, symmetry) if both is None and not missing else None,
-        reason=reason_words(next(iter(sides.values())).reason) if missing else None,
+        difference=told or _difference(left, right, term, symmetry),
+        reason=_reason_of(next(iter(sides.values()))) if missing else None,
         scale=term.scale,
+        side_reason=side_reason,
+        whole=None in sides,
         norm=_norm_text(shown, term),
         norm_mean=None if shown is None else shown.mean,
         norm_sd=None if shown is None else shown.sd,
@@ -244,7 +253,7 @@ def _unsure(row: ParameterRow, sides: Mapping[str | None, Parameter]) -> Paramet
         right=bare("right", row.right),
         low_confidence=True,
         low_side="" if len(unsure) > 1 else unsure[0] or "",
-        difference=None,
+        difference=None if row.side_reason is None else row.difference,
         symmetry=None,
     )
     if any(p.mean is not None for side, p in sides.items() if side not in unsure):
@@ -267,21 +276,17 @@ def _unsure(row: ParameterRow, sides: Mapping[str | None, Parameter]) -> Paramet
 
 
 def _difference(
-    left: TableCell | None,
-    right: TableCell | None,
-    sides: Mapping[str | None, Parameter],
-    term: Term,
-    symmetry: Symmetry | None,
+    left: TableCell | None, right: TableCell | None, term: Term, symmetry: Symmetry | None
 ) -> str | None:
-    """Words for left against right, or why a side has no number; None where too few strides are compared."""
-    if left is not None and right is not None:
-        if symmetry is None:
-            return None
-        same = difference_words(left.value, right.value, term)
-        return same if symmetry.clear or same == NO_DIFFERENCE else "no clear difference"
-    side = "left" if left is None else "right"
-    absent = sides.get(side)
-    return f"{side} {reason_words(None if absent is None else absent.reason)}"
+    """Words for left against right; None where too few strides are compared."""
+    if left is None or right is None or symmetry is None:
+        return None
+    same = difference_words(left.value, right.value, term)
+    return same if symmetry.clear or same == NO_DIFFERENCE else "no clear difference"
+
+
+def _reason_of(p: Parameter | None) -> str:
+    return reason_words(None if p is None else p.reason)
 
 
 def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
@@ -316,7 +321,7 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
         place.percentile,
         "" if enough else f"{p.n} {what if p.n != 1 else what.removesuffix('s')}",
         p.uncertainty,
-        "" if p.uncertainty is None else f"± {format_number(p.uncertainty, term.digits)}",
+        "" if p.uncertainty is None else format_uncertainty(p.uncertainty, term.digits),
         _known_by(p, term),
     )
 

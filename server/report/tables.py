@@ -48,7 +48,7 @@ def parameters_csv(report: ReportModel) -> bytes:
     def rows() -> Iterator[Sequence[object]]:
         for _, group in report.groups:
             for r in group:
-                cells = (("", r.both),) if r.both is not None else (("left", r.left), ("right", r.right))
+                cells = (("", r.both),) if r.whole else (("left", r.left), ("right", r.right))
                 for side, c in cells:
                     numbers = (0, None, None, None) if c is None else (c.n, c.value, c.sd, c.uncertainty)
                     norm = (r.norm_mean, r.norm_sd, r.norm_source, r.norm_group)
@@ -64,7 +64,7 @@ def parameters_csv(report: ReportModel) -> bytes:
                         *(None if r.symmetry is None else getattr(r.symmetry, what) for what in SYMMETRY),
                         *norm,
                         *usual,
-                        r.reason if c is None else None,
+                        (r.reason or r.side_reason) if c is None else None,
                         report.condition,
                     )
 

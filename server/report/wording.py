@@ -242,6 +242,16 @@ def format_number(value: float, digits: int = 0) -> str:
     return text.removeprefix("-") if float(text) == 0 else text.replace("-", "−")
 
 
+def format_uncertainty(value: float, digits: int) -> str:
+    """What a number of so many digits is known to, with up to two more digits where it would be 0.
+
+    >>> format_uncertainty(2.4, 0), format_uncertainty(0.08, 0)
+    ('± 2', '± 0.1')
+    """
+    shown = next((d for d in range(digits, digits + 3) if round(value, d)), digits)
+    return f"± {format_number(value, shown)}"
+
+
 def symmetry_words(s: Symmetry) -> str:
     """The indices of two sides with what they put first; "" for angles, whose difference says it all."""
     if s.ratio is None or s.index_pct is None or s.angle_pct is None:

@@ -15,6 +15,7 @@ from server.processes.child import enter_child
 from server.storage.blob_opening import open_blobs
 from server.storage.blob_source import open_source
 from server.storage.blobs import BlobStore, StoreAway
+from server.storage.refusal import refusal_of
 from server.worker.messages import (
     Checkpoint,
     ChildReady,
@@ -72,8 +73,11 @@ def compute(order: Order, store: BlobStore, line: Channel) -> Result | Failure:
             "The recording needs more memory than one analysis may use. Analyse a shorter part of it, or ask "
             "the administrator (SAGITTAL_CHILD_MEMORY_BYTES).",
         )
-    except Exception:
+    except Exception as error:
         log.exception("job of kind %s failed unexpectedly", order.kind)
+        refusal = refusal_of(error)
+        if refusal is not None:
+            return Failure(refusal.value, refusal.sentence)
         return Failure(
             "internal_error",
             "The analysis stopped on an error of the program, not of the recording. "

@@ -156,6 +156,16 @@ MOVE = """(rows) => new Promise((done) => {
   })"""
 
 
+def test_a_device_without_motion_is_not_asked_to_be_turned(
+    flat: Browser, running: RunningServer, clinic: Clinic
+) -> None:
+    with tablet(flat, running) as page:
+        pair(page, clinic.code)
+        page.get_by_role("button", name="This device itself").click()
+        expect(page.locator("[data-axes-say]")).to_have_text("This device sends no motion")
+        expect(page.locator("[data-go]")).to_be_disabled()
+
+
 def test_the_device_itself_is_a_sensor_after_its_self_test(
     flat: Browser, running: RunningServer, clinic: Clinic
 ) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from uuid import uuid4
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Locator, Page, Route, expect
 
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
@@ -106,6 +106,20 @@ def test_a_dragged_foot_off_changes_the_numbers_within_a_second_and_undo_brings_
     done(timeline, "undone")
     assert numbers(timeline) == before
     expect(timeline.locator("[data-undo]")).to_be_disabled()
+
+
+def test_numbers_that_no_longer_hold_are_pale_until_the_new_ones_are_there(timeline: Page) -> None:
+    held: list[Route] = []
+    timeline.route("**/timeline/numbers", lambda route: held.append(route))
+    try:
+        drag(timeline, handle(timeline, "tc"), 20)
+        expect(timeline.locator("#numbers")).to_have_css("opacity", "0.4")
+    finally:
+        for route in held:
+            route.continue_()
+        timeline.unroute("**/timeline/numbers")
+    done(timeline, "left foot-off moved")
+    expect(timeline.locator("#numbers")).to_have_css("opacity", "1")
 
 
 def test_an_event_stops_at_its_neighbour_of_the_same_foot(

@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.browser.conftest import NAME, PACED, PASSWORD, Opener, RunningServer
-from tests.browser.filling import add, add_session
+from tests.browser.filling import add, add_session, simulated_files, upload
 from tests.browser.network import Network
 from tests.data import ROOT, data_folder
 
@@ -80,6 +80,34 @@ def test_a_table_without_a_time_asks_for_it_in_words(opened: Opener, running: Ru
     page.locator("[data-rate]").fill("204.8")
     expect(said).to_have_count(0)
     expect(page.locator("[data-check]")).to_have_count(2)
+
+
+def test_a_visit_of_wrong_files_is_deleted_where_it_is_said(opened: Opener, running: RunningServer) -> None:
+    with running.client() as client:
+        patient = add(client, "/patients", code="WRONG")["id"]
+        session = add_session(client, patient, "Walk, another file")
+    page = opened(f"/sessions/{session}/upload", width=1024, height=768)
+    page.locator("[data-files]").set_input_files(
+        {"name": "notes.txt", "mimeType": "text/plain", "buffer": b"Walked well.\n"}
+    )
+    expect(page.get_by_text("These files could not be read")).to_be_visible(timeout=60_000)
+    page.get_by_role("button", name="Delete session").click()
+    page.locator("dialog[open]").get_by_role("button", name="Delete session").click()
+    page.wait_for_url(f"**/patients/{patient}")
+    with running.client() as client:
+        assert client.get(f"/api/v1/sessions/{session}").status_code == 404
+
+
+def test_why_nothing_can_be_analysed_is_said_on_a_tablet(opened: Opener, running: RunningServer) -> None:
+    with running.client() as client:
+        patient = add(client, "/patients", code="TABLET")["id"]
+        session = add_session(client, patient, "Walk, no places")
+        upload(client, session, simulated_files()[0])
+    page = opened(f"/sessions/{session}/upload", width=1024, height=768)
+    for select in page.locator("tr[data-device] select").all():
+        select.select_option("")
+    expect(page.locator("[data-analyse]")).to_be_disabled()
+    expect(page.get_by_text("0 of 7 sensors placed")).to_be_visible()
 
 
 def test_a_table_with_its_manifest_is_analysed_as_from_the_command_line(

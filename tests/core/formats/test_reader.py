@@ -121,6 +121,29 @@ def test_nothing_readable_names_what_was_tried() -> None:
     assert "a.txt" in e.value.message
 
 
+def test_one_fault_of_all_sensor_files_is_told_once() -> None:
+    empty = [source(f"take_00B40C4{i}.txt", "") for i in range(3)]
+    with pytest.raises(FormatError) as e:
+        read_recording([*empty, source("README.md", "About this take.")])
+    assert e.value.code == "empty"
+    assert e.value.message == (
+        "take_00B40C40.txt is empty; copy or export it again. The same holds of 2 other files."
+    )
+
+
+def test_faults_that_differ_are_each_told_once() -> None:
+    files = [
+        source("a.txt", ""),
+        source("b.txt", ""),
+        SourceFile.of_bytes("c.mat", b"MATLAB 5.0 MAT-file, Platform: PCWIN64"),
+    ]
+    with pytest.raises(FormatError) as e:
+        read_recording(files)
+    assert e.value.message.count("is empty") == 1
+    assert "a.txt is empty; copy or export it again. The same holds of 1 other file." in e.value.message
+    assert "c.mat is " in e.value.message
+
+
 def test_no_files_and_an_empty_zip_are_refused() -> None:
     for files in ([], [SourceFile.of_bytes("a.zip", zipped({}))]):
         with pytest.raises(FormatError) as e:

@@ -146,6 +146,7 @@ async def test_the_stored_files_stay_as_the_worker_wrote_them(clinic: Clinic, pa
         ({**move(), "to_s": CONTACT + 1.0}, 422, "event_order"),
         ({**move(), "time_s": CONTACT + 0.2}, 422, "no_such_event"),
         ({**move(), "to_s": 1000.0}, 422, "event_outside"),
+        ({**move(), "to_s": -5.0}, 422, "event_outside"),
         ({**LEAVE_OUT, "reason": None}, 422, "bad_edit"),
         ({"kind": "add_event", "side": "left", "time_s": 1.0}, 422, "bad_edit"),
         ({"kind": "forget", "side": "left", "time_s": 1.0}, 422, None),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import io
+import resource
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -69,6 +71,17 @@ def test_a_moment_without_signal_has_no_markers_and_a_left_out_stride_its_reason
     place = ours["STRIDE_REASONS"]["value"].index("manual:stumbled")
     assert ours["STRIDE_COUNTED"]["value"][place] == 0
     assert ours["STRIDE_BOUNDS_S"]["value"][:, place] == pytest.approx((cycle.start_s, cycle.end_s), abs=1e-4)
+
+
+def test_a_file_that_the_disk_cut_short_is_not_handed_out() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
+    try:
+        with pytest.raises(OSError, match=r"walk\.c3d") as e:
+            c3d.write_c3d(open_walk())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert e.value.errno == errno.ENOSPC
 
 
 def test_a_long_take_comes_in_parts_that_hold_every_event(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import inspect
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -13,13 +14,15 @@ from typing import Any, cast
 import pytest
 
 from server.jobs.queue import Claim, JobQueue, LeaseState
+from server.processes.channel import Channel
 from server.services import erasure
 from server.settings import Settings
 from server.storage.blobs import Blob, BlobStore, StoreAway
 from server.storage.db import Database
 from server.worker import worker as at
-from server.worker.messages import Checkpoint, ChildReady, Result
-from server.worker.task import TASKS
+from server.worker.child import compute
+from server.worker.messages import Checkpoint, ChildReady, Failure, Order, Result
+from server.worker.task import TASKS, Task
 
 SPACE = "0" * 32
 
@@ -126,3 +129,14 @@ def test_a_former_checkpoint_that_cannot_be_removed_stops_no_job(monkeypatch: py
     monkeypatch.setattr(erasure, "discard", discard)
     work(monkeypatch, leave)
     assert tried[:2] == ["discard", "looked again"]
+
+
+def test_a_full_disk_is_no_error_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(*rest: object) -> dict[str, bytes]:
+        raise OSError(errno.ENOSPC, "No space left on device", "walk.c3d")
+
+    monkeypatch.setitem(TASKS, "told", Task("told", run, lambda *rest: None, keeps_files=False))
+    found = compute(Order("told", None, [], {}), cast("BlobStore", None), cast("Channel", None))
+    assert isinstance(found, Failure)
+    assert (found.code, found.passing) == ("disk_full", False)
+    assert "disk is full" in found.message

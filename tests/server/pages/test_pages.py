@@ -12,7 +12,7 @@ from core.body.model import NOMINAL_HEIGHT_M
 from core.online.calibrating import CalibratingParams
 from server.pages.charts import draw_chart
 from server.report.panels import CurvePanel
-from server.services import analyses
+from server.services import analyses, recordings
 from tests.data import ROOT
 from tests.server import analysed
 from tests.server.clinic import Clinic
@@ -133,6 +133,25 @@ async def test_the_session_page_does_not_repeat_what_the_upload_page_said_of_fil
     assert [n["code"] for n in notices if f"{n['code']} was told." in html] == ["gap"]
     _, session = await visit(clinic, "Q-FILES-2", warnings=notices[:-1])
     assert 'class="badge ok"' in await page(clinic, f"/sessions/{session}")
+
+
+async def test_files_that_were_changed_after_the_analysis_are_not_taken_for_its_own(clinic: Clinic) -> None:
+    _, session = await visit(clinic, "CHANGED")
+    path, note = f"/sessions/{session}", "The files were changed after this analysis"
+    assert note not in await page(clinic, path)
+    assert "exactly as uploaded" in await page(clinic, f"{path}/data")
+    async with clinic.client("clinician") as client:
+        put = await client.put(f"/api/v1{path}/files/walk.txt", content=b"another one")
+        asked = await client.post(f"/api/v1{path}/inspections")
+    assert (put.status_code, asked.status_code) == (201, 202)
+    assert "Changed files are read" in await page(clinic, path)
+    queue = clinic.app.state.queue
+    claim = queue.claim("test", [recordings.INSPECT])
+    assert queue.finish(claim, lambda c: None)
+    assert note in await page(clinic, path)
+    told = await page(clinic, f"{path}/data")
+    assert "changed after this analysis; what it was made from is in the archive" in told
+    assert "exactly as uploaded" not in told
 
 
 async def test_the_numbers_after_an_edit_are_no_page_of_their_own(clinic: Clinic) -> None:

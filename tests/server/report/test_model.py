@@ -142,6 +142,14 @@ def test_a_large_number_says_what_each_side_is_known_to() -> None:
     assert _plus_minus(found) == ""
 
 
+def test_no_number_is_known_to_nothing() -> None:
+    (found,) = parameter_rows(
+        [Parameter("cadence_spm", None, 4000, 111.2, 1.9, "steps/min", uncertainty=0.08)]
+    )
+    assert found.both is not None
+    assert (found.both.text, found.both.plus_minus) == ("111", "± 0.1")
+
+
 def test_a_missing_number_gives_its_reason_never_zero() -> None:
     both = rows_of(
         of("stance_pct", "left", None, "no_terminal_contact"),
@@ -153,6 +161,36 @@ def test_a_missing_number_gives_its_reason_never_zero() -> None:
     assert one.reason is None
     assert one.right is None
     assert one.difference == "right not measured: no stride of this side counts"
+
+
+def test_a_side_withheld_beside_an_estimated_one_says_why() -> None:
+    name = "knee_flexion_min_stance_deg"
+    left = Parameter(name, "left", 9, 4.8, 5.6, "deg", estimated=True)
+    right = Parameter(name, "right", 0, None, None, "deg", "at_bound", estimated=True)
+    (found,) = parameter_rows((left, right))
+    assert found.side_reason == "withheld: the leg model's knee rests on its limit"
+    assert found.difference == f"right {found.side_reason}"
+    assert (found.low_confidence, found.reason) == (True, None)
+
+
+def test_the_csv_says_why_a_side_has_no_number_and_keeps_the_rows_of_the_whole_take(bundle: Bundle) -> None:
+    rows = parameter_rows(
+        (
+            of("stance_pct", "left", 62.0),
+            of("stance_pct", "right", None, "no_strides"),
+            of("pci_pct", None, None, "few_strides"),
+        )
+    )
+    model = replace(report_model(bundle, age=40, speed_mps=1.2), groups=(("", rows),))
+    told = [
+        (r["name"], r["side"], r["mean"] == "", r["reason"] == "")
+        for r in csv.DictReader(io.StringIO(parameters_csv(model).decode()))
+    ]
+    assert sorted(told) == [
+        ("pci_pct", "", True, False),
+        ("stance_pct", "left", False, True),
+        ("stance_pct", "right", True, False),
+    ]
 
 
 def test_an_unknown_parameter_is_shown_under_its_own_name() -> None:

@@ -282,6 +282,7 @@ class TakeTimeline extends HTMLElement {
 
   // The numbers are written by the server, as on the other pages.
   async numbers() {
+    document.getElementById("numbers").setAttribute("aria-busy", "true"); // until others stand there they do not hold
     const answer = await fetch(`/sessions/${this.session}/timeline/numbers`, { credentials: "same-origin", headers: { "X-Sagittal-Fragment": "numbers" } });
     if (!answer.ok) throw { title: speak`The numbers could not be loaded`, detail: speak`Load the page again.` };
     const page = new DOMParser().parseFromString(await answer.text(), "text/html");

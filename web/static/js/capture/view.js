@@ -97,6 +97,9 @@ export class View {
       set(this.part("axes-say"), speak`The axes of this device are checked`);
       const fit = Math.max(1, Math.round(axes.errorDeg));
       set(this.part("axes-more"), speak`Turning it agreed with gravity within ${fit}°. This is remembered until the browser changes.`);
+    } else if (source.isMute()) {
+      set(this.part("axes-say"), speak`This device sends no motion`);
+      set(this.part("axes-more"), speak`Use a phone or a tablet with a motion sensor, or choose another source.`);
     } else if (test.problem) {
       set(this.part("axes-say"), speak`The check did not work`);
       set(this.part("axes-more"), test.problem);

@@ -4,7 +4,7 @@ import { RateMeter } from "./rate.js";
 import { speak } from "../../common/words.js";
 
 const BATCH_S = 0.05;
-const SILENT_S = 1;
+const SILENT_S = 1, MUTE_S = 5;
 const ID_KEY = "sagittal.capture.device", AXES_KEY = "sagittal.capture.axes";
 
 export function whyNot() {
@@ -43,6 +43,7 @@ export class DeviceMotion {
     const axes = remembered(AXES_KEY);
     this.axes = axes?.browser === navigator.userAgent ? axes : null;
     if (!this.axes) this.check();
+    this.addedMs = performance.now();
     addEventListener("devicemotion", this.hear);
     this.onchange();
   }
@@ -53,6 +54,9 @@ export class DeviceMotion {
     this.test = new AxesTest();
     this.onchange();
   }
+
+  // It was listened to for some seconds and has said nothing: a computer without a motion sensor.
+  isMute() { return this.sensors[0].meter.silentS() === null && performance.now() - this.addedMs > 1000 * MUTE_S; }
 
   take(event) {
     const a = event.accelerationIncludingGravity, r = event.rotationRate;
