@@ -127,7 +127,7 @@ def rate_confidence(found: Mapping[str, GaitEvents], params: ConsensusParams | N
                 # a cluster begins with the lead's contact where it has one
                 if votes[0].detector == name:
                     shares[side, kind, votes[0].time_s] = len(votes) / len(voters)
-    events = tuple(replace(e, confidence=shares.get((e.side, e.kind, e.time_s))) for e in lead.events)
+    events = tuple(e.rate(shares.get((e.side, e.kind, e.time_s))) for e in lead.events)
     return replace(lead, events=events, notices=tuple(notices))
 
 

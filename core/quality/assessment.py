@@ -12,7 +12,7 @@ import numpy as np
 from core.errors import Notice
 from core.frames import GRAVITY, Segment
 from core.quality.inspection import measure_losses
-from core.quality.signals import magnetic_share, measure_signal, saturation
+from core.quality.signals import magnetic_share, measure_stream, saturation
 from core.quality.suspicion import list_suspicions
 from core.recording import Recording, SensorSignals, UniformRecording
 from core.rest import RestParams, Window, find_rest_windows, find_runs, index_window
@@ -201,7 +201,7 @@ def _sensor(
     params: QualityParams,
 ) -> tuple[SensorQuality, list[Notice]]:
     stream = recording.streams[signals.device_id]
-    f = measure_signal(stream.acc, stream.gyr, stream.rate_hz)
+    f = measure_stream(stream)
     notices = list_suspicions(signals.device_id, f, stream.acc, stream.quat)
     lost, longest = measure_losses(stream)
     gaps = find_runs(~signals.valid | signals.interpolated)

@@ -10,7 +10,7 @@ import numpy as np
 from core.errors import Notice
 from core.formats.aliases import segment_in
 from core.frames import Segment
-from core.quality.signals import measure_signal
+from core.quality.signals import measure_signal, measure_stream
 from core.quality.suggestion import Suggestion, suggest
 from core.quality.suspicion import list_suspicions
 from core.recording import ImuStream, Recording, Subject
@@ -192,7 +192,7 @@ def _device(
     suggestion: Suggestion,
     duplicate_of: str | None,
 ) -> DeviceFacts:
-    f = measure_signal(s.acc, s.gyr, s.rate_hz)
+    f = measure_stream(s)
     lost, longest = measure_losses(s)
     notices = [*s.notices, *list_suspicions(s.device_id, f, s.acc, s.quat)]
     if duplicate_of is not None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from core.frames import GRAVITY, Floats
+from core.recording import ImuStream
 from core.rest import find_runs
 
 STILL: Final = 0.03
@@ -52,6 +54,16 @@ class Facts:
     median_norm: float
     acc_std: float
     gyro_top: float | None
+
+
+_known: Final = WeakKeyDictionary[ImuStream, Facts]()
+
+
+def measure_stream(stream: ImuStream) -> Facts:
+    """Measure a sensor as it was read; asked again of the same stream nothing is measured again."""
+    if stream not in _known:
+        _known[stream] = measure_signal(stream.acc, stream.gyr, stream.rate_hz)
+    return _known[stream]
 
 
 def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
