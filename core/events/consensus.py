@@ -11,7 +11,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -70,8 +70,7 @@ class ConsensusParams:
             )
 
 
-@dataclass(frozen=True)
-class _Vote:
+class _Vote(NamedTuple):
     detector: str
     time_s: float
     detected_s: float

@@ -18,7 +18,7 @@ from core.parameters.kinematic import read_cycles
 from core.parameters.result import CycleCurves, Parameter
 from core.quality import concern_paths_alone, find_shown_level
 from core.quality.devices import check_device, is_serial
-from core.scores import CurveMeans, Scores, score_curves
+from core.scores import CurveMeans, Scores, ScoreSpread, score_curves
 from server.report.columns import SCHEMA, list_turns, reduce_to_plain
 from server.report.estimator import list_estimated_variables
 
@@ -164,7 +164,11 @@ def _summarise_curves(analysis: TakeAnalysis) -> dict[str, object]:
 def score_rows(found: Scores) -> list[dict[str, object]]:
     """Profiles and indices as JSON; what belongs to one curve is left out."""
     return [
-        {name: reduce_to_plain(value) for name, value in asdict(s).items() if name != "variable"}
+        {
+            name: reduce_to_plain(asdict(value) if isinstance(value, ScoreSpread) else value)
+            for name, value in vars(s).items()
+            if name != "variable"
+        }
         for s in found.scores
         if s.variable is None
     ]
