@@ -162,27 +162,33 @@ def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
 LINES: Final = 4096
 """Rows of a table that are written together."""
 
+WORDS: Final = frozenset({str, type(None)})
+
 NUMBERS: Final = frozenset({float, type(None), np.float64})
 
 UNSURE: Final = 1e-3
 """A number so close to half a millionth, in millionths, is rounded as text: its product is off by 1e-4."""
 
-LARGE: Final = 1e12
-"""From so many millionths on all are."""
+LARGE: Final = 1e6
+"""From here on all are."""
 
 
 def _cells(column: Sequence[object]) -> list[object]:
     """What stands in a column; a number as Python's `round` has it."""
-    if not NUMBERS.issuperset(map(type, column)):
+    kinds = set(map(type, column))
+    if kinds <= WORDS:
+        written = {word: _cell(word) for word in set(column)}
+        return [written[word] for word in column]
+    if not kinds <= NUMBERS:
         return [_cell(value) for value in column]
     values = np.array(column, np.float64)
-    with np.errstate(invalid="ignore", over="ignore"):
-        millionths = 1e6 * values
-        whole = np.rint(millionths)
-        sure = (np.abs(np.abs(millionths - whole) - 0.5) > UNSURE) & (np.abs(millionths) < LARGE)
+    small = np.abs(values) < LARGE
+    millionths = 1e6 * np.where(small, values, 0.0)
+    whole = np.rint(millionths)
     cells: list[object] = (whole / 1e6 + 0.0).tolist()
-    for k in np.flatnonzero(~sure).tolist():
-        cells[k] = _cell(column[k])
+    for k in np.flatnonzero(~small | (np.abs(np.abs(millionths - whole) - 0.5) < UNSURE)).tolist():
+        value = column[k]
+        cells[k] = "" if value is None else _cell(value)
     return cells
 
 
