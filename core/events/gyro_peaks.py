@@ -203,9 +203,9 @@ class _Course:
 
     def __init__(self, rate: Floats, valid: Bools) -> None:
         self.rate = rate
-        self._lows = _minima(rate).tolist()
-        self._below = np.flatnonzero(rate <= 0.0).tolist()
-        self._lost = np.flatnonzero(~valid).tolist()
+        self._lows: list[int] = _minima(rate).tolist()
+        self._below: list[int] = np.flatnonzero(rate <= 0.0).tolist()
+        self._lost: list[int] = np.flatnonzero(~valid).tolist()
 
     def find_lows(self, start: int, end: int) -> list[int]:
         """Local minima between two samples, neither of which can be one."""

@@ -120,7 +120,8 @@ def step_times(
         found = best >= 0
         step_s[part][found] = lag[best[found]] / rate_hz
         score[part][found] = scores[found, best[found]]
-    return Periodicity((hop * np.arange(len(score)) + 0.5 * width) / rate_hz, step_s, score)
+    middles = (hop * np.arange(len(score)) + 0.5 * width) / rate_hz
+    return Periodicity(np.asarray(middles), step_s, score)
 
 
 def _list_lags(width: int, rate_hz: float, params: PeriodicityParams) -> NDArray[np.int64]:

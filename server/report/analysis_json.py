@@ -14,11 +14,12 @@ from core.body.health import find_worst_verdict
 from core.body.model import LENGTHS
 from core.frames import SEGMENTS, Floats, Side
 from core.norms.controls import mean_curves
+from core.norms.profile import ScoreSpread
 from core.parameters.kinematic import read_cycles
 from core.parameters.result import CycleCurves, Parameter
 from core.quality import concern_paths_alone, find_shown_level
 from core.quality.devices import check_device, is_serial
-from core.scores import CurveMeans, Scores, ScoreSpread, score_curves
+from core.scores import CurveMeans, Scores, score_curves
 from server.report.columns import SCHEMA, list_turns, reduce_to_plain
 from server.report.estimator import list_estimated_variables
 
