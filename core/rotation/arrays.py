@@ -60,7 +60,7 @@ def find_vertical(q: Floats) -> Floats:
     """Where the z axis of the world points in bodies (n, 3), from q (n, 4): as `rotate`, to the bit."""
     w, x, y, z = _components(np.asarray(q, np.float64))
     a, b = -2.0 * y, 2.0 * x
-    return np.stack((w * a + z * b, w * b - z * a, 1.0 + (y * a - x * b)), axis=-1)
+    return np.stack((0.0 + w * a + z * b, 0.0 + w * b - z * a, 1.0 + (y * a - x * b)), axis=-1)
 
 
 def to_matrix(q: Floats) -> Floats:

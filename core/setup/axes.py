@@ -123,8 +123,8 @@ def _list_windows(signals: SensorSignals, quiet: Bools, rate_hz: float, params: 
 
 def _moves(signals: SensorSignals, window: _Window, params: SetupParams) -> bool:
     """A gyroscope in the wrong unit may seem not to turn: a force that shakes counts too."""
-    rate = np.sqrt((signals.gyr[window.order][window.part] ** 2).sum(axis=1).mean())
-    shaking = np.linalg.norm(signals.acc[window.order][window.part], axis=1).std()
+    gyr, acc = (signals.cut(name, window.order)[window.part] for name in ("gyr", "acc"))
+    rate, shaking = np.sqrt((gyr**2).sum(axis=1).mean()), np.linalg.norm(acc, axis=1).std()
     return bool(rate > params.least_rate or shaking > SHAKING)
 
 
@@ -146,13 +146,13 @@ class _Walk:
 
 
 def _list_walks(signals: SensorSignals, windows: list[_Window], bias: Floats) -> list[_Walk]:
-    acc, gyr = signals.acc, signals.gyr
     walks = []
     for window in windows:
         step = -1.0 if window.order.step else 1.0
-        rate, force = step * (gyr[window.order] - bias), np.ascontiguousarray(acc[window.order])
+        rate = step * (signals.cut("gyr", window.order) - bias)
+        force = np.ascontiguousarray(signals.cut("acc", window.order))
         weights = np.hanning(window.part.stop - window.part.start + 2)[1:-1]
-        level = acc[window.still].mean(axis=0)
+        level = signals.cut("acc", window.still).mean(axis=0)
         walks.append(_Walk(rate, force, window.part, weights, level))
     return walks
 

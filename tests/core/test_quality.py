@@ -11,7 +11,7 @@ import pytest
 from core.formats import SourceFile, manifest_of, read_recording
 from core.frames import GRAVITY, Floats, Segment
 from core.quality import QualityReport, assess, concern_paths_alone, describe, suggest, suggest_segments
-from core.quality.signals import magnetic_share, measure_signal, saturation
+from core.quality.signals import magnetic_share, measure_signal, measure_stream, saturation
 from core.recording import ImuStream, Recording
 from core.rotation import about
 from core.simulate import simulate_scenario
@@ -368,3 +368,11 @@ def test_two_sensors_that_name_their_side_alone_are_taken_for_the_feet() -> None
         assert set(
             suggest_segments(Recording({d: stream(d, ACC, GYR) for d in devices}, segments={})).values()
         ) == {None}
+
+
+def test_a_stream_is_measured_once() -> None:
+    one = stream("a", ACC, GYR)
+    facts = measure_stream(one)
+    assert facts == measure_signal(one.acc, one.gyr, one.rate_hz)
+    assert measure_stream(one) is facts
+    assert measure_stream(stream("a", 2.0 * ACC, GYR)) != facts
