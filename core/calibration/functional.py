@@ -30,7 +30,7 @@ from core.errors import CalibrationError, Notice
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from core.recording import UniformRecording
 from core.rest import find_runs
-from core.rotation import find_vertical
+from core.rotation import find_lengths, find_vertical
 
 FunctionalMethod = Literal["hip_swing", "trunk_bow"]
 FUNCTIONAL: Final[tuple[FunctionalMethod, ...]] = ("hip_swing", "trunk_bow")
@@ -203,7 +203,7 @@ def _average(recording: UniformRecording, segments: Sequence[Segment], seconds: 
     """Mean |ω| (n,) of some sensors over a window around each sample, rad/s."""
     from scipy.ndimage import uniform_filter1d
 
-    rate = np.mean([np.linalg.norm(recording.sensors[s].gyr, axis=1) for s in segments], axis=0)
+    rate = np.mean([find_lengths(recording.sensors[s].gyr) for s in segments], axis=0)
     width = max(1, min(round(seconds * recording.rate_hz), len(rate)))
     return np.asarray(uniform_filter1d(rate, width, mode="nearest"))
 

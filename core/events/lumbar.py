@@ -28,6 +28,7 @@ from core.frames import Bools, Floats, Segment, Side
 from core.peaks import find_peaks
 from core.recording import SensorSignals, UniformRecording
 from core.rest import STANDING, find_rest_windows, find_runs
+from core.rotation import find_lengths
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 
@@ -189,7 +190,7 @@ def _split_along(signals: SensorSignals, up: Floats, norm: Floats) -> tuple[Floa
 def _mean_up(signals: SensorSignals, rate_hz: float, params: LumbarParams) -> tuple[Floats, Floats]:
     """Where up is (n, 3), sensor axes, and the mean specific force (n,) along it, m/s²."""
     force = np.stack([smooth_gaussian(a, params.up_s * rate_hz) for a in signals.acc.T], axis=1)
-    norm = np.maximum(np.linalg.norm(force, axis=1), 1e-9)
+    norm = np.maximum(find_lengths(force), 1e-9)
     return force / norm[:, None], norm
 
 

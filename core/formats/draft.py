@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from core.errors import FormatError, Notice
 from core.frames import Floats, Segment
+from core.held_samples import is_complete
 from core.recording import ImuStream
 
 WRAP_16: Final = 1 << 16
@@ -75,7 +76,7 @@ def make_draft(
     ------
     FormatError `missing_acc`.
     """
-    if not np.isfinite(acc).all(axis=1).any():
+    if not is_complete(acc).any():
         raise FormatError(
             "missing_acc",
             f"{source}: the acceleration of {device} holds no numbers; export it again with acceleration.",
@@ -197,7 +198,7 @@ def _in_order(d: Draft) -> Draft:
             t_s=t,
         )
     keep = np.flatnonzero(good)[rising]
-    if not np.isfinite(d.acc[keep]).all(axis=1).any():
+    if not is_complete(d.acc[keep]).any():
         raise FormatError(
             "empty",
             f"{d.source} has no row with both a valid counter and a complete acceleration; export it again.",

@@ -24,6 +24,7 @@ from core.formats.draft import signal_digest
 from core.formats.json_tree import read_json
 from core.formats.source import SourceFile
 from core.frames import Floats, Protocol, Segment
+from core.held_samples import is_complete
 from core.recording import ImuStream, Recording, Subject
 from core.sample_blocks import LongStream, SampleBlock
 from core.shoe import Shoe
@@ -273,11 +274,11 @@ def _recording(file: pq.ParquetFile, info: Mapping[str, object], source: str) ->
             raise KeyError(f"{device}.acc")
         known = [_read_notice(n) for n in _list(sensor["notices"])]
         known += _clear_infinite(device, signals)
-        if not np.isfinite(acc).all(axis=1).any():
+        if not is_complete(acc).any():
             message = f"{device} in {source} holds no acceleration; results that need it are left out."
             notices.append(Notice("sensor_missing", message, device))
             continue
-        if (gyr := signals["gyr"]) is not None and not np.isfinite(gyr).all(axis=1).any():
+        if (gyr := signals["gyr"]) is not None and not is_complete(gyr).any():
             signals["gyr"] = None
             message = f"{device} in {source} holds no angular rate; it cannot be used for orientations."
             known.append(Notice("missing_gyro", message, device))
@@ -329,8 +330,9 @@ def _clear_infinite(device: str, signals: Mapping[str, Floats | None]) -> list[N
         signal = signals[kind]
         if signal is not None:
             wrong = np.isinf(signal)
-            count += int(np.count_nonzero(wrong.any(axis=1)))
-            signal[wrong] = np.nan
+            if wrong.any():
+                count += int(np.count_nonzero(wrong.any(axis=1)))
+                signal[wrong] = np.nan
     message = f"{count} samples of {device} are infinite and count as lost."
     return [Notice("not_finite", message, device)] if count else []
 

@@ -16,6 +16,7 @@ from core.quality.signals import magnetic_share, measure_stream, saturation
 from core.quality.suspicion import list_suspicions
 from core.recording import Recording, SensorSignals, UniformRecording
 from core.rest import RestParams, Window, find_rest_windows, find_runs, index_window
+from core.rotation import find_lengths
 
 Level = Literal["good", "usable", "poor"]
 """Best first."""
@@ -211,7 +212,7 @@ def _sensor(
     at_rest &= signals.valid
     norm = bias = None
     if at_rest.any():
-        norm = float(np.median(np.linalg.norm(signals.acc[at_rest], axis=1)))
+        norm = float(np.median(find_lengths(signals.acc[at_rest])))
         bias = float(np.linalg.norm(signals.gyr[at_rest].mean(axis=0)))
     invalid = float(np.mean(~signals.valid))
     notices += _gap_notice(segment, signals, uniform, invalid, params)

@@ -77,7 +77,7 @@ def test_quietness_is_of_the_window_around_each_sample(width: int) -> None:
     signals = replace(signals, valid=np.arange(n) != 300)
     found = measure_quietness(signals, RATE, RestParams(window_s=width / RATE))
     windows = sliding_window_view(signals.gyr, width, axis=0)
-    whole = sliding_window_view(signals.valid, width).all(axis=1)
+    whole = np.asarray(sliding_window_view(signals.valid, width).all(axis=1))
     spread = np.where(whole, windows.var(axis=2).sum(axis=1), np.inf)
     offset = windows[np.argmin(spread)].mean(axis=1)
     rate = sliding_window_view(np.linalg.norm(signals.gyr - offset, axis=1), width)
