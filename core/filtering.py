@@ -57,9 +57,10 @@ WIDTHS: Final = 4.0
 """Standard deviations at which a Gaussian ends."""
 
 LEAST_PIECE: Final = 4096
-"""Samples that are smoothed together, or so many reaches of the Gaussian as `REACHES`."""
+"""Samples that are smoothed together, or more where the Gaussian is wide:"""
 
 REACHES: Final = 8
+"""so many times as far as it reaches, since twice of it are lost to what a spectrum wraps round."""
 
 
 def smooth_gaussian(x: Floats, sd: float) -> Floats:

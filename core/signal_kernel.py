@@ -130,19 +130,3 @@ def measure_windows(x, width, mean, sd):  # type: ignore[no-untyped-def]
     last = n - width + half
     for k in range(last + 1, n):
         mean[k], sd[k] = mean[last], sd[last]
-
-
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
-def write_moving_mean(x, width, out):  # type: ignore[no-untyped-def]
-    """Write the means (n − width + 1,) of every full window of x (n,), summed about the mean of all."""
-    centre = 0.0
-    for k in range(len(x)):
-        centre += x[k]
-    centre /= len(x)
-    before = until = 0.0
-    for k in range(len(x)):
-        until += x[k] - centre
-        i = k - width + 1
-        if i >= 0:
-            out[i] = (until - before) / width + centre
-            before += x[i] - centre

@@ -184,14 +184,10 @@ def magnetic_share(mag: Floats, still: slice, limit: float) -> float | None:
 
 def _moving_mean(x: Floats, width: int) -> Floats:
     """Means (n − width + 1,) of every full window of x (n,)."""
-    # readers of results do without numba
-    from core.signal_kernel import write_moving_mean
-
-    mean = np.empty(len(x) - width + 1)
-    write_moving_mean(x, width, mean)
-    return mean
-
-
-def compile_moving_mean() -> None:
-    """Compile what `measure_signal` calls or load it, so that the first take does not wait for it."""
-    _moving_mean(np.zeros(1), 1)
+    centre = np.cumsum(x)[-1] / len(x)
+    total = np.zeros(len(x) + 1)
+    np.cumsum(x - centre, out=total[1:])
+    mean = total[width:] - total[:-width]
+    mean /= width
+    mean += centre
+    return np.asarray(mean)

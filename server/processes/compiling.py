@@ -20,7 +20,6 @@ OFFLINE: Final[tuple[Order, Order]] = (
     (("core.body.estimate", "compile_erkf_kernels"),),
     (
         ("core.fusion.attitude", "compile_attitude_kernel"),
-        ("core.quality.signals", "compile_moving_mean"),
         ("core.quality.stuck", "compile_stuck_kernel"),
         ("core.agreement.slips", "compile_agreement_kernels"),
         ("core.angles.kernel", "compile_angle_kernel"),

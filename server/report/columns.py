@@ -166,7 +166,7 @@ def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
     return text.getvalue().encode()
 
 
-LINES: Final = 4096
+LINES: Final = 1024
 """Rows of a table that are written together."""
 
 WORDS: Final = frozenset({str, type(None)})
