@@ -1,7 +1,7 @@
 """Zero-phase low-pass of whole signals.
 
-It is what SciPy's `butter` and `sosfiltfilt` give, to the bit. That package brings statistics, optimisation
-and interpolation along, 50 MB and half a second in every process that analyses.
+`low_pass` is what SciPy's `butter` and `sosfiltfilt` give, to the bit. That package brings statistics,
+optimisation and interpolation along, 50 MB and half a second in every process that analyses.
 """
 
 from __future__ import annotations
@@ -51,3 +51,36 @@ def low_pass(x: Floats, cutoff_hz: float, rate_hz: float, pad: int | None = None
     found = np.empty(rows.shape)
     filter_both_ways(rows, *_design(cutoff_hz, rate_hz), reach, np.empty(n + 2 * reach), found)
     return found.reshape(x.shape)
+
+
+WIDTHS: Final = 4.0
+"""Standard deviations at which a Gaussian ends."""
+
+LEAST_PIECE: Final = 4096
+"""Samples that are smoothed together, or more where the Gaussian is wide:"""
+
+REACHES: Final = 8
+"""so many times as far as it reaches, since twice of it are lost to what a spectrum wraps round."""
+
+
+def smooth_gaussian(x: Floats, sd: float) -> Floats:
+    """Gaussian mean of x (n,), n ≥ 1, the ends held: SciPy's `gaussian_filter1d`, mode "nearest", to 1e-15.
+
+    SciPy adds up 1600 products for each sample where `sd` is 200 samples; here pieces go by way of their
+    spectra. A sample that is no number spoils its piece, and no more.
+
+    Parameters
+    ----------
+    sd : of the Gaussian, samples.
+    """
+    reach = int(WIDTHS * sd + 0.5)
+    bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sd) ** 2)
+    size = 1 << (max(LEAST_PIECE, REACHES * reach) - 1).bit_length()
+    spectrum = np.fft.rfft(bell / bell.sum(), size)
+    held = np.pad(x, reach, mode="edge")
+    found, step = np.empty(len(x)), size - 2 * reach
+    for first in range(0, len(x), step):
+        # the first 2 reach samples of a piece have the end of it mixed in
+        piece = np.fft.irfft(np.fft.rfft(held[first : first + size], size) * spectrum, size)[2 * reach :]
+        found[first : first + step] = piece[: len(x) - first]
+    return found

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Final, Protocol, Self, TypeVar
 
 import numpy as np
 
-from core.frames import Floats
+from core.frames import Bools, Floats
 
 Held = TypeVar("Held", bound="HoldsSamples")
 
@@ -49,6 +49,14 @@ def compare_neighbours(x: Floats, of: Callable[[Floats, Floats], Floats]) -> Flo
     for part in cut_blocks(len(found)):
         found[part] = of(x[part], x[part.start + 1 : part.stop + 1])
     return found
+
+
+def is_complete(x: Floats) -> Bools:
+    """Rows (n,) of x (n, c) without a missing value; NumPy's loop over so few takes ten times as long."""
+    good = np.isfinite(x[:, 0])
+    for axis in range(1, x.shape[1]):
+        good &= np.isfinite(x[:, axis])
+    return np.asarray(good, np.bool_)
 
 
 def make_room(rows: int, *more: int, kind: type[np.floating[Any]] = np.float64) -> Any:

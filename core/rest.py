@@ -8,9 +8,8 @@ gyroscope.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
 from math import radians
 from typing import Final, TypeVar
 
@@ -73,40 +72,22 @@ def measure_quietness(signals: SensorSignals, rate_hz: float, params: RestParams
     if len(signals.valid) < width:
         never = np.full(len(signals.valid), np.inf)
         return Quietness(never, never, np.zeros(len(signals.valid), bool))
-    # axis by axis: all at once are as large again as the take
-    rate, force = (partial(_read_axis, signals, name) for name in ("gyr", "acc"))
-    whole = _moving_mean(signals.valid.astype(np.float64), width) > 1 - 0.5 / width
-    offset = _steadiest_rate(rate, whole, width)
-    if np.linalg.norm(offset) > params.gyro_limit:
-        offset = np.zeros(3)
-    gyro = _moving_mean(np.sqrt(_sum_axes(lambda k: (rate(k) - offset[k]) ** 2)), width)
-    norm = np.sqrt(_sum_axes(lambda k: force(k) ** 2))
+    # readers of results do without numba
+    from core.signal_kernel import find_steadiest_rate, measure_norms, measure_windows
+
+    n, zero = len(signals.valid), np.zeros(3)
+    whole, offset, norm = np.empty(n - width + 1, np.bool_), np.empty(3), np.empty(n)
+    rate = _lock(signals.gyr)
+    find_steadiest_rate(rate, _lock(signals.valid), width, whole, offset)
+    measure_norms(rate, zero if np.linalg.norm(offset) > params.gyro_limit else offset, norm)
+    del rate
+    gyro, acc, unused = np.empty(n), np.empty(n), np.empty(n)
+    measure_windows(norm, width, gyro, unused)
+    measure_norms(_lock(signals.acc), zero, norm)
     norm -= norm.mean()
-    acc = np.sqrt(np.maximum(_moving_mean(norm**2, width) - _moving_mean(norm, width) ** 2, 0.0))
-    quiet = whole & (gyro < params.gyro_limit) & (acc < params.acc_std_limit)
-    n = len(norm)
-    return Quietness(_centred(gyro, n, width), _centred(acc, n, width), _centred(quiet, n, width))
-
-
-def _steadiest_rate(rate: Callable[[int], Floats], whole: Bools, width: int) -> Floats:
-    """Mean rate (3,) of the whole window in which it varies least; `rate` gives an axis (n,)."""
-    mean = np.empty((3, len(whole)))
-    for axis in range(3):
-        mean[axis] = _moving_mean(rate(axis), width)
-    spread = _sum_axes(lambda k: _moving_mean(rate(k) ** 2, width) - mean[k] ** 2)
-    return mean[:, int(np.argmin(np.where(whole, spread, np.inf)))].copy()
-
-
-def _read_axis(signals: SensorSignals, name: str, axis: int) -> Floats:
-    return np.array(signals.held(name)[:, axis], np.float64)
-
-
-def _sum_axes(of_axis: Callable[[int], Floats]) -> Floats:
-    """Sum (n,) over the three axes of what is given for each, in their order."""
-    total = of_axis(0)
-    total += of_axis(1)
-    total += of_axis(2)
-    return total
+    measure_windows(norm, width, unused, acc)
+    quiet = (gyro < params.gyro_limit) & (acc < params.acc_std_limit) & _centred(whole, n, width)
+    return Quietness(gyro, acc, quiet)
 
 
 def find_rest_windows(
@@ -178,16 +159,20 @@ def index_window(window: Window, rate_hz: float) -> slice:
     return slice(max(0, round(window[0] * rate_hz)), max(0, round(window[1] * rate_hz)))
 
 
-def _moving_mean(x: Floats, width: int) -> Floats:
-    """Means (..., n − width + 1) of every full window of x (..., n)."""
-    total = np.zeros((*x.shape[:-1], x.shape[-1] + 1))
-    np.cumsum(x, axis=-1, out=total[..., 1:])
-    mean = total[..., width:] - total[..., :-width]
-    mean /= width
-    return np.asarray(mean)
+def _lock(x: A) -> A:
+    """The same array as a kernel takes it, which is compiled once: contiguous, not to be written."""
+    locked = np.ascontiguousarray(x).view()
+    locked.setflags(write=False)
+    return locked
 
 
-def _centred(x: A, n: int, width: int) -> A:
+def _centred(x: Bools, n: int, width: int) -> Bools:
     """Place full-window values at the window centres of an axis of n samples, borders held."""
     index = np.clip(np.arange(n) - width // 2, 0, len(x) - 1)
     return x[index]
+
+
+def compile_rest_kernels() -> None:
+    """Compile what `measure_quietness` calls or load it, so that the first take does not wait for it."""
+    valid = np.ones(2, np.bool_)
+    measure_quietness(SensorSignals("", np.zeros((2, 3)), np.zeros((2, 3)), None, valid, ~valid), 1.0)

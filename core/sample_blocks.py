@@ -9,10 +9,9 @@ import datetime as dt
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from core.errors import Notice
 from core.frames import Floats
+from core.held_samples import is_complete
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +52,9 @@ class LongStream:
 
 def find_complete_rows(block: SampleBlock) -> SampleBlock:
     """The rows of a block in which every channel was measured."""
-    good = np.isfinite(block.acc).all(axis=1)
+    good = is_complete(block.acc)
     if block.gyr is not None:
-        good = good & np.isfinite(block.gyr).all(axis=1)
+        good = good & is_complete(block.gyr)
     if good.all():
         return block
     return SampleBlock(block.t_s[good], block.acc[good], None if block.gyr is None else block.gyr[good])

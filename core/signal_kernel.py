@@ -1,10 +1,13 @@
-"""Compiled loops of `core.filtering` and `core.peaks`: over a row forwards and backwards, and over its tops.
+"""Compiled loops of `core.filtering`, `core.peaks` and `core.rest`: over a row forwards and backwards, over
+its tops, and over what a sensor measured in the window around every sample.
 
 The filtered numbers are those of SciPy's `sosfiltfilt` to the bit, in a third of its time and without its
 five copies.
 """
 
 from __future__ import annotations
+
+from math import sqrt
 
 import numba
 
@@ -63,3 +66,67 @@ def find_lows(end, level, valleys, higher, lows):  # type: ignore[no-untyped-def
         lows[k] = higher[count, 1] = low
         higher[count, 0] = level[k]
         count += 1
+
+
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+def find_steadiest_rate(gyr, valid, width, whole, mean):  # type: ignore[no-untyped-def]
+    """Write which windows (n − width + 1,) have no lost sample, and the mean rate (3,) of the steadiest one.
+
+    Without any it is the first one's. Sums are differences of running sums, as `np.cumsum` has them.
+
+    Parameters
+    ----------
+    gyr : (n, 3). valid : (n,). width : samples of a window, ≤ n.
+    """
+    # running sums of the samples before the window, and of those up to its end
+    a0 = a1 = a2 = b0 = b1 = b2 = 0.0
+    s0 = s1 = s2 = t0 = t1 = t2 = 0.0
+    lost, least, found = 0, 0.0, False
+    for k in range(len(valid)):
+        x, y, z = gyr[k, 0], gyr[k, 1], gyr[k, 2]
+        b0, b1, b2 = b0 + x, b1 + y, b2 + z
+        t0, t1, t2 = t0 + x * x, t1 + y * y, t2 + z * z
+        lost += not valid[k]
+        i = k - width + 1
+        if i < 0:
+            continue
+        m0, m1, m2 = (b0 - a0) / width, (b1 - a1) / width, (b2 - a2) / width
+        spread = ((t0 - s0) / width - m0 * m0) + ((t1 - s1) / width - m1 * m1)
+        spread += (t2 - s2) / width - m2 * m2
+        whole[i] = lost == 0
+        if i == 0 or (whole[i] and (not found or spread < least)):
+            mean[0], mean[1], mean[2] = m0, m1, m2
+            found, least = whole[i], spread
+        x, y, z = gyr[i, 0], gyr[i, 1], gyr[i, 2]
+        a0, a1, a2 = a0 + x, a1 + y, a2 + z
+        s0, s1, s2 = s0 + x * x, s1 + y * y, s2 + z * z
+        lost -= not valid[i]
+
+
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+def measure_norms(x, offset, out):  # type: ignore[no-untyped-def]
+    """Write the norms (n,) of vectors x (n, 3) less an offset (3,)."""
+    for k in range(len(x)):
+        a, b, c = x[k, 0] - offset[0], x[k, 1] - offset[1], x[k, 2] - offset[2]
+        out[k] = sqrt(a * a + b * b + c * c)
+
+
+@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+def measure_windows(x, width, mean, sd):  # type: ignore[no-untyped-def]
+    """Write mean and standard deviation (n,) of x (n,) in the window around every sample, borders held."""
+    n, half = len(x), width // 2
+    before = until = square_before = square_until = 0.0
+    for k in range(n):
+        until, square_until = until + x[k], square_until + x[k] * x[k]
+        i = k - width + 1
+        if i < 0:
+            continue
+        m = (until - before) / width
+        v = (square_until - square_before) / width - m * m
+        mean[i + half], sd[i + half] = m, sqrt(max(v, 0.0))
+        before, square_before = before + x[i], square_before + x[i] * x[i]
+    for k in range(half):
+        mean[k], sd[k] = mean[half], sd[half]
+    last = n - width + half
+    for k in range(last + 1, n):
+        mean[k], sd[k] = mean[last], sd[last]

@@ -22,7 +22,7 @@ from core.agreement.strides import find_swings
 from core.agreement.terms import SensorMotion, SensorTerms, TermsPart, cut_terms
 from core.agreement.windows import JointWindows, compare_at_joint
 from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
-from core.rotation import rotate
+from core.rotation import find_lengths, rotate
 
 Swap = tuple[tuple[Segment, Segment], ...]
 """Pairs of segments whose sensors are exchanged."""
@@ -225,7 +225,7 @@ def _cosines(
 ) -> list[float]:
     """One cosine per swing of a leg."""
     foot, shank = motions[chain[-1].second], motions[chain[-1].first]
-    speed, level, pelvis = np.linalg.norm(foot.rate, axis=1), foot.level, motions["pelvis"].q
+    speed, level, pelvis = find_lengths(foot.rate), foot.level, motions["pelvis"].q
     swings, said = find_swings(shank.rate, rate_hz), []
     for a, b in pairwise(swings):
         if b - a > LONGEST_SWING_S * rate_hz or b - a < 5:

@@ -14,7 +14,7 @@ from core.agreement.terms import SensorMotion
 from core.filtering import low_pass
 from core.frames import Bools, Floats, Segment
 from core.peaks import find_peaks
-from core.rotation import conjugate, exp, rotate, to_matrix
+from core.rotation import conjugate, exp, find_lengths, rotate, to_matrix
 
 SMOOTH_HZ: Final = 4.0
 LEAST_SWING: Final = 0.6
@@ -111,6 +111,6 @@ def _fit_rotation(P: Floats, Q: Floats) -> Floats:
     U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
     R = U @ Vt
     v = 0.5 * np.stack((R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]), axis=1)
-    s = np.linalg.norm(v, axis=1)
+    s = find_lengths(v)
     angle = np.arctan2(s, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0))
     return np.asarray(v * (angle / np.maximum(s, 1e-12))[:, None])

@@ -18,7 +18,7 @@ from core.frames import GRAVITY, Bools, Floats
 from core.fusion.attitude import AttitudeParams, AttitudeState, advance
 from core.recording import SensorSignals
 from core.rest import Quietness, measure_quietness
-from core.rotation import compiled, from_matrix
+from core.rotation import compiled, find_lengths, from_matrix
 
 TERMS: Final = 4
 """Columns of a sensor's terms: three for the place, one for its own specific force."""
@@ -234,7 +234,7 @@ def find_bias(signals: SensorSignals, rate_hz: float, quiet: Quietness | None = 
 
 def start_tilt(acc: Floats, valid: Bools, rate_hz: float) -> tuple[AttitudeState, float]:
     """Level a sensor by its first `START_S`, heading free: the filter's start, and the norm at rest."""
-    norm = float(np.median(np.linalg.norm(acc[valid], axis=1))) if valid.any() else GRAVITY
+    norm = float(np.median(find_lengths(acc[valid]))) if valid.any() else GRAVITY
     first = np.flatnonzero(valid)[: max(1, round(START_S * rate_hz))]
     up = acc[first].mean(axis=0) if len(first) else np.array([0.0, 0.0, 1.0])
     up = up / max(float(np.linalg.norm(up)), 1e-9)

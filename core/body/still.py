@@ -16,6 +16,7 @@ import numpy as np
 
 from core.frames import GRAVITY, Bools, Floats
 from core.rest import find_runs
+from core.rotation import find_lengths
 
 
 @dataclass(frozen=True)
@@ -75,8 +76,8 @@ def contact_samples(
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     still = still_samples(acc, gyr, valid, rate_hz, rule.still)
-    turning = np.linalg.norm(gyr, axis=1)
-    force = np.abs(np.linalg.norm(acc, axis=1) - GRAVITY)
+    turning = find_lengths(gyr)
+    force = np.abs(find_lengths(acc) - GRAVITY)
     loud = np.maximum(turning / rule.still.gyr_limit, force / rule.still.acc_limit)
     reach = round(rule.still.window_s * rate_hz) // 2
     loud = maximum_filter1d(np.where(valid, loud, np.inf), 2 * reach + 1, mode="nearest")
@@ -98,9 +99,7 @@ def contact_samples(
 def still_samples(acc: Floats, gyr: Floats, valid: Bools, rate_hz: float, rule: StillRule) -> Bools:
     """Samples (T,) at which one sensor is still; acc, gyr (T, 3), never where it is not valid."""
     quiet = (
-        valid
-        & (np.linalg.norm(gyr, axis=1) < rule.gyr_limit)
-        & (np.abs(np.linalg.norm(acc, axis=1) - GRAVITY) < rule.acc_limit)
+        valid & (find_lengths(gyr) < rule.gyr_limit) & (np.abs(find_lengths(acc) - GRAVITY) < rule.acc_limit)
     )
     reach = round(rule.window_s * rate_hz) // 2
     loud = np.concatenate(([0], np.cumsum(~quiet)))

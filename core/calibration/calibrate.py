@@ -48,7 +48,7 @@ from core.fusion.attitude import AttitudeParams, estimate_orientation
 from core.held_samples import HeldSeries
 from core.recording import UniformRecording
 from core.rest import RestParams, Window
-from core.rotation import conjugate, from_matrix, rotate
+from core.rotation import find_vertical, from_matrix, rotate
 
 FACING = radians(20.0)
 """Turn between standing and the first straight part that still counts as facing the walk (our choice)."""
@@ -305,7 +305,7 @@ def _tilts(
         return {}
     tilts = {}
     for s, f in found.items():
-        up = [rotate(conjugate(q[s][a:b]), np.array([0.0, 0.0, 1.0])) for a, b in parts]
+        up = [find_vertical(q[s][a:b]) for a, b in parts]
         mean = np.concatenate(up).mean(axis=0)[None]
         R = about_vertical(-f.angle) @ vertical_frame(standing[s].up)
         tilts[s] = float(sagittal_angle(mean, R)[0])

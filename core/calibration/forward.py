@@ -16,7 +16,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
+from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment, Side
 from core.rotation import wrap_angle
 
 MeasureName = Literal[
@@ -28,6 +28,10 @@ CELLS: Final = 360
 """Cells of the circle. Densities of 1.5° and wider are summed over them as if they were integrated."""
 
 ANGLES: Final[Floats] = np.asarray(np.arange(CELLS) * (2.0 * pi / CELLS) - pi, np.float64)
+
+OPEN: Final[Floats] = np.ones((CELLS, CELLS))
+"""Density of two angles that no joint links."""
+OPEN.setflags(write=False)
 
 NARROWEST: Final = radians(1.5)
 """No measure is taken to be surer (cells of 1°)."""
@@ -180,14 +184,16 @@ def _find_marginals(
     the chest, has no joint here to any other and is heard alone.
     """
     links = {j.distal: _link(j) for j in joints}
-    open_link = np.ones((CELLS, CELLS))
 
     def own(segment: Segment) -> Floats:
         each = [_spread(ANGLES - m.angle, m.sd, m.doubt) for m in measures.get(segment, ())]
         return np.asarray(np.prod(each, axis=0)) if each else np.ones(CELLS)
 
-    def link(segment: Segment) -> Floats:
-        return links.get(segment, open_link)
+    def find_links(level: Mapping[Side, Segment]) -> tuple[Floats, Floats] | None:
+        left, right = (links.get(level[side]) for side in SIDES)
+        if left is None and right is None:
+            return None
+        return OPEN if left is None else left, OPEN if right is None else right
 
     pairs = []
     for level in LEVELS:
@@ -198,19 +204,22 @@ def _find_marginals(
         pairs.append(pair)
     up = [pairs[0]]
     for level, pair in zip(LEVELS, pairs[1:], strict=False):
-        up.append(_scale(pair * (link(level["left"]) @ up[-1] @ link(level["right"]).T)))
-    hips = link(LEVELS[-1]["left"]), link(LEVELS[-1]["right"])
-    pelvis = own("pelvis")
-    yield "pelvis", pelvis * ((hips[0] @ up[-1]) * hips[1]).sum(axis=1)
-    down = _scale(hips[0].T @ (pelvis[:, None] * hips[1]))
+        found = find_links(level)
+        up.append(_scale(pair if found is None else pair * (found[0] @ up[-1] @ found[1].T)))
+    hips, pelvis, down = find_links(LEVELS[-1]), own("pelvis"), OPEN
+    if hips is None:
+        yield "pelvis", pelvis
+    else:
+        yield "pelvis", pelvis * ((hips[0] @ up[-1]) * hips[1]).sum(axis=1)
+        down = _scale(hips[0].T @ (pelvis[:, None] * hips[1]))
     for i in reversed(range(len(LEVELS))):
         left, right = LEVELS[i]["left"], LEVELS[i]["right"]
         both = up[i] * down
         yield left, both.sum(axis=1)
         yield right, both.sum(axis=0)
         if i:
-            below = LEVELS[i - 1]
-            down = _scale(link(below["left"]).T @ (pairs[i] * down) @ link(below["right"]))
+            found = find_links(LEVELS[i - 1])
+            down = OPEN if found is None else _scale(found[0].T @ (pairs[i] * down) @ found[1])
     chained = {"pelvis", *(s for level in LEVELS for s in level.values())}
     for outside in measures.keys() - chained:
         yield outside, own(outside)

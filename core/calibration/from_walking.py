@@ -38,7 +38,7 @@ from core.calibration.heading import (
 from core.calibration.joint_turns import JointTurnParams, measure_joint_turns
 from core.calibration.mounting import read_declared_angle
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
-from core.calibration.sensor_in_walk import UP, SensorInWalk, WalkRungParams, follow_sensor
+from core.calibration.sensor_in_walk import SensorInWalk, WalkRungParams, follow_sensor
 from core.calibration.standing import vertical_frame
 from core.calibration.walking import (
     TRUNK,
@@ -56,7 +56,7 @@ from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, THIGH, Bools, Floats, Seg
 from core.fusion.attitude import AttitudeParams
 from core.recording import UniformRecording
 from core.rest import Window, find_runs
-from core.rotation import about, conjugate, from_matrix, multiply, rotate
+from core.rotation import about, find_vertical, from_matrix, multiply, rotate
 
 SWING_HZ: Final = 1.6
 """Low-pass under which the sensors of one leg are pushed forward together: a stride and its double."""
@@ -205,10 +205,10 @@ def _find_neutral(segment: Segment, sensor: SensorInWalk, parts: list[Part], hom
     if segment in FOOT.values() and len(sensor.flats) >= 3:
         flat = np.zeros(n, np.bool_)
         flat[sensor.flats] = True
-        up = np.median(rotate(conjugate(q[flat]), UP), axis=0)
+        up = np.median(find_vertical(q[flat]), axis=0)
         here = here & flat if (here & flat).any() else here
     else:
-        up = rotate(conjugate(q[seen]), UP).mean(axis=0)
+        up = find_vertical(q[seen]).mean(axis=0)
     up = up / np.linalg.norm(up)
     facing = from_matrix(R_NEUTRAL @ vertical_frame(up))
     turned = float(np.angle(np.exp(1j * measure_turned_angle(q[here], facing)).mean()))
@@ -342,7 +342,7 @@ def _sign(
         skew = float(np.mean((rate - rate.mean()) ** 3) / max(float(rate.std()) ** 3, 1e-12))
         clear, margin = abs(skew) >= CLEAR_SKEW, skew
     elif segment in FOOT.values():
-        up = rotate(conjugate(x.q), UP)
+        up = find_vertical(x.q)
         margin = gait_margin(sagittal_angle(up, about_vertical(-axis) @ R), mask, segment)
         clear = abs(margin) >= WEAK_MARGIN
     else:
@@ -400,5 +400,5 @@ def _straight_steps(
     if leg is None:
         return None
     x = neutral[leg]
-    up, R = rotate(conjugate(x.q), UP), about_vertical(-found[leg].angle) @ vertical_frame(x.up)
+    up, R = find_vertical(x.q), about_vertical(-found[leg].angle) @ vertical_frame(x.up)
     return count_steps(sagittal_angle(up, R), _mask(len(x.q), parts))

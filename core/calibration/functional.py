@@ -30,7 +30,7 @@ from core.errors import CalibrationError, Notice
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from core.recording import UniformRecording
 from core.rest import find_runs
-from core.rotation import conjugate, rotate
+from core.rotation import find_lengths, find_vertical
 
 FunctionalMethod = Literal["hip_swing", "trunk_bow"]
 FUNCTIONAL: Final[tuple[FunctionalMethod, ...]] = ("hip_swing", "trunk_bow")
@@ -147,7 +147,7 @@ def find_functional_axes(
             axis = flexion_axis(signals.gyr[seen] - standing[segment].gyro_bias, R_vertical, segment)
         except CalibrationError:
             continue  # turned about several axes: the walk has to show it
-        up = rotate(conjugate(q[segment]), UP)
+        up = find_vertical(q[segment])
         angle, margin = _give_sign(-axis.gamma, how, up[seen], R_vertical)
         written = read_declared_angle(recording.mounting.get(segment, ""), R_vertical, segment)
         if written is not None:
@@ -203,7 +203,7 @@ def _average(recording: UniformRecording, segments: Sequence[Segment], seconds: 
     """Mean |ω| (n,) of some sensors over a window around each sample, rad/s."""
     from scipy.ndimage import uniform_filter1d
 
-    rate = np.mean([np.linalg.norm(recording.sensors[s].gyr, axis=1) for s in segments], axis=0)
+    rate = np.mean([find_lengths(recording.sensors[s].gyr) for s in segments], axis=0)
     width = max(1, min(round(seconds * recording.rate_hz), len(rate)))
     return np.asarray(uniform_filter1d(rate, width, mode="nearest"))
 

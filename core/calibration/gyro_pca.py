@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from core.errors import CalibrationError
 from core.frames import Bools, Floats, Segment
 from core.held_samples import cut_blocks
-from core.rotation import conjugate, rotate
+from core.rotation import find_vertical
 
 SINGLE_AXIS, GOOD_AXIS = 0.70, 0.85
 """Share of the first component: below the first an error, below the second a notice
@@ -106,8 +106,7 @@ def sagittal_course(q: Floats, R_segment_sensor: Floats) -> Floats:
     """The same (n,) of orientations (n, 4) of the sensor in a world whose z is up."""
     angle = np.empty(len(q))
     for part in cut_blocks(len(q)):
-        up = rotate(conjugate(q[part]), np.array([0.0, 0.0, 1.0]))
-        angle[part] = sagittal_angle(up, R_segment_sensor)
+        angle[part] = sagittal_angle(find_vertical(q[part]), R_segment_sensor)
     return angle
 
 

@@ -20,7 +20,7 @@ from core.fusion.attitude import AttitudeParams, AttitudeState, advance, estimat
 from core.peaks import find_peaks
 from core.recording import SensorSignals
 from core.rest import find_runs
-from core.rotation import conjugate, multiply, rotate, wrap_angle
+from core.rotation import conjugate, find_squares, multiply, rotate, wrap_angle
 
 Indices = NDArray[np.int64]
 Span = tuple[int, int]
@@ -88,7 +88,7 @@ def find_flat_moments(gyr: Floats, walked: Bools, rate_hz: float, params: WalkRu
     from scipy.ndimage import uniform_filter1d
 
     width = max(2, round(params.flat_mean_s * rate_hz))
-    rate = np.sqrt(uniform_filter1d((gyr**2).sum(axis=1), width, mode="nearest"))
+    rate = np.sqrt(uniform_filter1d(find_squares(gyr), width, mode="nearest"))
     lows = find_peaks(-np.where(walked, rate, rate.max()), distance=params.flat_apart_s * rate_hz)
     lows = lows[walked[lows]]
     if not len(lows):

@@ -12,7 +12,7 @@ from core.filtering import low_pass
 from core.frames import Bools, Floats, Segment
 from core.recording import UniformRecording
 from core.rest import find_runs
-from core.rotation import conjugate, multiply, rotate, wrap_angle
+from core.rotation import conjugate, find_lengths, multiply, rotate, wrap_angle
 
 TRUNK: tuple[Segment, ...] = ("pelvis", "chest")
 DOWN: tuple[tuple[Segment, ...], ...] = (
@@ -52,9 +52,9 @@ def moving_mask(recording: UniformRecording, params: WalkingParams) -> Bools:
     legs = [s for s in recording.sensors if s not in TRUNK]
     width = max(1, round(recording.rate_hz))
     if legs:
-        rate = np.mean([np.linalg.norm(recording.sensors[s].gyr, axis=1) for s in legs], axis=0)
+        rate = np.mean([find_lengths(recording.sensors[s].gyr) for s in legs], axis=0)
         return np.asarray(_box(rate, width) > params.leg_rate)
-    norm = np.mean([np.linalg.norm(s.acc, axis=1) for s in recording.sensors.values()], axis=0)
+    norm = np.mean([find_lengths(s.acc) for s in recording.sensors.values()], axis=0)
     norm = norm - norm.mean()
     return np.asarray(_box(norm**2, width) - _box(norm, width) ** 2 > params.trunk_std**2)
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -70,8 +70,11 @@ class ConsensusParams:
             )
 
 
-@dataclass(frozen=True)
-class _Vote:
+_Sorted = Mapping[tuple[Side, EventKind], Sequence[GaitEvent]]
+"""Events of one detector by foot and kind, in order of time."""
+
+
+class _Vote(NamedTuple):
     detector: str
     time_s: float
     detected_s: float
@@ -112,12 +115,12 @@ def rate_confidence(found: Mapping[str, GaitEvents], params: ConsensusParams | N
     the lead's events and notices; `others_found_contacts` where the lead abstained and two others did not.
     """
     params = params or ConsensusParams()
-    lead = next(iter(found.values()))
+    name, lead = next(iter(found.items()))
     notices = list(lead.notices)
-    name = next(iter(found))
+    own = _sort_all(found)
     shares: dict[tuple[Side, EventKind, float], float] = {}
     for side in SIDES:
-        voters = _voters(found, side)
+        voters = _voters(own, side)
         if name not in voters and len(voters) >= 2:
             notices.append(_others(side, voters))
         if name not in voters or len(voters) < 2:
@@ -127,7 +130,7 @@ def rate_confidence(found: Mapping[str, GaitEvents], params: ConsensusParams | N
                 # a cluster begins with the lead's contact where it has one
                 if votes[0].detector == name:
                     shares[side, kind, votes[0].time_s] = len(votes) / len(voters)
-    events = tuple(replace(e, confidence=shares.get((e.side, e.kind, e.time_s))) for e in lead.events)
+    events = tuple(e.rate(shares.get((e.side, e.kind, e.time_s))) for e in lead.events)
     return replace(lead, events=events, notices=tuple(notices))
 
 
@@ -148,8 +151,9 @@ def agree_on_contacts(found: Mapping[str, GaitEvents], params: ConsensusParams |
     lead = next(iter(found))
     events: list[GaitEvent] = []
     notices = list(found[lead].notices)
+    own = _sort_all(found)
     for side in SIDES:
-        voters = _voters(found, side)
+        voters = _voters(own, side)
         if not voters:
             continue
         leads = next(iter(voters))
@@ -161,13 +165,13 @@ def agree_on_contacts(found: Mapping[str, GaitEvents], params: ConsensusParams |
         for kind in KINDS:
             for votes in _clusters(voters, side, kind, params):
                 share = len(votes) / len(voters)
-                own = votes[0] if votes[0].detector == leads else None
-                if share < params.least or (own is None and share <= params.least):
+                led = votes[0] if votes[0].detector == leads else None
+                if share < params.least or (led is None and share <= params.least):
                     dropped += 1
                     continue
-                time = own.time_s if own is not None else float(np.median([v.time_s for v in votes]))
+                time = led.time_s if led is not None else float(np.median([v.time_s for v in votes]))
                 known = max(v.detected_s for v in votes)
-                sd = None if own is None else own.uncertainty_s
+                sd = None if led is None else led.uncertainty_s
                 if shank:
                     time += params.shank_early_s if kind == "ic" else 0.0
                     sd = params.shank_sd_s
@@ -178,23 +182,34 @@ def agree_on_contacts(found: Mapping[str, GaitEvents], params: ConsensusParams |
     return GaitEvents(tuple(events), tuple(notices), {"detectors": tuple(found)})
 
 
-def _voters(found: Mapping[str, GaitEvents], side: Side) -> dict[str, GaitEvents]:
+def _sort_all(found: Mapping[str, GaitEvents]) -> dict[str, _Sorted]:
+    """Detector → its events by foot and kind."""
+    every: dict[str, _Sorted] = {}
+    for name, events in found.items():
+        own: dict[tuple[Side, EventKind], list[GaitEvent]] = {(s, k): [] for s in SIDES for k in KINDS}
+        for event in events.events:
+            own[event.side, event.kind].append(event)
+        every[name] = own
+    return every
+
+
+def _voters(found: Mapping[str, _Sorted], side: Side) -> dict[str, _Sorted]:
     """Detectors that found contacts of a foot, in their order."""
-    return {name: events for name, events in found.items() if events.times(side, "ic")}
+    return {name: own for name, own in found.items() if own[side, "ic"]}
 
 
 def _clusters(
-    voters: Mapping[str, GaitEvents], side: Side, kind: EventKind, params: ConsensusParams
+    voters: Mapping[str, _Sorted], side: Side, kind: EventKind, params: ConsensusParams
 ) -> list[list[_Vote]]:
     """Contacts that are one, at most one vote of each detector, in order of time."""
     lead, *others = voters
-    reference = voters[lead].times(side, kind)
-    clusters = [[v] for v in _votes(lead, voters[lead], side, kind)]
+    reference = [e.time_s for e in voters[lead][side, kind]]
+    clusters = [[v] for v in _votes(lead, voters[lead][side, kind])]
     for name in others:
         times = [c[0].time_s for c in clusters]
         taken: set[int] = set()
         free = []
-        for vote in _moved(_votes(name, voters[name], side, kind), reference, params):
+        for vote in _moved(_votes(name, voters[name][side, kind]), reference, params):
             first = bisect_left(times, vote.time_s - params.window_s)
             end = bisect_right(times, vote.time_s + params.window_s)
             near = [(abs(times[i] - vote.time_s), i) for i in range(first, end) if i not in taken]
@@ -208,9 +223,8 @@ def _clusters(
     return clusters
 
 
-def _votes(name: str, events: GaitEvents, side: Side, kind: EventKind) -> list[_Vote]:
-    own = (e for e in events.events if (e.side, e.kind) == (side, kind))
-    return [_Vote(name, e.time_s, e.detected_s, e.uncertainty_s) for e in own]
+def _votes(name: str, events: Sequence[GaitEvent]) -> list[_Vote]:
+    return [_Vote(name, e.time_s, e.detected_s, e.uncertainty_s) for e in events]
 
 
 def _moved(votes: list[_Vote], lead: Sequence[float], params: ConsensusParams) -> list[_Vote]:
@@ -229,8 +243,8 @@ def _moved(votes: list[_Vote], lead: Sequence[float], params: ConsensusParams) -
     return [_Vote(v.detector, v.time_s - apart, v.detected_s, v.uncertainty_s) for v in votes]
 
 
-def _others(side: Side, voters: Mapping[str, GaitEvents]) -> Notice:
-    counts = ", ".join(f"{name} {len(e.times(side, 'ic'))}" for name, e in voters.items())
+def _others(side: Side, voters: Mapping[str, _Sorted]) -> Notice:
+    counts = ", ".join(f"{name} {len(own[side, 'ic'])}" for name, own in voters.items())
     return Notice(
         "others_found_contacts",
         f"Other detectors found contacts of the {side} foot ({counts}). The analysis can be run with the"
@@ -240,7 +254,7 @@ def _others(side: Side, voters: Mapping[str, GaitEvents]) -> Notice:
     )
 
 
-def _led_by_other(side: Side, leads: str, voters: Mapping[str, GaitEvents]) -> Notice:
+def _led_by_other(side: Side, leads: str, voters: Mapping[str, _Sorted]) -> Notice:
     return Notice(
         "led_by_other",
         f"No contacts of the {side} foot were found by a foot sensor. These are of {leads}"

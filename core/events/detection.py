@@ -204,14 +204,18 @@ def _quiet_level(q: Floats, s: Floats, valid: Bools, rate_hz: float, params: Foo
 def _flat_level(events: list[GaitEvent], s: Floats, valid: Bools, orientations: Orientations) -> float | None:
     """Median over a foot's stances of the mean s in their middle thirds, None without a whole stance."""
     ordered = sorted(events, key=lambda e: e.time_s)
-    middles = []
-    for contact, off in pairwise(ordered):
-        if (contact.kind, off.kind) == ("ic", "tc"):
-            lasts = off.time_s - contact.time_s
-            times = contact.time_s + np.array([lasts / 3.0, 2.0 * lasts / 3.0])
-            a, b = np.searchsorted(orientations.t_s, times)
-            if b > a and valid[a:b].all():
-                middles.append(float(s[a:b].mean()))
+    stances = [
+        (contact.time_s, off.time_s - contact.time_s)
+        for contact, off in pairwise(ordered)
+        if (contact.kind, off.kind) == ("ic", "tc")
+    ]
+    if not stances:
+        return None
+    start, lasts = np.array(stances).T
+    first, last = (np.searchsorted(orientations.t_s, start + x) for x in (lasts / 3.0, 2.0 * lasts / 3.0))
+    lost = np.concatenate(([0], np.cumsum(~valid)))
+    whole = (last > first) & (lost[first] == lost[last])
+    middles = [s[a:b].mean() for a, b in zip(first[whole].tolist(), last[whole].tolist(), strict=True)]
     return float(np.median(middles)) if middles else None
 
 

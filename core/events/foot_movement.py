@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from core.frames import FOOT, Floats, Segment
+from core.rotation import find_lengths
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
@@ -30,7 +29,7 @@ class FootMovement(NamedTuple):
     @classmethod
     def of_signals(cls, acc: Floats, gyr: Floats, mounted: SegmentCalibration) -> FootMovement:
         """From signals (n, 3) of a sensor and how it sits."""
-        speed = np.sqrt(((gyr - mounted.gyro_bias) ** 2).sum(axis=1))
+        speed = find_lengths(gyr - mounted.gyro_bias)
         return cls(speed, acc @ mounted.R_segment_sensor.T)
 
     def cut(self, part: slice) -> FootMovement:

@@ -10,6 +10,7 @@ papers.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from itertools import pairwise
@@ -172,40 +173,73 @@ def _events(
     swings = find_peaks(np.where(valid, rate, 0.0), height=params.swing_rad_s, distance=distance)
     reach = round(params.longest_s * rate_hz)
     step = 1.0 / rate_hz
+    course, begin_s = _Course(rate, valid), float(t_s[0])
     events: list[GaitEvent] = []
     landed = 0
-    ends = [*(int(s) for s in swings), len(rate)]
+    ends = [*swings.tolist(), len(rate)]
     for swing, following in pairwise(ends):
         # waiting after a contact matters only when that contact is near
         start = max(landed + round(params.wait_s * rate_hz) if landed else 0, swing - reach)
-        leaving = _leaving(rate, start, swing, params)
-        if leaving is not None and valid[leaving : swing + 1].all():
+        leaving = _leaving(course, start, swing, params)
+        if leaving is not None and course.is_valid(leaving, swing):
             # the minimum is believed when the swing shows that the foot has left
-            known = t_s[swing]
             time = float(t_s[leaving] + _vertex(rate, leaving) * step)
-            events.append(GaitEvent(time, side, "tc", params.name, float(known)))
-        contact = _contact(rate, swing, min(following, swing + reach), rate_hz, params)
-        if contact is not None and valid[swing : contact[1] + 1].all():
+            events.append(GaitEvent(time, side, "tc", params.name, float(t_s[swing])))
+        contact = _contact(course, swing, min(following, swing + reach), rate_hz, params)
+        if contact is not None and course.is_valid(swing, contact[1]):
             at, known_at = contact
-            events.append(GaitEvent(float(t_s[0] + at * step), side, "ic", params.name, float(t_s[known_at])))
+            events.append(GaitEvent(begin_s + at * step, side, "ic", params.name, float(t_s[known_at])))
             landed = known_at
     return events
 
 
+class _Course:
+    """A rate (n,) with what is asked of it at every swing, found once.
+
+    Parameters
+    ----------
+    valid : (n,) sensor there.
+    """
+
+    def __init__(self, rate: Floats, valid: Bools) -> None:
+        self.rate = rate
+        self._lows: list[int] = _minima(rate).tolist()
+        self._below: list[int] = np.flatnonzero(rate <= 0.0).tolist()
+        self._lost: list[int] = np.flatnonzero(~valid).tolist()
+
+    def find_lows(self, start: int, end: int) -> list[int]:
+        """Local minima between two samples, neither of which can be one."""
+        lows = self._lows
+        return lows[bisect_right(lows, start) : bisect_left(lows, end - 1)]
+
+    def find_below(self, start: int, end: int) -> int | None:
+        """The first sample from `start` on, before `end`, at which the segment does not go forwards."""
+        at = bisect_left(self._below, start)
+        return self._below[at] if at < len(self._below) and self._below[at] < end else None
+
+    def is_valid(self, first: int, last: int) -> bool:
+        """Whether no sample is lost, both ends included."""
+        at = bisect_left(self._lost, first)
+        return at == len(self._lost) or self._lost[at] > last
+
+    def find_deepest(self, samples: list[int]) -> int:
+        """The lowest of some samples, of equals the first."""
+        return min(samples, key=self.rate.__getitem__)
+
+
 def _contact(
-    rate: Floats, swing: int, end: int, rate_hz: float, params: GyroPeakParams
+    course: _Course, swing: int, end: int, rate_hz: float, params: GyroPeakParams
 ) -> tuple[float, int] | None:
     """Sample (fractional) of the contact after a swing, and the sample at which it is known."""
-    below = np.flatnonzero(rate[swing:end] <= 0.0)
-    if not len(below):
+    rate, after = course.rate, course.find_below(swing, end)
+    if after is None:
         return None
-    after = swing + int(below[0])
     if params.contact == "zero_cross":
         return after - float(rate[after] / (rate[after] - rate[after - 1])), after
-    lows = after + _minima(rate[after : min(end, after + round(params.contact_s * rate_hz) + 1)])
-    if not len(lows):
+    lows = course.find_lows(after, min(end, after + round(params.contact_s * rate_hz) + 1))
+    if not lows:
         return None
-    low = int(lows[np.argmin(rate[lows])])
+    low = course.find_deepest(lows)
     return low + _vertex(rate, low), low + 1
 
 
@@ -231,15 +265,12 @@ def _say_unclear(side: Side, segment: Segment, found: tuple[int, int], params: G
     )
 
 
-def _leaving(rate: Floats, start: int, swing: int, params: GyroPeakParams) -> int | None:
+def _leaving(course: _Course, start: int, swing: int, params: GyroPeakParams) -> int | None:
     """Sample of the minimum before a swing, None if there is none deep enough."""
-    lows = start + _minima(rate[start:swing])
-    lows = lows[rate[lows] <= -params.leaving_rad_s]
-    if not len(lows):
+    lows = [k for k in course.find_lows(start, swing) if course.rate[k] <= -params.leaving_rad_s]
+    if not lows:
         return None
-    if params.leaving == "deepest":
-        return int(lows[np.argmin(rate[lows])])
-    return int(lows[-1])
+    return course.find_deepest(lows) if params.leaving == "deepest" else lows[-1]
 
 
 def _minima(x: Floats) -> np.ndarray:

@@ -23,11 +23,12 @@ from core.errors import Notice, SignalError
 from core.events.bouts import Bout, BoutParams, walking_bouts
 from core.events.periodicity import Periodicity, PeriodicityParams, step_times
 from core.events.steps import Step, Steps
-from core.filtering import low_pass
+from core.filtering import low_pass, smooth_gaussian
 from core.frames import Bools, Floats, Segment, Side
 from core.peaks import find_peaks
 from core.recording import SensorSignals, UniformRecording
 from core.rest import STANDING, find_rest_windows, find_runs
+from core.rotation import find_lengths
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 
@@ -188,10 +189,8 @@ def _split_along(signals: SensorSignals, up: Floats, norm: Floats) -> tuple[Floa
 
 def _mean_up(signals: SensorSignals, rate_hz: float, params: LumbarParams) -> tuple[Floats, Floats]:
     """Where up is (n, 3), sensor axes, and the mean specific force (n,) along it, m/s²."""
-    from scipy.ndimage import gaussian_filter1d
-
-    force = gaussian_filter1d(signals.acc, params.up_s * rate_hz, axis=0, mode="nearest")
-    norm = np.maximum(np.linalg.norm(force, axis=1), 1e-9)
+    force = np.stack([smooth_gaussian(a, params.up_s * rate_hz) for a in signals.acc.T], axis=1)
+    norm = np.maximum(find_lengths(force), 1e-9)
     return force / norm[:, None], norm
 
 
@@ -215,8 +214,6 @@ def _steps(
     vertical: Floats, moving: Bools, rhythm: Periodicity, rate_hz: float, params: LumbarParams
 ) -> list[float]:
     """Times of the maxima of every moving part, at the scale of its own step time."""
-    from scipy.ndimage import gaussian_filter1d
-
     good = _good(rhythm, params)
     usual = float(np.median(rhythm.step_s[good]))
     times: list[float] = []
@@ -225,7 +222,7 @@ def _steps(
         step = float(np.median(rhythm.step_s[here])) if here.any() else usual
         reach = round(2.0 * step * rate_hz)
         low = max(0, first - reach)
-        smooth = gaussian_filter1d(vertical[low : end + reach], params.scale * step * rate_hz, mode="nearest")
+        smooth = smooth_gaussian(vertical[low : end + reach], params.scale * step * rate_hz)
         peaks = find_peaks(smooth, prominence=params.prominence, distance=params.apart * step * rate_hz)
         inside = [int(p) for p in peaks + low if first <= p < end and moving[p]]
         row = [float(p + _offset(smooth, p - low)) / rate_hz for p in inside]

@@ -20,10 +20,17 @@ step time where the acceleration alone fails.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
+from core.filtering import smooth_gaussian
 from core.frames import Floats
+
+TOGETHER: Final = 64
+"""Windows whose rhythm is looked for at a time."""
 
 
 @dataclass(frozen=True)
@@ -98,59 +105,73 @@ def step_times(
     params = params or PeriodicityParams()
     second = horizontal if gyr is None else gyr
     assert second is not None  # noqa: S101 - the caller gives one of them
-    a, w = (_between(x, rate_hz, params) for x in (vertical[:, None], second))
-    width = min(len(a), round(params.window_s * rate_hz))
-    starts = range(0, max(1, len(a) - width + 1), max(1, round(params.hop_s * rate_hz)))
-    turns = gyr is not None
-    found = [_step_time(a[i : i + width], w[i : i + width], turns, rate_hz, params) for i in starts]
-    return Periodicity(
-        t_s=np.array([(i + 0.5 * width) / rate_hz for i in starts]),
-        step_s=np.array([f[0] for f in found]),
-        score=np.array([f[1] for f in found]),
+    width = min(len(vertical), round(params.window_s * rate_hz))
+    hop = max(1, round(params.hop_s * rate_hz))
+    a, w = (
+        sliding_window_view(_between(x, rate_hz, params), width, axis=1)[:, ::hop]
+        for x in (vertical[None], second.T)
     )
+    lag = _list_lags(width, rate_hz, params)
+    step_s, score = np.full(a.shape[1], np.nan), np.zeros(a.shape[1])
+    for first in range(0, len(score) if len(lag) > 2 else 0, TOGETHER):
+        part = slice(first, first + TOGETHER)
+        scores = _score_lags(a[:, part], w[:, part], lag, turns=gyr is not None)
+        best = _choose(scores, params.nearly)
+        found = best >= 0
+        step_s[part][found] = lag[best[found]] / rate_hz
+        score[part][found] = scores[found, best[found]]
+    middles = (hop * np.arange(len(score)) + 0.5 * width) / rate_hz
+    return Periodicity(np.asarray(middles), step_s, score)
 
 
-def _step_time(
-    a: Floats, w: Floats, turns: bool, rate_hz: float, params: PeriodicityParams
-) -> tuple[float, float]:
-    """Step time in s and score of one window; (NaN, 0) without any. turns : w is an angular velocity."""
+def _list_lags(width: int, rate_hz: float, params: PeriodicityParams) -> NDArray[np.int64]:
+    """Step times that are tried in windows of so many samples, in samples."""
     first = max(2, round(params.shortest_s * rate_hz))
-    last = min(round(params.longest_s * rate_hz), round(0.375 * len(a)))
-    if last - first < 2:
-        return float("nan"), 0.0
-    r_a = _autocorrelation(a, 2 * last + 1)
-    r_w = _autocorrelation(w, 2 * last + 1)
-    lag = np.arange(first, last + 1)
+    last = min(round(params.longest_s * rate_hz), round(0.375 * width))
+    return np.arange(first, last + 1)
+
+
+def _score_lags(a: Floats, w: Floats, lag: NDArray[np.int64], *, turns: bool) -> Floats:
+    """Scores (k, lags) of windows a (1, k, width) and w (c, k, width). turns : w is an angular velocity."""
+    r_a, r_w = (_autocorrelation(x, 2 * int(lag[-1]) + 1) for x in (a, w))
     if turns:
-        score = 0.25 * (r_a[lag] + r_a[2 * lag] + r_w[2 * lag] - r_w[lag])
+        score = 0.25 * (r_a[:, lag] + r_a[:, 2 * lag] + r_w[:, 2 * lag] - r_w[:, lag])
     else:
-        score = (r_a[lag] + r_a[2 * lag] + r_w[2 * lag]) / 3.0
-    peaks = np.flatnonzero((score[1:-1] >= score[:-2]) & (score[1:-1] > score[2:])) + 1
-    if not len(peaks) or score[peaks].max() <= 0.0:
-        return float("nan"), 0.0
-    best = peaks[np.flatnonzero(score[peaks] >= params.nearly * score[peaks].max())[0]]
-    return float(lag[best] / rate_hz), float(score[best])
+        score = (r_a[:, lag] + r_a[:, 2 * lag] + r_w[:, 2 * lag]) / 3.0
+    return np.asarray(score)
+
+
+def _choose(score: Floats, nearly: float) -> NDArray[np.int64]:
+    """Place (k,) of the shortest lag among the maxima of each score (k, lags) that is nearly the best.
+
+    −1 where no maximum is above 0.
+    """
+    top = (score[:, 1:-1] >= score[:, :-2]) & (score[:, 1:-1] > score[:, 2:])
+    height = np.where(top, score[:, 1:-1], -np.inf)
+    best = height.max(axis=1)
+    shortest = np.argmax(height >= nearly * best[:, None], axis=1) + 1
+    return np.where(best > 0.0, shortest, -1)
 
 
 def _between(x: Floats, rate_hz: float, params: PeriodicityParams) -> Floats:
-    """x (n, c) without what is quicker or slower than steps."""
-    from scipy.ndimage import gaussian_filter1d
-
+    """x (c, n) without what is quicker or slower than steps."""
     quick, slow = params.smooth_s * rate_hz, params.slow_s * rate_hz
-    return np.asarray(
-        gaussian_filter1d(x, quick, axis=0, mode="nearest")
-        - gaussian_filter1d(x, slow, axis=0, mode="nearest")
-    )
+    return np.array([smooth_gaussian(row, quick) - smooth_gaussian(row, slow) for row in x])
 
 
 def _autocorrelation(x: Floats, lags: int) -> Floats:
-    """Correlation (lags,) of x (n, c) with itself later, each lag by the energy of its two parts."""
-    x = x - x.mean(axis=0)
-    n = len(x)
-    size = 2 ** int(np.ceil(np.log2(2 * n)))
-    spectrum = np.fft.rfft(x, size, axis=0)
-    product = np.fft.irfft((np.abs(spectrum) ** 2).sum(axis=1), size)[:lags]
-    energy = np.concatenate(([0.0], np.cumsum((x**2).sum(axis=1))))
-    k = np.arange(lags)
-    norm = np.sqrt(energy[n - k] * (energy[n] - energy[k]))
-    return np.asarray(np.divide(product, norm, out=np.zeros(lags), where=norm > 1e-12))
+    """Correlation (k, lags) of windows with themselves later, each lag by the energy of its two parts.
+
+    Parameters
+    ----------
+    x : (c, k, n) components of a vector; of each its mean over the window is taken off.
+    """
+    n = x.shape[-1]
+    x = x - x.mean(axis=-1, keepdims=True)
+    size = 2 ** int(np.ceil(np.log2(n + lags)))
+    spectrum = np.fft.rfft(x, size)
+    product = np.fft.irfft((spectrum.real**2 + spectrum.imag**2).sum(axis=0), size)[:, :lags]
+    energy = np.zeros((x.shape[1], n + 1))
+    np.cumsum((x**2).sum(axis=0), axis=-1, out=energy[:, 1:])
+    norm = np.sqrt(energy[:, n : n - lags : -1] * (energy[:, -1:] - energy[:, :lags]))
+    return np.asarray(np.divide(product, norm, out=np.zeros(norm.shape), where=norm > 1e-12))

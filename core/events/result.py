@@ -63,6 +63,19 @@ class GaitEvent:
     uncertainty_s: float | None = None
     first_s: float | None = None
 
+    def rate(self, confidence: float | None) -> GaitEvent:
+        """The same with another confidence; of thousands `replace` takes three times as long."""
+        return GaitEvent(
+            self.time_s,
+            self.side,
+            self.kind,
+            self.source,
+            self.detected_s,
+            confidence,
+            self.uncertainty_s,
+            self.first_s,
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class GaitEvents:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from core.errors import FormatError, Notice
 from core.frames import Floats, Segment
-from core.held_samples import SOME_ROWS, cut_blocks
+from core.held_samples import cut_blocks, is_complete
 from core.recording import ImuStream
 
 WRAP_16: Final = 1 << 16
@@ -311,9 +311,7 @@ def _bits(a: Floats) -> NDArray[np.float32]:
 
 def has_whole_row(signal: Floats) -> bool:
     """Whether any sample of (n, axes) is finite in all axes."""
-    return any(
-        np.isfinite(signal[i : i + SOME_ROWS]).all(axis=1).any() for i in range(0, len(signal), SOME_ROWS)
-    )
+    return any(is_complete(signal[part]).any() for part in cut_blocks(len(signal)))
 
 
 def _stream(d: Draft, t_s: Floats) -> ImuStream:

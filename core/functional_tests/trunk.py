@@ -16,7 +16,7 @@ from core.frames import GRAVITY, Bools, Floats, Segment
 from core.fusion.attitude import AttitudeParams, estimate_orientation
 from core.recording import UniformRecording
 from core.rest import find_rest_windows, index_window
-from core.rotation import conjugate, exp, rotate
+from core.rotation import exp, find_vertical
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 """Sensors that tell how the trunk moves, the better known first."""
@@ -90,7 +90,7 @@ def follow_trunk(recording: UniformRecording) -> TrunkMotion:
     q = estimate_orientation(
         _level(force / norm), longest.start, gyr, signals.acc, signals.valid, rate, norm, AttitudeParams()
     )
-    up = rotate(conjugate(q), UP)
+    up = find_vertical(q)
     acc = signals.acc * (GRAVITY / norm) - GRAVITY * up
     return TrunkMotion(segment, recording.t_s, rate, up, acc, gyr, signals.valid, rests)
 

@@ -28,6 +28,7 @@ from core.fusion.orientations import Orientations
 from core.online.frame import SegmentCheck
 from core.peaks import compile_peak_kernel
 from core.recording import UniformRecording
+from core.rest import compile_rest_kernels
 
 
 @dataclass(frozen=True)
@@ -146,5 +147,6 @@ def compile_calibration_kernels() -> None:
 
     low_pass(np.arange(9.0), 1.0, 100.0)
     compile_peak_kernel()
+    compile_rest_kernels()
     compile_attitude_kernel()
     compile_pose_kernels()

@@ -85,8 +85,13 @@ class PipelineConfig:
     @property
     def digest(self) -> str:
         """sha256 over all parameters; equal parameters give equal digests."""
-        text = json.dumps(dataclasses.asdict(self), sort_keys=True, default=str)
+        text = json.dumps(self, sort_keys=True, default=_list_fields)
         return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _list_fields(value: object) -> object:
+    """Parameters of a stage by name; what else JSON does not know as text."""
+    return vars(value) if dataclasses.is_dataclass(value) else str(value)
 
 
 def override_config(defaults: Settings, overrides: Mapping[str, Any], path: str = "config") -> Settings:

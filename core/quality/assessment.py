@@ -12,10 +12,11 @@ import numpy as np
 from core.errors import Notice
 from core.frames import GRAVITY, Segment
 from core.quality.inspection import measure_losses
-from core.quality.signals import magnetic_share, measure_signal, saturation
+from core.quality.signals import magnetic_share, measure_stream, saturation
 from core.quality.suspicion import list_suspicions
 from core.recording import Recording, SensorSignals, UniformRecording
 from core.rest import RestParams, Window, find_rest_windows, find_runs, index_window
+from core.rotation import find_lengths
 
 Level = Literal["good", "usable", "poor"]
 """Best first."""
@@ -201,7 +202,7 @@ def _sensor(
     params: QualityParams,
 ) -> tuple[SensorQuality, list[Notice]]:
     stream = recording.streams[signals.device_id]
-    f = measure_signal(stream.acc, stream.gyr, stream.rate_hz)
+    f = measure_stream(stream)
     notices = list_suspicions(signals.device_id, f, stream.acc, stream.quat)
     lost, longest = measure_losses(stream)
     gaps = find_runs(~signals.valid | signals.interpolated)
@@ -211,7 +212,7 @@ def _sensor(
     at_rest &= signals.valid
     norm = bias = None
     if at_rest.any():
-        norm = float(np.median(np.linalg.norm(signals.acc[at_rest], axis=1)))
+        norm = float(np.median(find_lengths(signals.acc[at_rest])))
         bias = float(np.linalg.norm(signals.gyr[at_rest].mean(axis=0)))
     invalid = float(np.mean(~signals.valid))
     notices += _gap_notice(segment, signals, uniform, invalid, params)

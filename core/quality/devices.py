@@ -14,6 +14,7 @@ from typing import Any, Final, Literal, Self
 import numpy as np
 
 from core.frames import GRAVITY, Floats
+from core.held_samples import is_complete
 from core.recording import ImuStream, SensorSignals
 from core.rest import (
     RestParams,
@@ -156,12 +157,12 @@ def check_device(stream: ImuStream, params: RestParams | None = None) -> DeviceC
 
 def _held(stream: ImuStream) -> SensorSignals:
     """The stream's samples, missing ones held and not valid, nor those beside a gap in time."""
-    there = [np.isfinite(stream.held(name)).all(axis=1) for name in ("acc", "gyr")]
+    there = [is_complete(stream.held(name)) for name in ("acc", "gyr")]
     good = np.asarray(np.logical_and(*there), np.bool_)
-    last = np.maximum.accumulate(np.where(good, np.arange(len(good)), 0))
-    acc, rates = (
-        np.nan_to_num(stream.held(name)[last].astype(np.float64), copy=False) for name in ("acc", "gyr")
-    )
+    acc, rates = stream.held("acc"), stream.held("gyr")
+    if not good.all():
+        last = np.maximum.accumulate(np.where(good, np.arange(len(good)), 0))
+        acc, rates = (np.nan_to_num(x[last].astype(np.float64), copy=False) for x in (acc, rates))
     pause = np.diff(stream.t_s) > LONGEST_GAP / stream.rate_hz
     valid = good & ~np.concatenate(([False], pause)) & ~np.concatenate((pause, [False]))
     return SensorSignals(stream.device_id, acc, rates, None, valid, ~good)

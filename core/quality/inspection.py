@@ -10,7 +10,8 @@ import numpy as np
 from core.errors import Notice
 from core.formats.aliases import segment_in
 from core.frames import Segment
-from core.quality.signals import measure_signal
+from core.held_samples import is_complete
+from core.quality.signals import measure_signal, measure_stream
 from core.quality.suggestion import Suggestion, suggest
 from core.quality.suspicion import list_suspicions
 from core.recording import ImuStream, Recording, Subject
@@ -192,7 +193,7 @@ def _device(
     suggestion: Suggestion,
     duplicate_of: str | None,
 ) -> DeviceFacts:
-    f = measure_signal(s.acc, s.gyr, s.rate_hz)
+    f = measure_stream(s)
     lost, longest = measure_losses(s)
     notices = [*s.notices, *list_suspicions(s.device_id, f, s.acc, s.quat)]
     if duplicate_of is not None:
@@ -211,7 +212,7 @@ def _device(
         clock=s.clock,
         start_s=float(s.t_s[0]),
         duration_s=float(s.t_s[-1] - s.t_s[0]),
-        samples=int(np.count_nonzero(np.isfinite(s.acc).all(axis=1))),
+        samples=int(np.count_nonzero(is_complete(s.held("acc")))),
         lost_pct=100.0 * lost,
         longest_gap_s=longest,
         has_gyro=s.gyr is not None,
@@ -228,9 +229,9 @@ def _device(
 
 def measure_losses(s: ImuStream) -> tuple[float, float]:
     """Share (0 to 1) of samples missing between a stream's first and last, and its longest hole in s."""
-    good = np.isfinite(s.acc).all(axis=1)
+    good = is_complete(s.held("acc"))
     if s.gyr is not None:
-        good = good & np.isfinite(s.gyr).all(axis=1)
+        good = good & is_complete(s.held("gyr"))
     t = s.t_s[good]
     expected = round(float(s.t_s[-1] - s.t_s[0]) * s.rate_hz) + 1
     if len(t) < 2:

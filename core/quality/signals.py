@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from core.frames import GRAVITY, Floats
+from core.held_samples import is_complete
+from core.recording import ImuStream
 from core.rest import find_runs
+from core.rotation import find_lengths, find_squares
 
 STILL: Final = 0.03
 """A second is still when acc varies less than this share of its mean (0.25 m/s²:
@@ -54,6 +58,16 @@ class Facts:
     gyro_top: float | None
 
 
+_known: Final = WeakKeyDictionary[ImuStream, Facts]()
+
+
+def measure_stream(stream: ImuStream) -> Facts:
+    """Measure a sensor as it was read; asked again of the same stream nothing is measured again."""
+    if stream not in _known:
+        _known[stream] = measure_signal(stream.acc, stream.gyr, stream.rate_hz)
+    return _known[stream]
+
+
 def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
     """Measure a sensor; rows with a missing value are left out.
 
@@ -61,9 +75,9 @@ def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
     ----------
     acc : (n, 3). gyr : (n, 3) or None. At least one complete row.
     """
-    good = np.flatnonzero(np.isfinite(acc).all(axis=1))
+    good = np.flatnonzero(is_complete(acc))
     a = acc[good]
-    norm = np.linalg.norm(a, axis=1)
+    norm = find_lengths(a)
     width = int(min(len(a), max(2, round(rate_hz))))
     # axis by axis: of a day each array is half a gigabyte
     mean, spread, middle = np.empty((3, len(a) - width + 1)), np.zeros(len(a) - width + 1), a.mean(axis=0)
@@ -80,7 +94,7 @@ def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
     calm = np.union1d([k], np.flatnonzero(spread < STILL * np.sqrt((mean**2).sum(axis=0))))
     still = bool(spread[k] < STILL * np.linalg.norm(mean[:, k]))
     del mean, spread
-    speed = None if gyr is None else np.linalg.norm(gyr, axis=1)
+    speed = None if gyr is None else find_lengths(gyr)
     if gyr is not None:
         calm = _without_turns(gyr[good], calm, width)
     known = None if speed is None else speed[np.isfinite(speed)]
@@ -102,11 +116,11 @@ def _without_turns(gyr: Floats, starts: NDArray[np.int64], width: int) -> NDArra
     twice the variance: 1); a body's turning rate changes smoothly (0.1 and less).
     """
     total = np.concatenate((np.zeros((1, 3)), np.cumsum(gyr, axis=0)))
-    square = np.concatenate(([0.0], np.cumsum((gyr**2).sum(axis=1))))
-    jump = np.concatenate(([0.0, 0.0], np.cumsum((np.diff(gyr, axis=0) ** 2).sum(axis=1))))
+    square = np.concatenate(([0.0], np.cumsum(find_squares(gyr))))
+    jump = np.concatenate(([0.0, 0.0], np.cumsum(find_squares(np.diff(gyr, axis=0)))))
     ends = starts + width
     mean = (total[ends] - total[starts]) / width
-    level = (mean**2).sum(axis=1)
+    level = find_squares(mean)
     variance = (square[ends] - square[starts]) / width - level
     rough = (jump[ends] - jump[starts + 1]) / max(1, width - 1)
     smooth = (variance > TURNING * level) & (rough < SMOOTH * 2.0 * variance)
@@ -159,7 +173,7 @@ def magnetic_share(mag: Floats, still: slice, limit: float) -> float | None:
 
     None when the magnetometer has no reading at rest. Source: docs/science/quality.md, "Magnetic field".
     """
-    norm = np.linalg.norm(mag, axis=1)
+    norm = find_lengths(mag)
     rest = norm[still]
     rest = rest[np.isfinite(rest)]
     known = norm[np.isfinite(norm)]

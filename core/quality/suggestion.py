@@ -16,6 +16,7 @@ import numpy as np
 
 from core.formats.aliases import segment_in, segment_named, side_in
 from core.frames import Floats, Segment
+from core.held_samples import is_complete
 from core.quality.sides import find_left_leg, smooth
 from core.recording import ImuStream, Recording
 
@@ -152,7 +153,7 @@ def _on_grid(streams: list[ImuStream]) -> tuple[Floats, Floats] | None:
     for s in streams:
         assert s.gyr is not None  # noqa: S101 - the caller chose streams with a gyroscope
         for signal, out in ((s.acc, acc), (s.gyr, gyr)):
-            good = np.isfinite(signal).all(axis=1)
+            good = is_complete(signal)
             if not good.any():
                 return None
             out.append(np.stack([np.interp(grid, s.t_s[good], axis[good]) for axis in signal.T], axis=1))

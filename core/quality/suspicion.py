@@ -13,6 +13,7 @@ import numpy as np
 from core import rotation
 from core.errors import Notice, Severity
 from core.frames import GRAVITY, Floats
+from core.held_samples import is_complete
 from core.quality.signals import Facts
 
 TOLERANCE: Final = 0.10
@@ -148,7 +149,7 @@ def _rate(device: str, f: Facts) -> list[Notice]:
 
 def _sign(device: str, acc: Floats, quat: Floats) -> list[Notice]:
     """With the vendor's orientation (sensor → z up) specific force must point up on average."""
-    good = np.isfinite(acc).all(axis=1) & np.isfinite(quat).all(axis=1)
+    good = is_complete(acc) & is_complete(quat)
     if np.count_nonzero(good) < 10:
         return []
     world = rotation.rotate(rotation.normalise(quat[good]), acc[good]).mean(axis=0)

@@ -12,6 +12,9 @@ from core.rotation.arrays import (
     angle_between,
     conjugate,
     exp,
+    find_lengths,
+    find_squares,
+    find_vertical,
     from_matrix,
     log,
     mean,
@@ -26,6 +29,7 @@ from core.rotation.arrays import (
 )
 
 __all__ = [
-    "about", "angle_between", "conjugate", "exp", "from_matrix", "log", "mean", "multiply", "normalise",
-    "rotate", "slerp", "split_heading", "to_matrix", "wrap_angle", "yaw",
+    "about", "angle_between", "conjugate", "exp", "find_lengths", "find_squares", "find_vertical",
+    "from_matrix", "log", "mean", "multiply", "normalise", "rotate", "slerp", "split_heading", "to_matrix",
+    "wrap_angle", "yaw",
 ]  # fmt: skip

@@ -68,14 +68,14 @@ def fit_axes(signals: SensorSignals, rate_hz: float, params: SetupParams) -> Axe
     windows = _list_windows(signals, quiet.quiet, rate_hz, params)
     if len(windows) < params.least_windows:
         return None
-    gyr = signals.gyr - find_bias(signals, rate_hz, quiet)
-    stated = _measure(signals.acc, gyr, windows, rate_hz)
+    walks = _list_walks(signals, windows, find_bias(signals, rate_hz, quiet))
+    stated = _measure(walks, rate_hz)
     if stated <= params.misfit_mps2:
         return AxesFit(len(windows), stated)
     limit = stated / params.misfit_ratio
-    if all(_measure(signals.acc, gyr, windows, rate_hz, C, limit) >= limit for C in CHOICES[1:]):
+    if all(_measure(walks, rate_hz, C, limit) >= limit for C in CHOICES[1:]):
         return AxesFit(len(windows), stated)
-    others = [_measure(signals.acc, gyr, windows, rate_hz, C) for C in CHOICES[1:]]
+    others = [_measure(walks, rate_hz, C) for C in CHOICES[1:]]
     return AxesFit(len(windows), stated, np.array([stated, *others]))
 
 
@@ -85,9 +85,8 @@ def refuses_choice(signals: SensorSignals, rate_hz: float, choice: Floats, param
     windows = _list_windows(signals, quiet.quiet, rate_hz, params)
     if len(windows) < params.least_windows:
         return False
-    gyr = signals.gyr - find_bias(signals, rate_hz, quiet)
-    stated = _measure(signals.acc, gyr, windows, rate_hz)
-    chosen = _measure(signals.acc, gyr, windows, rate_hz, choice)
+    walks = _list_walks(signals, windows, find_bias(signals, rate_hz, quiet))
+    stated, chosen = _measure(walks, rate_hz), _measure(walks, rate_hz, choice)
     return chosen > params.misfit_mps2 and chosen > params.distinct * stated
 
 
@@ -124,30 +123,50 @@ def _list_windows(signals: SensorSignals, quiet: Bools, rate_hz: float, params: 
 
 def _moves(signals: SensorSignals, window: _Window, params: SetupParams) -> bool:
     """A gyroscope in the wrong unit may seem not to turn: a force that shakes counts too."""
-    rate = np.sqrt((signals.gyr[window.order][window.part] ** 2).sum(axis=1).mean())
-    shaking = np.linalg.norm(signals.acc[window.order][window.part], axis=1).std()
+    gyr, acc = (signals.cut(name, window.order)[window.part] for name in ("gyr", "acc"))
+    rate, shaking = np.sqrt((gyr**2).sum(axis=1).mean()), np.linalg.norm(acc, axis=1).std()
     return bool(rate > params.least_rate or shaking > SHAKING)
 
 
-def _measure(
-    acc: Floats,
-    gyr: Floats,
-    windows: list[_Window],
-    rate_hz: float,
-    choice: Floats = CHOICES[0],
-    limit: float = np.inf,
-) -> float:
-    """RMS difference of a rest and the mean force carried back to it, m/s²; inf where above a limit."""
-    total = 0.0
+@dataclass(frozen=True, eq=False)
+class _Walk:
+    """What a sensor measured from a rest into the walking beside it, forwards or backwards.
+
+    Parameters
+    ----------
+    rate : (n, 3) rad/s, without bias. force : (n, 3) m/s². part : samples that are averaged. weights : of
+        these. level : (3,) mean force at rest, m/s².
+    """
+
+    rate: Floats
+    force: Floats
+    part: slice
+    weights: Floats
+    level: Floats
+
+
+def _list_walks(signals: SensorSignals, windows: list[_Window], bias: Floats) -> list[_Walk]:
+    walks = []
     for window in windows:
         step = -1.0 if window.order.step else 1.0
-        force, rate = np.ascontiguousarray(acc[window.order]), step * (gyr[window.order] @ choice.T)
+        rate = step * (signals.cut("gyr", window.order) - bias)
+        force = np.ascontiguousarray(signals.cut("acc", window.order))
+        weights = np.hanning(window.part.stop - window.part.start + 2)[1:-1]
+        level = signals.cut("acc", window.still).mean(axis=0)
+        walks.append(_Walk(rate, force, window.part, weights, level))
+    return walks
+
+
+def _measure(walks: list[_Walk], rate_hz: float, choice: Floats = CHOICES[0], limit: float = np.inf) -> float:
+    """RMS difference of a rest and the mean force carried back to it, m/s²; inf where above a limit."""
+    total = 0.0
+    for walk in walks:
+        rate, force, part = walk.rate @ choice.T, walk.force, walk.part
         level = AttitudeState(np.array([1.0, 0.0, 0.0, 0.0]), rate[0])
         q, _ = advance(level, rate, force, np.ones(len(force), np.bool_), rate_hz, 1.0, RIGID)
-        carried = rotate(q[window.part], force[window.part])
-        taper = np.hanning(len(carried) + 2)[1:-1]
-        off = taper @ carried / taper.sum() - acc[window.still].mean(axis=0)
+        carried = rotate(q[part], force[part])
+        off = walk.weights @ carried / walk.weights.sum() - walk.level
         total += float(off @ off)
-        if total > limit**2 * len(windows):
+        if total > limit**2 * len(walks):
             return np.inf
-    return float(np.sqrt(total / len(windows)))
+    return float(np.sqrt(total / len(walks)))

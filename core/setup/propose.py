@@ -20,7 +20,7 @@ from core.agreement.exchange import find_exchange
 from core.correction import AGAINST, AS_READ, SensorCorrection, name_axes
 from core.frames import FOOT, GRAVITY, SHANK, SIDES, THIGH, Floats, Segment
 from core.quality.sides import find_left_leg
-from core.quality.signals import measure_signal
+from core.quality.signals import Facts, measure_signal, measure_stream
 from core.quality.suspicion import list_suspicions
 from core.recording import ImuStream, Recording, UniformRecording
 from core.setup.axes import CHOICES, REVERSED, fit_axes, refuses_choice
@@ -71,7 +71,7 @@ def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
     corrections: dict[str, SensorCorrection] = {}
     said: list[str] = []
     for segment, stream in worn.items():
-        wrong = _list_errors(stream, SensorCorrection())
+        wrong = _list_errors(stream, measure_stream(stream), stream.acc)
         if not wrong:
             continue
         signs = AS_READ if "gravity_sign" not in wrong else AGAINST
@@ -79,7 +79,7 @@ def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
             SensorCorrection(acc_axes=signs, acc_times=a, gyr_times=g)
             for a, g in product(ACC_FACTORS, GYR_FACTORS)
         ]
-        good = [x for x in tried if not _list_errors(stream, x)]
+        good = [x for x in tried if not _list_remaining(stream, x)]
         least = min((len(x.to_json()) for x in good), default=0)
         simplest = [x for x in good if len(x.to_json()) == least]
         if len(simplest) == 1:
@@ -91,7 +91,7 @@ def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
         # one that moves too little to be refused was read like the others of its export
         one = next(iter(corrections.values()))
         rest = {s: x for s, x in worn.items() if x.device_id not in corrections}
-        follow = {s: x for s, x in rest.items() if not _list_errors(x, one)}
+        follow = {s: x for s, x in rest.items() if not _list_remaining(x, one)}
         corrections |= {x.device_id: one for x in follow.values()}
         said += follow
     return SetupRepair(
@@ -99,13 +99,16 @@ def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
     )
 
 
-def _list_errors(stream: ImuStream, correction: SensorCorrection) -> set[str]:
+def _list_remaining(stream: ImuStream, correction: SensorCorrection) -> set[str]:
+    """Codes of what is refused of a sensor that was put right."""
     acc = correction.correct_acc(stream.acc)
     gyr = None if stream.gyr is None else correction.correct_gyr(stream.gyr)
-    facts = measure_signal(acc, gyr, stream.rate_hz)
-    return {
-        n.code for n in list_suspicions(stream.device_id, facts, acc, stream.quat) if n.severity == "error"
-    }
+    return _list_errors(stream, measure_signal(acc, gyr, stream.rate_hz), acc)
+
+
+def _list_errors(stream: ImuStream, facts: Facts, acc: Floats) -> set[str]:
+    suspicions = list_suspicions(stream.device_id, facts, acc, stream.quat)
+    return {n.code for n in suspicions if n.severity == "error"}
 
 
 def _propose_axes(

@@ -11,6 +11,7 @@ import numpy as np
 
 from core.errors import Notice, SignalError
 from core.frames import Bools, Floats, Segment
+from core.held_samples import is_complete
 from core.recording import ImuStream, Recording, SensorSignals, UniformRecording
 from core.timeline.grid import lay_signal
 from core.timeline.params import TimelineParams
@@ -250,8 +251,3 @@ def _lay_magnetometer(
         return np.ascontiguousarray(mag[first : first + samples])
     values, _, _ = lay_signal(s.t_s[good], mag[good], start_s, samples, s.rate_hz, rate, params)
     return _hold_once(np.asarray(values[0]), mag[first:])
-
-
-def is_complete(x: Floats) -> Bools:
-    """Rows (n,) of x (n, c) without a missing value."""
-    return np.asarray(np.isfinite(x).all(axis=1), np.bool_)

@@ -24,6 +24,7 @@ OFFLINE: Final[tuple[Order, Order]] = (
         ("core.agreement.slips", "compile_agreement_kernels"),
         ("core.angles.kernel", "compile_angle_kernel"),
         ("core.peaks", "compile_peak_kernel"),
+        ("core.rest", "compile_rest_kernels"),
         ("core.body.l7s.inputs", "compile_gravity_kernel"),
         ("core.events", "compile_foot_contact_kernel"),
     ),

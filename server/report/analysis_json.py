@@ -14,6 +14,7 @@ from core.body.health import find_worst_verdict
 from core.body.model import LENGTHS
 from core.frames import SEGMENTS, Floats, Side
 from core.norms.controls import mean_curves
+from core.norms.profile import ScoreSpread
 from core.parameters.kinematic import read_cycles
 from core.parameters.result import CycleCurves, Parameter
 from core.quality import concern_paths_alone, find_shown_level
@@ -164,7 +165,11 @@ def _summarise_curves(analysis: TakeAnalysis) -> dict[str, object]:
 def score_rows(found: Scores) -> list[dict[str, object]]:
     """Profiles and indices as JSON; what belongs to one curve is left out."""
     return [
-        {name: reduce_to_plain(value) for name, value in asdict(s).items() if name != "variable"}
+        {
+            name: reduce_to_plain(asdict(value) if isinstance(value, ScoreSpread) else value)
+            for name, value in vars(s).items()
+            if name != "variable"
+        }
         for s in found.scores
         if s.variable is None
     ]

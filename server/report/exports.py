@@ -18,10 +18,10 @@ Undefined is an empty cell or null, never NaN. `server.report.bundle` reads them
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import repeat
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -45,6 +45,7 @@ from server.report.columns import (
     reduce_to_plain,
     single_precision,
     write_csv,
+    write_json,
 )
 
 if TYPE_CHECKING:
@@ -74,8 +75,8 @@ def analysis_files(analysis: TakeAnalysis, let_go: Callable[[], None] = lambda: 
     """
     if analysis.source.protocol == "activity":
         written = {} if analysis.activity is None else write_activity(analysis.activity)
-        return {"analysis.json": _json_bytes(summarise_analysis(analysis)), **written}
-    files = {"analysis.json": _json_bytes(summarise_analysis(analysis))}
+        return {"analysis.json": write_json(summarise_analysis(analysis)), **written}
+    files = {"analysis.json": write_json(summarise_analysis(analysis))}
     # what is written is let go of, where the caller keeps no name for the analysis
     recording, poses, angles = analysis.recording, analysis.poses, analysis.angles
     measured, squats, held = analysis.measured, analysis.squats, analysis.tracks
@@ -179,7 +180,7 @@ def strides_csv(strides: Strides, columns: Mapping[str, Column]) -> bytes:
     ----------
     columns : parameters by name, one entry per stride.
     """
-    lines = (
+    own = (
         (
             s.side,
             s.start_s,
@@ -188,14 +189,10 @@ def strides_csv(strides: Strides, columns: Mapping[str, Column]) -> bytes:
             s.opposite_tc_s,
             s.opposite_ic_s,
             None if s.turn_rad is None else math.degrees(s.turn_rad),
-            *(column[i] for column in columns.values()),
-            " ".join(s.flags),
-            s.excluded_reason,
         )
-        for i, s in enumerate(strides.strides)
+        for s in strides.strides
     )
+    why = ((" ".join(s.flags), s.excluded_reason) for s in strides.strides)
+    measured = zip(*columns.values(), strict=True) if columns else repeat(())
+    lines = ((*o, *m, *w) for o, m, w in zip(own, measured, why, strict=False))
     return write_csv((*STRIDE_COLUMNS, *columns, "flags", "excluded_reason"), lines)
-
-
-def _json_bytes(value: object) -> bytes:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False, indent=1).encode()

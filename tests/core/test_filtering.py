@@ -1,12 +1,13 @@
-"""The low-pass of whole signals: what it lets through, and that it moves nothing."""
+"""Low-passes of whole signals: what they let through, and that they move nothing."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 from scipy.signal import butter, sosfiltfilt
 
-from core.filtering import low_pass
+from core.filtering import LEAST_PIECE, low_pass, smooth_gaussian
 
 RATE = 100.0
 
@@ -47,3 +48,16 @@ def test_it_is_the_filter_of_scipy(cutoff_hz: float, rate_hz: float) -> None:
     for pad in (0, 30, round(2.0 * rate_hz)):
         expected = sosfiltfilt(section, rows, padlen=pad)
         np.testing.assert_allclose(low_pass(rows, cutoff_hz, rate_hz, pad), expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("sd", [0.4, 3.0, 60.0, 200.0])
+@pytest.mark.parametrize("n", [1, 50, LEAST_PIECE, 20_011])
+def test_a_gaussian_is_that_of_scipy(sd: float, n: int) -> None:
+    x = 9.81 + np.random.default_rng(1).normal(size=n)
+    np.testing.assert_allclose(smooth_gaussian(x, sd), gaussian_filter1d(x, sd, mode="nearest"), rtol=1e-14)
+
+
+def test_what_is_no_number_spoils_a_piece_of_a_gaussian_alone() -> None:
+    x = np.zeros(4 * LEAST_PIECE)
+    x[0] = np.nan
+    assert np.isfinite(smooth_gaussian(x, 3.0)[LEAST_PIECE:]).all()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -11,14 +13,14 @@ import pytest
 from core.formats import SourceFile, manifest_of, read_recording
 from core.frames import GRAVITY, Floats, Segment
 from core.quality import QualityReport, assess, concern_paths_alone, describe, suggest, suggest_segments
-from core.quality.signals import magnetic_share, measure_signal, saturation
+from core.quality.signals import magnetic_share, measure_signal, measure_stream, saturation
 from core.recording import ImuStream, Recording
 from core.rotation import about
 from core.simulate import simulate_scenario
 from core.timeline import synchronise
 from tests.core.formats.making import signals, stream, take
 from tests.core.formats.test_samples import gaitmap
-from tests.data import data_folder
+from tests.data import ROOT, data_folder
 
 NEURA: dict[str, Segment | None] = {
     "00B40B91": "pelvis", "00B40C45": "thigh_l", "00B40C3C": "thigh_r", "00B40BA5": "shank_l",
@@ -368,3 +370,18 @@ def test_two_sensors_that_name_their_side_alone_are_taken_for_the_feet() -> None
         assert set(
             suggest_segments(Recording({d: stream(d, ACC, GYR) for d in devices}, segments={})).values()
         ) == {None}
+
+
+def test_a_table_is_judged_without_a_compiler() -> None:
+    """The web process does: numba would cost it seconds and memory."""
+    code = "import sys, numpy as np; from core.quality.signals import measure_signal; "
+    code += "measure_signal(np.ones((200, 3)), np.zeros((200, 3)), 100.0); sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+
+
+def test_a_stream_is_measured_once() -> None:
+    one = stream("a", ACC, GYR)
+    facts = measure_stream(one)
+    assert facts == measure_signal(one.acc, one.gyr, one.rate_hz)
+    assert measure_stream(one) is facts
+    assert measure_stream(stream("a", 2.0 * ACC, GYR)) != facts

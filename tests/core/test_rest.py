@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.lib.stride_tricks import sliding_window_view
 
 from core.frames import Floats
 from core.recording import SensorSignals, Subject, UniformRecording
@@ -68,6 +69,24 @@ def test_rest_of_a_take_is_the_rest_of_all_its_sensors() -> None:
     assert first_end == pytest.approx(4.8, abs=0.3)
     assert second_start == pytest.approx(15.2, abs=0.3)
     assert find_rest_windows(recording, segments=["foot_r"])[0][1] == pytest.approx(6.8, abs=0.3)
+
+
+@pytest.mark.parametrize("width", [2, 50, 99, 100, 400])
+def test_quietness_is_of_the_window_around_each_sample(width: int) -> None:
+    signals, n = with_walk(still(400, np.radians([1.0, 2.0, -1.0])), 1.0, 2.0), 400
+    signals = replace(signals, valid=np.arange(n) != 300)
+    found = measure_quietness(signals, RATE, RestParams(window_s=width / RATE))
+    windows = sliding_window_view(signals.gyr, width, axis=0)
+    whole = np.asarray(sliding_window_view(signals.valid, width).all(axis=1))
+    spread = np.where(whole, windows.var(axis=2).sum(axis=1), np.inf)
+    offset = windows[np.argmin(spread)].mean(axis=1)
+    rate = sliding_window_view(np.linalg.norm(signals.gyr - offset, axis=1), width)
+    force = sliding_window_view(np.linalg.norm(signals.acc, axis=1), width)
+    at = np.clip(np.arange(n) - width // 2, 0, n - width)
+    np.testing.assert_allclose(found.gyro, rate.mean(axis=1)[at], atol=1e-9)
+    np.testing.assert_allclose(found.acc, force.std(axis=1)[at], atol=1e-6)
+    calm = (found.gyro < RestParams.gyro_limit) & (found.acc < RestParams.acc_std_limit)
+    np.testing.assert_array_equal(found.quiet, calm & whole[at])
 
 
 def test_a_lost_sensor_does_not_rest() -> None:

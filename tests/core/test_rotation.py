@@ -76,6 +76,12 @@ def test_exp_and_log_keep_small_angles(decade: float) -> None:
     np.testing.assert_allclose(rotation.log(rotation.exp(phi)), phi, rtol=1e-9)
 
 
+@given(arrays(np.float64, (5, 4), elements=components).map(lambda x: np.array([_unit(q) for q in x])))
+def test_the_vertical_in_a_body_is_that_of_a_rotation(q: Floats) -> None:
+    turned = rotation.rotate(rotation.conjugate(q), np.array([0.0, 0.0, 1.0]))
+    assert rotation.find_vertical(q).tobytes() == turned.tobytes()
+
+
 @given(quaternions, quaternions)
 def test_slerp_runs_along_the_shorter_arc_at_even_speed(p: Floats, q: Floats) -> None:
     half = rotation.slerp(p, q, 0.5)

@@ -10,6 +10,8 @@ ball, and its way tells how far it is from it (docs/science/l7s.md, "Where the s
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from itertools import pairwise
 from math import radians
 from typing import Final
@@ -32,6 +34,9 @@ LEAST_ROLL: Final = radians(5.0)
 
 LEAST_STRIDES: Final = 3
 
+TOGETHER: Final = 4096
+"""Samples that are laid out for the strides in them at a time."""
+
 ON_FOOT_M: Final = 0.12
 """No place on a foot is further from its middle."""
 
@@ -49,9 +54,15 @@ def find_sensor_offsets(inputs: L7sInputs | L7sTake, valid: Bools, model: LegMod
     found = np.zeros((len(LEGS), 3))
     for leg in range(len(LEGS)):
         b = 1 + leg
-        swings = (inputs.part(slice(*x)) for x in _swings(inputs.step[:, leg], valid[:, b], rate_hz))
-        found_balls = (_find_ball(x.R[:, b], x.acc[:, b], rate_hz) for x in swings)
-        seen = [ball for ball in found_balls if ball is not None]
+        seen = []
+        for swings in _take_together(_swings(inputs.step[:, leg], valid[:, b], rate_hz)):
+            begin = swings[0][0]
+            x = inputs.part(slice(begin, swings[-1][1]))
+            R, acc = x.R[:, b], x.acc[:, b]
+            rises = -np.arcsin(np.clip(R[:, 2, 2], -1.0, 1.0))
+            parts = (slice(first - begin, last - begin) for first, last in swings)
+            found_balls = (_find_ball(R[part], acc[part], rises[part], rate_hz) for part in parts)
+            seen += [ball for ball in found_balls if ball is not None]
         if len(seen) < LEAST_STRIDES:
             continue
         forward_down = np.median(seen, axis=0) - [0.0, 0.5 * model.foot]
@@ -70,32 +81,58 @@ def _swings(step: Bools, valid: Bools, rate_hz: float) -> list[tuple[int, int]]:
     ]
 
 
-def _find_ball(R: Floats, acc: Floats, rate_hz: float) -> Floats | None:
+def _take_together(swings: Iterable[tuple[int, int]]) -> Iterator[list[tuple[int, int]]]:
+    """Swings in order, as many at a time as lie within `TOGETHER` samples, or one."""
+    together: list[tuple[int, int]] = []
+    for swing in swings:
+        if together and swing[1] - together[0][0] > TOGETHER:
+            yield together
+            together = []
+        together.append(swing)
+    if together:
+        yield together
+
+
+def _find_ball(R: Floats, acc: Floats, rises: Floats, rate_hz: float) -> Floats | None:
     """The ball (2,) from the sensor along the foot's x (down) and z (forward), m; None where the heel stays.
 
     From (R₀ − R) b = p − p₀ by least squares over the push-off, p from the velocity less its linear drift.
 
     Parameters
     ----------
-    R : (m, 3, 3) and acc : (m, 3) of the foot from rest to rest.
+    R : (m, 3, 3) and acc : (m, 3) of the foot from rest to rest. rises : (m,) how steep its sole is, rad.
     """
-    rising = -np.arcsin(np.clip(R[:, 2, 2], -1.0, 1.0))
-    rising -= rising[0]
+    rising = rises - rises[0]
     highest = int(np.argmax(rising))
     if rising[highest] < LEAST_ROLL:
         return None
     # from its fastest rise on the foot is on its way
-    last = int(np.argmax(np.gradient(rising)[: highest + 1]))
+    last = int(np.argmax(_differentiate(rising)[: highest + 1]))
     over = np.flatnonzero(rising[: highest + 1] > ROLLS)
     last = min(last, int(over[0])) if len(over) else last
     if rising[last] < LEAST_ROLL:
         return None
     v = _integrate(acc, 1.0 / rate_hz)
-    v -= np.linspace(0.0, 1.0, len(v))[:, None] * v[-1]
+    v -= _ramp(len(v)) * v[-1]
     part = slice(0, last + 1)
     way = _integrate(v[part], 1.0 / rate_hz)
     turned = (R[0] - R[part])[:, :, ::2].reshape(-1, 2)
     return np.asarray(np.linalg.lstsq(turned, way.reshape(-1), rcond=None)[0])
+
+
+def _differentiate(x: Floats) -> Floats:
+    """Difference (m,) from sample to sample, the mean of both sides: `np.gradient` without its checks."""
+    steps = np.diff(x)
+    middle = (x[2:] - x[:-2]) / 2.0
+    return np.concatenate((steps[:1], middle, steps[-1:]))
+
+
+@lru_cache(maxsize=256)
+def _ramp(length: int) -> Floats:
+    """From 0 to 1 (length, 1); strides of a walk have few lengths."""
+    ramp = np.linspace(0.0, 1.0, length)[:, None]
+    ramp.setflags(write=False)
+    return ramp
 
 
 def _integrate(x: Floats, dt: float) -> Floats:

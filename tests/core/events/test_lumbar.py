@@ -9,7 +9,9 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from core.errors import SignalError
+from core.events import periodicity
 from core.events.lumbar import detect_steps
+from core.events.periodicity import step_times
 from core.events.steps import Steps
 from core.frames import GRAVITY, SIDES, Floats
 from core.recording import SensorSignals, Subject, UniformRecording
@@ -156,3 +158,23 @@ def test_what_cannot_be_read_is_refused_with_its_code() -> None:
 def test_a_take_of_a_moment_does_no_harm(n: int) -> None:
     rng = np.random.default_rng(0)
     assert detect_steps(made(rng.standard_normal((n, 3)), rng.standard_normal((n, 3)))).steps == ()
+
+
+def test_windows_that_are_looked_at_together_say_what_each_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    x = trunk("comfortable").sensors["pelvis"]
+    together = step_times(x.acc[:, 1], x.gyr, 100.0)
+    monkeypatch.setattr(periodicity, "TOGETHER", 1)
+    alone = step_times(x.acc[:, 1], x.gyr, 100.0)
+    np.testing.assert_array_equal(together.step_s, alone.step_s)
+    np.testing.assert_array_equal(together.score, alone.score)
+
+
+@pytest.mark.parametrize("step_s", [0.31, 0.6, 1.1])
+def test_a_wave_repeats_with_its_step_time(step_s: float) -> None:
+    t = np.arange(3000) / 100.0
+    up, turn = np.sin(2.0 * np.pi * t / step_s), np.sin(np.pi * t / step_s)
+    found = step_times(up, np.stack((turn, 0.0 * t, 0.5 * turn), axis=1), 100.0)
+    assert found.t_s[0] == 2.0
+    assert np.diff(found.t_s) == pytest.approx(1.0)
+    np.testing.assert_allclose(found.step_s, step_s, atol=0.011)
+    assert found.score.min() > 0.9
