@@ -8,7 +8,7 @@ from typing import Any
 import numba
 
 
-def inner_njit(**options: bool) -> Callable[[Callable[..., Any]], Any]:
+def inner_njit(**options: bool | str) -> Callable[[Callable[..., Any]], Any]:
     """A decorator like `numba.njit` without what Python and C would call the function by.
 
     That is a tenth of the time that the ErKF takes to compile. Python that calls such a function all the same

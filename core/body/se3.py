@@ -1,4 +1,4 @@
-"""The right Jacobian of SE(3) as a compiled loop, for the filter of L7S.
+"""Exponential and right Jacobian of SE(3) inside compiled loops, for the filter of L7S.
 
 ξ = (ρ, φ); T Exp(ξ) = (R Exp(φ), p + R J_l(φ) ρ). ad(ξ) = [[φ×, ρ×], [0, φ×]];
 Φ(ξ) = Σ (−1)^i/(i+1)! ad(ξ)^i (Sy 2021 eq 8) is the right Jacobian. What turns alone needs:
@@ -8,45 +8,97 @@ Source: docs/science/l7s.md, "Frames and symbols"; Barfoot 2017, State Estimatio
 
 from __future__ import annotations
 
+from math import factorial, sin, sqrt
+
 import numba
 
-from core.frames import Floats
-from core.rotation.compiled import multiply3, skew
+from core.inner import inner_njit
+from core.rotation.compiled import multiply3, orthonormalise, skew_polynomial
 
-TERMS = 40
-"""Terms after which a series has surely ended: the angles are below π."""
+SMALL = 0.25
+"""Square of the angle up to which seven terms of a series are exact to 1e-17: no sine is needed."""
+
+_A = tuple((-1.0) ** k / factorial(2 * k + 2) for k in range(7))
+_B = tuple((-1.0) ** k / factorial(2 * k + 3) for k in range(7))
+_SLOPE_A = tuple((-1.0) ** k * 2 * k / factorial(2 * k + 2) for k in range(1, 8))
+_SLOPE_B = tuple((-1.0) ** k * 2 * k / factorial(2 * k + 3) for k in range(1, 8))
+
+
+@inner_njit(_nrt=False)
+def _sum_powers(terms, x):  # type: ignore[no-untyped-def]
+    total = terms[6]
+    for k in range(5, -1, -1):
+        total = total * x + terms[k]
+    return total
+
+
+@inner_njit(error_model="numpy", _nrt=False)
+def _quotients(square):  # type: ignore[no-untyped-def]
+    """a = (1 − cos θ) / θ² and b = (θ − sin θ) / θ³ of an angle θ given as its square."""
+    if square < SMALL:
+        return _sum_powers(_A, square), _sum_powers(_B, square)
+    angle = sqrt(square)
+    return 2.0 * (sin(0.5 * angle) / angle) ** 2, (1.0 - sin(angle) / angle) / square
+
+
+@inner_njit(error_model="numpy", _nrt=False)
+def _slopes(square, a, b):  # type: ignore[no-untyped-def]
+    """Derivatives of a and b by θ, over θ."""
+    if square < SMALL:
+        return _sum_powers(_SLOPE_A, square), _sum_powers(_SLOPE_B, square)
+    return (1.0 - square * b - 2.0 * a) / square, (a - 3.0 * b) / square
+
+
+@inner_njit(_nrt=False)
+def move_pose(R, p, xi, at, work):  # type: ignore[no-untyped-def]
+    """T ← T Exp(ξ) of a pose R (3, 3), p (3,); ξ is xi[at : at + 6], work (3, 3, 3) of scratch."""
+    x, y, z = xi[at + 3], xi[at + 4], xi[at + 5]
+    r, s, t = xi[at], xi[at + 1], xi[at + 2]
+    square = x * x + y * y + z * z
+    a, b = _quotients(square)
+    # J_l ρ = ρ + a φ × ρ + b φ × (φ × ρ)
+    i, j, k = y * t - z * s, z * r - x * t, x * s - y * r
+    r, s, t = (
+        r + a * i + b * (y * k - z * j),
+        s + a * j + b * (z * i - x * k),
+        t + a * k + b * (x * j - y * i),
+    )
+    for c in range(3):
+        p[c] += R[c, 0] * r + R[c, 1] * s + R[c, 2] * t
+    turned = work[0]
+    skew_polynomial(xi[at + 3 : at + 6], 1.0, 1.0 - square * b, a, turned)
+    multiply3(R, turned, work[1])
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = work[1, i, j]
+    orthonormalise(R, work)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def right_jacobian(rho: Floats, phi: Floats, same: Floats, cross: Floats, work: Floats) -> None:
-    """Write Φ(ξ) = [[same, cross], [0, same]], blocks (3, 3); work is (5, 3, 3) of scratch.
+def right_jacobian(xi, at, same, cross):  # type: ignore[no-untyped-def]
+    """Write Φ(ξ) = [[same, cross], [0, same]], blocks (3, 3); ξ is xi[at : at + 6].
 
-    The powers of ad keep that form: ad^{i+1} has φ× Aⁱ on the diagonal and φ× Bⁱ + ρ× Aⁱ beside it.
+    `same` is J_r(φ) = 1 − a [φ]× + b [φ]×², `cross` its derivative along ρ: the series of Φ differentiated
+    term by term, as ad(ξ)^i has the derivative of [φ]×^i beside its diagonal.
     """
-    turn, shift, a, b, c = work[0], work[1], work[2], work[3], work[4]
-    skew(phi, turn)
-    skew(rho, shift)
-    for i in range(3):
-        for j in range(3):
-            a[i, j] = 1.0 if i == j else 0.0
-            b[i, j] = 0.0
-            same[i, j] = a[i, j]
-            cross[i, j] = 0.0
-    factor = 1.0
-    for term in range(1, TERMS):
-        factor = -factor / (term + 1)
-        multiply3(turn, b, c)
-        largest = 0.0
-        for i in range(3):
-            for j in range(3):
-                b[i, j] = c[i, j] + shift[i, 0] * a[0, j] + shift[i, 1] * a[1, j] + shift[i, 2] * a[2, j]
-                cross[i, j] += factor * b[i, j]
-                largest = max(largest, abs(factor * b[i, j]))
-        multiply3(turn, a, c)
-        for i in range(3):
-            for j in range(3):
-                a[i, j] = c[i, j]
-                same[i, j] += factor * a[i, j]
-                largest = max(largest, abs(factor * a[i, j]))
-        if largest < 1e-18:
-            break
+    x, y, z = xi[at + 3], xi[at + 4], xi[at + 5]
+    r, s, t = xi[at], xi[at + 1], xi[at + 2]
+    square, along = x * x + y * y + z * z, x * r + y * s + z * t
+    a, b = _quotients(square)
+    slope_a, slope_b = _slopes(square, a, b)
+    skew_polynomial(xi[at + 3 : at + 6], 1.0, -a, b, same)
+    # −a [ρ]× − slope_a (φ·ρ) [φ]×
+    c, d = a, slope_a * along
+    i, j, k = c * r + d * x, c * s + d * y, c * t + d * z
+    # b (φρᵀ + ρφᵀ − 2 (φ·ρ)) + slope_b (φ·ρ) (φφᵀ − θ²)
+    d = slope_b * along
+    trace = -2.0 * b * along - d * square
+    cross[0, 0] = trace + 2.0 * b * x * r + d * x * x
+    cross[1, 1] = trace + 2.0 * b * y * s + d * y * y
+    cross[2, 2] = trace + 2.0 * b * z * t + d * z * z
+    both = b * (x * s + y * r) + d * x * y
+    cross[0, 1], cross[1, 0] = both + k, both - k
+    both = b * (x * t + z * r) + d * x * z
+    cross[0, 2], cross[2, 0] = both - j, both + j
+    both = b * (y * t + z * s) + d * y * z
+    cross[1, 2], cross[2, 1] = both + i, both - i

@@ -146,6 +146,7 @@ def filter_block(
     EstimationError `bad_signal` when an input is not finite, `l7s_diverged` when a constraint cannot be met.
     """
     from core.body.l7s import kernel
+    from core.body.l7s.updates import WIDTH
 
     params = params or L7sParams()
     R = np.ascontiguousarray(inputs.R, np.float64)
@@ -166,8 +167,11 @@ def filter_block(
         )
     now = L7sState(*(np.array(x, np.float64, order="C") for x in vars(state).values()))
     track = L7sTrack(np.empty((n, 3, 3, 3)), np.empty((n, 3, 3)), np.empty((n, 3, 3)), np.empty((n, SIZE)))
+    wide = np.zeros((WIDTH, WIDTH))
+    wide[:SIZE, :SIZE] = now.P
     failed = kernel.run_l7s_kernel(
-        now.R, now.p, now.v, now.P, now.since, R, acc, step, inputs.worn == "3I", 1.0 / rate_hz,
+        now.R, now.p, now.v, wide.reshape(-1), np.zeros(WIDTH), now.since,
+        R, acc, step, inputs.worn == "3I", 1.0 / rate_hz,
         np.array([0.5 * model.hip_width, 0.5 * model.foot, model.thigh + model.shank]),
         np.array([model.hip_height, model.foot_height]),
         np.array([
@@ -177,6 +181,7 @@ def filter_block(
         np.array([params.acceleration, params.orientation_step]),
         params.adjoint == "printed", params.projections, track.R, track.p, track.v, track.variance,
     )  # fmt: skip
+    now.P[:] = wide[:SIZE, :SIZE]
     if failed >= 0 or not all(np.isfinite(x).all() for x in vars(now).values()):
         raise EstimationError(
             "l7s_diverged",

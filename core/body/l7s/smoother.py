@@ -17,11 +17,11 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.l7s.constraints import project
+from core.body.l7s.constraints import make_scratch, project_places
 from core.body.l7s.filter import L7sInputs, L7sTrack
 from core.body.l7s.foot_place import find_sensor_offsets
 from core.body.l7s.legs import LegModel
-from core.body.l7s.updates import N
+from core.body.l7s.node_kernel import KEPT, move_nodes
 from core.errors import EstimationError
 from core.frames import Bools, Floats
 
@@ -71,9 +71,6 @@ ANYWHERE: Final = 10.0
 PASSES: Final = 20
 SETTLED_M: Final = 1e-4
 """Gauss–Newton ends when no node moves further, after 11 to 14 passes on right walks."""
-
-BAND: Final = 18
-"""A node (9 places) is tied to the next but one."""
 
 PROJECTIONS: Final = 3
 
@@ -130,8 +127,9 @@ def smooth_track(
     if len(at) > 2:
         free = _integrate_twice(acc, dt)
         free[:, 1:] += np.einsum("nbij,bj->nbi", R[:, 1:], offsets)
-        x, passes = _solve_nodes(
-            p[at].reshape(-1, 9), free[at].reshape(-1, 9), np.ascontiguousarray(R[at]),
+        filtered = p[at].reshape(-1, 9)
+        x, passes = solve_nodes(
+            filtered, filtered, free[at].reshape(-1, 9), np.ascontiguousarray(R[at]),
             np.maximum.reduceat(density, at, axis=0), np.minimum.reduceat(inputs.step, at, axis=0), hop * dt,
             lengths, np.array([model.hip_height, model.foot_height]),
         )  # fmt: skip
@@ -159,28 +157,40 @@ NOT_FOUND: Final = (
 )
 
 
-def _solve_nodes(
-    start: Floats, free: Floats, R: Floats, density: Floats, still: Bools, hop_s: float, lengths: Floats,
-    heights: Floats,
+def solve_nodes(
+    x: Floats, pull: Floats, free: Floats, R: Floats, density: Floats, still: Bools, hop_s: float,
+    lengths: Floats, heights: Floats,
 ) -> tuple[Floats, int]:  # fmt: skip
-    """Places (T, 9) of the nodes by Gauss–Newton, and the passes it took; arguments as `write_equations`."""
-    from scipy.linalg import solveh_banded
+    """Places (T, 9) of the nodes by Gauss–Newton, and the passes it took.
 
-    x = start.copy()
+    Parameters
+    ----------
+    x : (T, 9) to begin with. pull : (T, 9) the filter's. free : (T, 9) ways by integration. density : (T, 3)
+    and still : (T, 2) from each node to the next. lengths : half hip width, half foot, leg, leg that carries.
+    heights : pelvis, foot.
+
+    Raises
+    ------
+    EstimationError `l7s_diverged` when there are none.
+    """
+    x = x.copy()
     bent = np.zeros_like(x)
     bent[1:-1] = free[2:] - 2.0 * free[1:-1] + free[:-2]
-    # by columns, as the solver takes it: any other way round it is copied
-    band, slope = np.empty((BAND + 1, x.size), order="F"), np.empty(x.size)
+    stiff = np.zeros((len(x) + 1, 3))
+    stiff[1:-2] = 1.0 / (np.maximum(density[:-2], density[1:-1]) * hop_s**3)
+    hold = np.array([
+        hop_s / ANYWHERE, 1.0 / REST_M**2, hop_s / MID_PELVIS, hop_s / PELVIS_HEIGHT,
+        hop_s / FOOT_HEIGHT[1], hop_s / FOOT_HEIGHT[0],
+    ])  # fmt: skip
+    spread = hop_s / np.array([HINGE, CARRIES, LONGER])
+    kept = np.empty((len(x), KEPT))
     passes = 0
     while passes < PASSES:
         passes += 1
-        write_equations(x, start, R, bent, density, still, hop_s, lengths, heights, band, slope)
-        try:
-            move = solveh_banded(band, slope, overwrite_ab=True, lower=True, check_finite=False)
-        except np.linalg.LinAlgError:
-            raise EstimationError("l7s_diverged", NOT_FOUND) from None
-        x -= move.reshape(x.shape)
-        if np.abs(move).max() < SETTLED_M:
+        most = move_nodes(x, pull, R, bent, stiff, still, hold, spread, lengths, heights, kept)
+        if np.isnan(most):
+            raise EstimationError("l7s_diverged", NOT_FOUND)
+        if most < SETTLED_M:
             break
     return x, passes
 
@@ -211,101 +221,16 @@ def _interpolate(slow: Floats, at: np.ndarray, n: int) -> Floats:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _add(band, slope, index, value, residual, weight):  # type: ignore[no-untyped-def]
-    """Add one row, `value` at `index`, to the normal equations: lower band and right side."""
-    for a in range(len(index)):
-        w = weight * value[a]
-        slope[index[a]] += w * residual
-        for b in range(len(index)):
-            if index[a] >= index[b]:
-                band[index[a] - index[b], index[b]] += w * value[b]
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _reach(R, p, leg, lengths, tau):  # type: ignore[no-untyped-def]
-    """Write the vector (3,) from ankle to hip; return its length. R (3, 3, 3), p (3, 3) of BODIES."""
-    side = 1.0 if leg == 0 else -1.0
-    square = 0.0
-    for i in range(3):
-        hip = p[0, i] + side * lengths[0] * R[0, i, 1]
-        tau[i] = hip - p[1 + leg, i] + lengths[1] * R[1 + leg, i, 2]
-        square += tau[i] * tau[i]
-    return np.sqrt(square)
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def write_equations(  # type: ignore[no-untyped-def]
-    x, start, R, bent, density, still, hop, lengths, heights, band, slope
-):
-    """Write band (19, 9 T) and right side (9 T,) of the least-squares problem at places x (T, 9).
-
-    start : the filter's. R : (T, 3, 3, 3). bent : second differences of the integrated accelerations.
-    density : (T, 3) and still : (T, 2) from each node to the next. lengths : half hip width, half foot, leg,
-    leg that carries. heights : pelvis, foot.
-    """
-    T = x.shape[0]
-    band[:] = 0.0
-    slope[:] = 0.0
-    index, value, tau = np.empty(6, np.int64), np.empty(6), np.empty(3)
-    for k in range(T):
-        o = 9 * k
-        for j in range(9):
-            index[0], value[0] = o + j, 1.0
-            _add(band, slope, index[:1], value[:1], x[k, j] - start[k, j], hop / ANYWHERE)
-            if 0 < k < T - 1:
-                index[0], index[1], index[2] = o + j - 9, o + j, o + j + 9
-                value[0], value[1], value[2] = 1.0, -2.0, 1.0
-                residual = x[k - 1, j] - 2.0 * x[k, j] + x[k + 1, j] - bent[k, j]
-                most = max(density[k - 1, j // 3], density[k, j // 3])
-                _add(band, slope, index[:3], value[:3], residual, 1.0 / (most * hop**3))
-        for i in range(2):
-            index[0], index[1], index[2] = o + i, o + 3 + i, o + 6 + i
-            value[0], value[1], value[2] = 1.0, -0.5, -0.5
-            residual = x[k, i] - 0.5 * x[k, 3 + i] - 0.5 * x[k, 6 + i]
-            _add(band, slope, index[:3], value[:3], residual, hop / MID_PELVIS)
-        index[0], value[0] = o + 2, 1.0
-        _add(band, slope, index[:1], value[:1], x[k, 2] - heights[0], hop / PELVIS_HEIGHT)
-        for leg in range(2):
-            f = 3 * (1 + leg)
-            index[0], value[0] = o + f + 2, 1.0
-            spread = FOOT_HEIGHT[0] if still[k, leg] else FOOT_HEIGHT[1]
-            _add(band, slope, index[:1], value[:1], x[k, f + 2] - heights[1], hop / spread)
-            if still[k, leg] and k < T - 1:
-                for i in range(3):
-                    index[0], index[1] = o + f + i, o + f + i + 9
-                    value[0], value[1] = -1.0, 1.0
-                    _add(band, slope, index[:2], value[:2], x[k + 1, f + i] - x[k, f + i], 1.0 / REST_M**2)
-            reach = _reach(R[k], x[k].reshape(3, 3), leg, lengths, tau)
-            across = 0.0
-            for i in range(3):
-                y = R[k, 1 + leg, i, 1]
-                across += y * tau[i]
-                index[i], value[i] = o + i, y
-                index[3 + i], value[3 + i] = o + f + i, -y
-            _add(band, slope, index[:6], value[:6], across, hop / HINGE)
-            for i in range(3):
-                value[i], value[3 + i] = tau[i] / reach, -tau[i] / reach
-            if still[k, leg] and not still[k, 1 - leg]:
-                _add(band, slope, index[:6], value[:6], reach - lengths[3], hop / CARRIES)
-            if reach > lengths[2]:
-                _add(band, slope, index[:6], value[:6], reach - lengths[2], hop / LONGER)
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _project_all(R, p, lengths):  # type: ignore[no-untyped-def]
     """Project every sample onto the constraints in place; return the sample that failed, −1 if none did.
 
     The filter's projection with what may move here: a foot turns by 0.1 rad as easily as a body shifts by
     1 cm, the pelvis keeps its orientation.
     """
-    P = np.zeros((N, N))
-    for b in range(3):
-        for i in range(3):
-            P[6 * b + i, 6 * b + i] = 1e-4
-            P[6 * b + 3 + i, 6 * b + 3 + i] = 1e-2 if b > 0 else 1e-8
-    dx, work, v = np.zeros(N), np.empty((7, 3, 3)), np.zeros((3, 3))
+    spread = np.array([1e-4, 1e-4, 1e-4, 1e-8, 1e-8, 1e-8, 1e-4, 1e-4, 1e-4, 1e-2, 1e-2, 1e-2])
+    dx, scratch = np.zeros(18), make_scratch()
     for k in range(R.shape[0]):
         for _ in range(PROJECTIONS):
-            if not project(R[k], p[k], v, P, lengths[0], lengths[1], lengths[2], dx, work):
+            if not project_places(R[k], p[k], spread, lengths, dx, scratch):
                 return k
     return -1

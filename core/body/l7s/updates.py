@@ -3,86 +3,138 @@
 X ← X Exp(ε), ε = (ρ_p φ_p ρ_lf φ_lf ρ_rf φ_rf ν_p ν_lf ν_rf). With diagonal R the stacked update of Sy 2021
 eq 9–12 equals one row after the other at one linearisation: the correction dx is added up and the residual of
 each row is taken at dx (docs/science/erkf.md, "Corrections").
+
+P lies flat, its rows filled up with zeros to 28 numbers: the compiler sees then how far they are from each
+other, and works on four or eight numbers of a row at once.
 """
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numba
 import numpy as np
 
-from core.body.se3 import right_jacobian
+from core.body.se3 import move_pose, right_jacobian
 from core.inner import inner_njit
-from core.rotation.compiled import exp_so3, multiply3, orthonormalise
 
 N = 27
 """Length of the error vector."""
 
+WIDTH = 28
+"""Of a row of P, and rows of it: the last of both is 0."""
+
 VELOCITY = 18
-"""Where the velocities begin in it."""
+"""Where the velocities begin in the error vector."""
 
 
 @inner_njit()
-def apply_row(P, dx, index, value, residual, variance, gain):  # type: ignore[no-untyped-def]
-    """One row of the stacked update: H is `value` (k,) at `index` (k,), else 0; gain (27,) is scratch."""
-    total, count = variance, len(index)
-    for j in range(N):
-        s = 0.0
-        for k in range(count):
-            s += value[k] * P[index[k], j]
-        gain[j] = s
-    for k in range(count):
-        total += value[k] * gain[index[k]]
-        residual -= value[k] * dx[index[k]]
-    for i in range(N):
-        g = gain[i] / total
-        dx[i] += g * residual
-        for j in range(i + 1):
-            P[i, j] -= g * gain[j]
-            P[j, i] = P[i, j]
+def make_form():  # type: ignore[no-untyped-def]
+    """Room for three rows of a measurement, as `apply_rows` takes them."""
+    return np.zeros(3, np.int64), np.zeros((3, 9)), np.zeros(3), np.zeros(3), np.zeros(3 * WIDTH)
+
+
+@inner_njit(error_model="numpy", _nrt=False)
+def apply_rows(P, dx, triples, form):  # type: ignore[no-untyped-def]
+    """Three rows of the stacked update, P at the end: fetching it costs more than the arithmetic.
+
+    Parameters
+    ----------
+    dx : (28,), of a length that the compiler does not know: known loops it unrolls, and does not work on
+    vectors. triples : how many places, rotations or velocities the rows read. form : of `make_form`; where
+    they begin in ε, H of the rows at those, residuals, variances, and room for gains. A row of zeros changes
+    nothing.
+    """
+    at, H, residual, variance, gain = form
+    n = len(dx)
+    for j in range(3 * n):
+        gain[j] = 0.0
+    for t in range(triples):
+        rows, k = P[WIDTH * at[t] :], 3 * t
+        a, b, c, d, e, f = H[0, k], H[0, k + 1], H[0, k + 2], H[1, k], H[1, k + 1], H[1, k + 2]
+        g, h, i = H[2, k], H[2, k + 1], H[2, k + 2]
+        for j in range(n):
+            x, y, z = rows[j], rows[WIDTH + j], rows[2 * WIDTH + j]
+            gain[j] += a * x + b * y + c * z
+            gain[WIDTH + j] += d * x + e * y + f * z
+            gain[2 * WIDTH + j] += g * x + h * y + i * z
+    for m in range(3):
+        own, total, left = WIDTH * m, variance[m], residual[m]
+        for before in range(0, own, WIDTH):
+            share = 0.0
+            for t in range(triples):
+                for i in range(3):
+                    share += H[m, 3 * t + i] * gain[before + at[t] + i]
+            for j in range(n):
+                gain[own + j] -= share * gain[before + j]
+        for t in range(triples):
+            for i in range(3):
+                total += H[m, 3 * t + i] * gain[own + at[t] + i]
+                left -= H[m, 3 * t + i] * dx[at[t] + i]
+        # P − g gᵀ with g over the root: as symmetric as P was
+        scale = 1.0 / sqrt(total)
+        left *= scale
+        for j in range(n):
+            gain[own + j] *= scale
+            dx[j] += gain[own + j] * left
+    for i in range(0, WIDTH, 2):
+        row = WIDTH * i
+        a, b, c = gain[i], gain[WIDTH + i], gain[2 * WIDTH + i]
+        d, e, f = gain[i + 1], gain[WIDTH + i + 1], gain[2 * WIDTH + i + 1]
+        for j in range(n):
+            x, y, z = gain[j], gain[WIDTH + j], gain[2 * WIDTH + j]
+            P[row + j] -= a * x + b * y + c * z
+            P[row + WIDTH + j] -= d * x + e * y + f * z
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def inject(R, p, v, dx, work):  # type: ignore[no-untyped-def]
-    """X ← X Exp(dx); work is (5, 3, 3) of scratch."""
-    for b in range(3):
-        rho, phi = dx[6 * b : 6 * b + 3], dx[6 * b + 3 : 6 * b + 6]
-        exp_so3(phi, work[0], work[1])
-        along = np.empty(3)
+    """X ← X Exp(dx); work is (3, 3, 3) of scratch."""
+    for b in range(len(R)):
+        move_pose(R[b], p[b], dx, 6 * b, work)
         for i in range(3):
-            along[i] = work[1, i, 0] * rho[0] + work[1, i, 1] * rho[1] + work[1, i, 2] * rho[2]
-        for i in range(3):
-            p[b, i] += R[b, i, 0] * along[0] + R[b, i, 1] * along[1] + R[b, i, 2] * along[2]
             v[b, i] += dx[VELOCITY + 3 * b + i]
-        multiply3(R[b], work[0], work[2])
-        R[b] = work[2]
-        orthonormalise(R[b], work[3:5])
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def reset(P, dx, work):  # type: ignore[no-untyped-def]
-    """P ← Φ(dx) P Φ(dx)ᵀ (eq 12), then symmetric again; work is (7, 3, 3) of scratch."""
-    same, cross = work[5], work[6]
-    column = np.empty(6)
+def reset(P, dx, blocks):  # type: ignore[no-untyped-def]
+    """P ← Φ(dx) P Φ(dx)ᵀ (eq 12), symmetric again; `blocks` (3, 2, 3, 3) is scratch."""
     for b in range(3):
-        at = 6 * b
-        right_jacobian(dx[at : at + 3], dx[at + 3 : at + 6], same, cross, work[:5])
-        for across in range(2):
-            for j in range(N):
-                for i in range(6):
-                    column[i] = P[at + i, j] if across == 0 else P[j, at + i]
-                for i in range(3):
-                    rho = phi = 0.0
-                    for k in range(3):
-                        rho += same[i, k] * column[k] + cross[i, k] * column[3 + k]
-                        phi += same[i, k] * column[3 + k]
-                    if across == 0:
-                        P[at + i, j] = rho
-                        P[at + 3 + i, j] = phi
-                    else:
-                        P[j, at + i] = rho
-                        P[j, at + 3 + i] = phi
-    for i in range(N):
+        right_jacobian(dx, 6 * b, blocks[b, 0], blocks[b, 1])
+    n = len(dx)
+    _turn_rows(P, blocks, n)
+    _transpose(P, n)
+    _turn_rows(P, blocks, n)
+    for i in range(n):
         for j in range(i):
-            mean = 0.5 * (P[i, j] + P[j, i])
-            P[i, j] = mean
-            P[j, i] = mean
+            mean = 0.5 * (P[WIDTH * i + j] + P[WIDTH * j + i])
+            P[WIDTH * i + j] = mean
+            P[WIDTH * j + i] = mean
+
+
+@inner_njit(_nrt=False)
+def _turn_rows(P, blocks, n):  # type: ignore[no-untyped-def]
+    """P ← Φ P."""
+    for b in range(3):
+        J, K, rows = blocks[b, 0], blocks[b, 1], P[WIDTH * 6 * b :]
+        for j in range(n):
+            r, s, t = rows[j], rows[j + WIDTH], rows[j + 2 * WIDTH]
+            x, y, z = rows[j + 3 * WIDTH], rows[j + 4 * WIDTH], rows[j + 5 * WIDTH]
+            rows[j] = J[0, 0] * r + J[0, 1] * s + J[0, 2] * t + K[0, 0] * x + K[0, 1] * y + K[0, 2] * z
+            rows[j + WIDTH] = (
+                J[1, 0] * r + J[1, 1] * s + J[1, 2] * t + K[1, 0] * x + K[1, 1] * y + K[1, 2] * z
+            )
+            rows[j + 2 * WIDTH] = (
+                J[2, 0] * r + J[2, 1] * s + J[2, 2] * t + K[2, 0] * x + K[2, 1] * y + K[2, 2] * z
+            )
+            rows[j + 3 * WIDTH] = J[0, 0] * x + J[0, 1] * y + J[0, 2] * z
+            rows[j + 4 * WIDTH] = J[1, 0] * x + J[1, 1] * y + J[1, 2] * z
+            rows[j + 5 * WIDTH] = J[2, 0] * x + J[2, 1] * y + J[2, 2] * z
+
+
+@inner_njit(_nrt=False)
+def _transpose(P, n):  # type: ignore[no-untyped-def]
+    """P ← Pᵀ."""
+    for i in range(n):
+        for j in range(i):
+            P[WIDTH * i + j], P[WIDTH * j + i] = P[WIDTH * j + i], P[WIDTH * i + j]

@@ -71,8 +71,8 @@ def random_state(seed: int) -> tuple[Floats, Floats, Floats]:
 def test_constraint_rows_are_the_derivatives_of_what_they_hold(leg: int, reach: float) -> None:
     R, p, v = random_state(3 + leg)
     p[1 + leg] = p[0] + reach * np.array([0.1, 0.2, -1.0])
-    C, d = np.zeros((2, 27)), np.zeros(2)
-    count = constraint_rows(R, p, leg, 0.09, 0.1, 0.9, C, d)
+    C, d = np.zeros((2, 12)), np.zeros(2)
+    count = constraint_rows(R, p, leg, 0.09, 0.1, 0.9, C, d, 0)
     assert count == (2 if reach > 1 else 1)
     step, work = 1e-6, np.empty((7, 3, 3))
     for k in range(27):
@@ -83,19 +83,21 @@ def test_constraint_rows_are_the_derivatives_of_what_they_hold(leg: int, reach: 
             Rk, pk, vk = R.copy(), p.copy(), v.copy()
             inject(Rk, pk, vk, dx, work)
             there = np.zeros(2)
-            constraint_rows(Rk, pk, leg, 0.09, 0.1, 0.9, np.zeros((2, 27)), there)
+            constraint_rows(Rk, pk, leg, 0.09, 0.1, 0.9, np.zeros((2, 12)), there, 0)
             ends.append(there)
         # d is what is missing: minus the constraint
         slope = -(ends[0] - ends[1]) / (2.0 * step)
-        np.testing.assert_allclose(C[:count, k], slope[:count], atol=1e-7)
+        row = np.zeros((count, 27))
+        row[:, :6], row[:, 6 + 6 * leg : 12 + 6 * leg] = C[:count, :6], C[:count, 6:]
+        np.testing.assert_allclose(row[:, k], slope[:count], atol=1e-7)
 
 
 def test_the_reset_turns_the_covariance_by_the_right_jacobian_of_the_correction() -> None:
     rng = np.random.default_rng(5)
-    for scale in (1e-6, 0.1, 1.5):
+    for scale in (1e-6, 0.1, 0.28, 0.3, 1.5):
         rho, phi = rng.normal(0.0, 1.0, 3), scale * rng.normal(0.0, 1.0, 3)
         same, cross = np.empty((3, 3)), np.empty((3, 3))
-        right_jacobian(rho, phi, same, cross, np.empty((5, 3, 3)))
+        right_jacobian(np.concatenate((rho, phi)), 0, same, cross)
         J = np.block([[same, cross], [np.zeros((3, 3)), same]])
         for k in range(6):
             ends = []
@@ -121,10 +123,18 @@ def test_the_reset_turns_the_covariance_by_the_right_jacobian_of_the_correction(
 def test_the_reset_keeps_the_covariance_symmetric_and_positive() -> None:
     rng = np.random.default_rng(6)
     A = rng.normal(0.0, 1.0, (27, 27))
-    P = A @ A.T + np.eye(27)
-    reset(P, rng.normal(0.0, 0.3, 27), np.empty((7, 3, 3)))
+    P, dx, turn = np.zeros((28, 28)), np.zeros(28), np.eye(27)
+    P[:27, :27], dx[:27] = A @ A.T + np.eye(27), rng.normal(0.0, 0.3, 27)
+    for at in (0, 6, 12):
+        same, cross = np.empty((3, 3)), np.empty((3, 3))
+        right_jacobian(dx, at, same, cross)
+        turn[at : at + 6, at : at + 6] = np.block([[same, cross], [np.zeros((3, 3)), same]])
+    turned = turn @ P[:27, :27] @ turn.T
+    reset(P.reshape(-1), dx, np.empty((3, 2, 3, 3)))
+    np.testing.assert_allclose(P[:27, :27], turned, rtol=1e-12, atol=1e-12)
     assert np.array_equal(P, P.T)
-    assert np.linalg.eigvalsh(P)[0] > 0.0
+    assert np.linalg.eigvalsh(P[:27, :27])[0] > 0.0
+    assert not P[27].any()
 
 
 # docs/science/l7s.md, "Limits on simulated walks": limits of RMSE (offset removed) and correlation of hip,

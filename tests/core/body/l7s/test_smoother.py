@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 import pytest
-from scipy.linalg import solveh_banded
 
 from core.body.l7s import smoother
 from core.body.l7s.filter import L7sInputs, L7sTrack, Worn, filter_block, start_l7s_state
 from core.body.l7s.inputs import free_acceleration, take_of
 from core.body.l7s.legs import LegModel, solve_legs
-from core.body.l7s.smoother import BAND, WholeTrack, smooth_track, write_equations
+from core.body.l7s.smoother import WholeTrack, smooth_track, solve_nodes
 from core.calibration import calibrate
-from core.frames import Floats
+from core.errors import EstimationError
+from core.frames import Bools, Floats
 from core.fusion.mahony import estimate_orientations
 from core.rotation import about, exp, to_matrix
 from tests.accuracy.l7s_walks import steps_of
@@ -40,38 +41,90 @@ def whole(worn: Worn) -> WholeTrack:
     return smooth_track(track, inputs, np.ones((len(inputs.step), 3), bool), model, 100.0)
 
 
-def equations(x: Floats, seed: int) -> tuple[Floats, Floats]:
-    """Band and right side at places x (T, 9) of a random take."""
-    rng = np.random.default_rng(seed)
-    T = len(x)
-    R = to_matrix(exp(rng.normal(0.0, 0.3, (T, 3, 3))))
-    band, slope = np.empty((BAND + 1, x.size)), np.empty(x.size)
-    write_equations(
-        x, np.zeros_like(x), R, rng.normal(0.0, 0.01, x.shape), rng.uniform(0.1, 1.0, (T, 3)),
-        rng.random((T, 2)) < 0.5, 0.04, np.array([0.09, 0.07, 0.84, 0.837]), np.array([0.9, 0.03]), band,
-    slope, )  # fmt: skip
-    return band, slope
+HOP_S = 0.04
+LENGTHS = np.array([0.09, 0.07, 0.84, 0.837])
+HEIGHTS = np.array([0.9, 0.03])
 
 
-def test_the_equations_are_the_derivatives_of_what_is_made_small() -> None:
-    """Right side: gradient; band: its derivative, up to the bend of the legs that Gauss–Newton leaves out."""
-    rng = np.random.default_rng(1)
-    x = rng.normal(0.0, 0.2, (6, 9)) + np.array([0.0, 0.0, 0.7, 0.0, 0.1, 0.0, 0.0, -0.1, 0.0])
-    band, slope = equations(x, 7)
-    full = np.zeros((x.size, x.size))
-    for below in range(BAND + 1):
-        for j in range(x.size - below):
-            full[j + below, j] = full[j, j + below] = band[below, j]
-    assert np.linalg.eigvalsh(full)[0] > 0.0
-    step = rng.normal(0.0, 1e-7, x.size)
-    _, after = equations(x + step.reshape(x.shape), 7)
-    _, before = equations(x - step.reshape(x.shape), 7)
-    np.testing.assert_allclose(0.5 * (after - before), full @ step, atol=0.2 * np.abs(full @ step).max())
-    # where the legs are far from their length nothing bends: exact
-    x[:, 2] = 0.3
-    _, slope = equations(x, 7)
-    move = solveh_banded(equations(x, 7)[0], slope, lower=True)
-    assert np.isfinite(move).all()
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Random nodes: arguments as of `solve_nodes`."""
+
+    x: Floats
+    pull: Floats
+    free: Floats
+    R: Floats
+    density: Floats
+    still: Bools
+
+    @classmethod
+    def make(cls, T: int) -> Problem:
+        rng = np.random.default_rng(7)
+        return cls(
+            rng.normal(0.0, 0.1, (T, 9)) + np.array([0.0, 0.0, 0.8, 0.0, 0.1, 0.0, 0.0, -0.1, 0.0]),
+            rng.normal(0.0, 0.1, (T, 9)),
+            rng.normal(0.0, 0.01, (T, 9)),
+            to_matrix(exp(rng.normal(0.0, 0.3, (T, 3, 3)))),
+            rng.uniform(0.1, 1.0, (T, 3)),
+            rng.random((T, 2)) < 0.5,
+        )
+
+    def solve(self) -> tuple[Floats, int]:
+        return solve_nodes(
+            self.x, self.pull, self.free, self.R, self.density, self.still, HOP_S, LENGTHS, HEIGHTS
+        )
+
+    def rows(self, flat: Floats) -> Floats:
+        """Residuals over the roots of their variances (docs/science/l7s.md, "Both ways")."""
+        x, hop, last = flat.reshape(-1, 9), HOP_S, len(self.x) - 1
+        found: list[float] = []
+
+        def add(residual: Floats | float, density: float) -> None:
+            found.extend(np.atleast_1d(np.asarray(residual) * np.sqrt(hop / density)))
+
+        for k in range(last + 1):
+            add(x[k] - self.pull[k], smoother.ANYWHERE)
+            pelvis, left, right = x[k].reshape(3, 3)
+            for b in range(3):
+                part = slice(3 * b, 3 * b + 3)
+                if 0 < k < last:
+                    bend = np.diff(x[k - 1 : k + 2, part] - self.free[k - 1 : k + 2, part], 2, axis=0)[0]
+                    add(bend, max(self.density[k - 1, b], self.density[k, b]) * hop**4)
+            add((pelvis - 0.5 * left - 0.5 * right)[:2], smoother.MID_PELVIS)
+            add(pelvis[2] - HEIGHTS[0], smoother.PELVIS_HEIGHT)
+            for leg, foot in enumerate((left, right)):
+                own, other = self.still[k, leg], self.still[k, 1 - leg]
+                add(foot[2] - HEIGHTS[1], smoother.FOOT_HEIGHT[0 if own else 1])
+                if own and k < last:
+                    add(x[k + 1].reshape(3, 3)[1 + leg] - foot, smoother.REST_M**2 * hop)
+                hip = pelvis + (1 - 2 * leg) * LENGTHS[0] * self.R[k, 0, :, 1]
+                leg_vector = hip - foot + LENGTHS[1] * self.R[k, 1 + leg, :, 2]
+                reach = float(np.linalg.norm(leg_vector))
+                add(self.R[k, 1 + leg, :, 1] @ leg_vector, smoother.HINGE)
+                add((reach - LENGTHS[3]) * float(own and not other), smoother.CARRIES)
+                add(max(reach - LENGTHS[2], 0.0), smoother.LONGER)
+        return np.array(found)
+
+
+def test_a_pass_is_that_of_gauss_newton_on_what_is_made_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With derivatives by differences and all equations in one matrix."""
+    of = Problem.make(9)
+    assert of.still.any(axis=0).all()
+    assert not of.still.all(axis=1).all()
+    step, flat = 1e-6, of.x.reshape(-1)
+    ways = step * np.eye(flat.size)
+    J = np.stack([(of.rows(flat + way) - of.rows(flat - way)) / (2.0 * step) for way in ways], axis=1)
+    monkeypatch.setattr(smoother, "PASSES", 1)
+    found, passes = of.solve()
+    assert passes == 1
+    expected = of.x - np.linalg.solve(J.T @ J, J.T @ of.rows(flat)).reshape(of.x.shape)
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+def test_places_that_are_no_numbers_are_refused() -> None:
+    of = Problem.make(9)
+    with pytest.raises(EstimationError, match="cannot be found"):
+        replace(of, R=np.full_like(of.R, np.nan)).solve()
 
 
 @pytest.mark.parametrize("worn", ["3I", "2I"])
