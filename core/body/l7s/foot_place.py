@@ -10,19 +10,21 @@ ball, and its way tells how far it is from it (docs/science/l7s.md, "Where the s
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from functools import lru_cache
 from itertools import pairwise
-from math import radians
+from math import asin, nan, radians
 from typing import Final
 
+import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from core.body.l7s.checks import BREAK_S, STRIDE_S
 from core.body.l7s.filter import L7sInputs
 from core.body.l7s.inputs import L7sTake
 from core.body.l7s.legs import LEGS, LegModel
 from core.frames import Bools, Floats
+from core.held_samples import cut_blocks, is_complete
+from core.inner import inner_njit
 from core.rest import find_runs
 
 ROLLS: Final = radians(20.0)
@@ -33,9 +35,6 @@ LEAST_ROLL: Final = radians(5.0)
 """A heel that rises by less tells nothing: the foot's speed at the end of its rest counts for as much."""
 
 LEAST_STRIDES: Final = 3
-
-TOGETHER: Final = 4096
-"""Samples that are laid out for the strides in them at a time."""
 
 ON_FOOT_M: Final = 0.12
 """No place on a foot is further from its middle."""
@@ -54,15 +53,15 @@ def find_sensor_offsets(inputs: L7sInputs | L7sTake, valid: Bools, model: LegMod
     found = np.zeros((len(LEGS), 3))
     for leg in range(len(LEGS)):
         b = 1 + leg
-        seen = []
-        for swings in _take_together(_swings(inputs.step[:, leg], valid[:, b], rate_hz)):
-            begin = swings[0][0]
-            x = inputs.part(slice(begin, swings[-1][1]))
-            R, acc = x.R[:, b], x.acc[:, b]
-            rises = -np.arcsin(np.clip(R[:, 2, 2], -1.0, 1.0))
-            parts = (slice(first - begin, last - begin) for first, last in swings)
-            found_balls = (_find_ball(R[part], acc[part], rises[part], rate_hz) for part in parts)
-            seen += [ball for ball in found_balls if ball is not None]
+        swings = _swings(inputs.step[:, leg], valid[:, b], rate_hz)
+        balls = np.empty((len(swings), 2))
+        for part in cut_blocks(len(valid)):
+            here = slice(*np.searchsorted(swings[:, 0], (part.start, part.stop)))
+            if here.start < here.stop:
+                begin = swings[here.start, 0]
+                x = inputs.part(slice(begin, swings[here.stop - 1, 1]))
+                _find_balls(x.R[:, b], x.acc[:, b], swings[here] - begin, 1.0 / rate_hz, balls[here])
+        seen = balls[is_complete(balls)]
         if len(seen) < LEAST_STRIDES:
             continue
         forward_down = np.median(seen, axis=0) - [0.0, 0.5 * model.foot]
@@ -71,71 +70,79 @@ def find_sensor_offsets(inputs: L7sInputs | L7sTake, valid: Bools, model: LegMod
     return found
 
 
-def _swings(step: Bools, valid: Bools, rate_hz: float) -> list[tuple[int, int]]:
-    """Half-open ranges from the last sample of a rest to the first of the next."""
+def _swings(step: Bools, valid: Bools, rate_hz: float) -> NDArray[np.int64]:
+    """Half-open ranges (s, 2) from the last sample of a rest to the first of the next."""
     between = [(a[1] - 1, b[0] + 1) for a, b in pairwise(find_runs(step))]
-    return [
+    swings = [
         (first, last)
         for first, last in between
         if BREAK_S * rate_hz < last - first < STRIDE_S[1] * rate_hz and valid[first:last].all()
     ]
+    return np.array(swings, np.int64).reshape(-1, 2)
 
 
-def _take_together(swings: Iterable[tuple[int, int]]) -> Iterator[list[tuple[int, int]]]:
-    """Swings in order, as many at a time as lie within `TOGETHER` samples, or one."""
-    together: list[tuple[int, int]] = []
-    for swing in swings:
-        if together and swing[1] - together[0][0] > TOGETHER:
-            yield together
-            together = []
-        together.append(swing)
-    if together:
-        yield together
-
-
-def _find_ball(R: Floats, acc: Floats, rises: Floats, rate_hz: float) -> Floats | None:
-    """The ball (2,) from the sensor along the foot's x (down) and z (forward), m; None where the heel stays.
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _find_balls(R, acc, swings, dt, balls):  # type: ignore[no-untyped-def]
+    """Write the ball (s, 2) from the sensor along the foot's x (down) and z (forward), m, NaN where none.
 
     From (R₀ − R) b = p − p₀ by least squares over the push-off, p from the velocity less its linear drift.
 
     Parameters
     ----------
-    R : (m, 3, 3) and acc : (m, 3) of the foot from rest to rest. rises : (m,) how steep its sole is, rad.
+    R : (n, 3, 3) and acc : (n, 3) of a foot. swings : (s, 2) from rest to rest; one in which the heel stays
+    has no ball.
     """
-    rising = rises - rises[0]
-    highest = int(np.argmax(rising))
-    if rising[highest] < LEAST_ROLL:
-        return None
+    for s in range(len(swings)):
+        first, last = swings[s]
+        balls[s] = nan
+        off = _find_push_off(R, first, last)
+        if off < 0:
+            continue
+        drift = np.zeros(3)
+        for k in range(first + 1, last):
+            for c in range(3):
+                drift[c] += 0.5 * dt * (acc[k - 1, c] + acc[k, c])
+        v, way = np.zeros(3), np.zeros(3)
+        xx, xz, zz, xp, zp = 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(first + 1, off + 1):
+            for c in range(3):
+                before = v[c] - (k - 1 - first) / (last - 1 - first) * drift[c]
+                v[c] += 0.5 * dt * (acc[k - 1, c] + acc[k, c])
+                now = v[c] - (k - first) / (last - 1 - first) * drift[c]
+                way[c] += 0.5 * dt * (before + now)
+                x, z = R[first, c, 0] - R[k, c, 0], R[first, c, 2] - R[k, c, 2]
+                xx, xz, zz, xp, zp = xx + x * x, xz + x * z, zz + z * z, xp + x * way[c], zp + z * way[c]
+        free = xx * zz - xz * xz
+        if free > 0.0:
+            balls[s, 0], balls[s, 1] = (zz * xp - xz * zp) / free, (xx * zp - xz * xp) / free
+
+
+@inner_njit()
+def _find_push_off(R, first, last):  # type: ignore[no-untyped-def]
+    """The last sample of a swing at which the ball is on the floor; −1 where the heel does not rise."""
+    start = _find_rise(R, first)
+    highest, top = first, 0.0
+    for k in range(first, last):
+        rise = _find_rise(R, k) - start
+        if rise > top:
+            highest, top = k, rise
+    if top < LEAST_ROLL:
+        return -1
     # from its fastest rise on the foot is on its way
-    last = int(np.argmax(_differentiate(rising)[: highest + 1]))
-    over = np.flatnonzero(rising[: highest + 1] > ROLLS)
-    last = min(last, int(over[0])) if len(over) else last
-    if rising[last] < LEAST_ROLL:
-        return None
-    v = _integrate(acc, 1.0 / rate_hz)
-    v -= _ramp(len(v)) * v[-1]
-    part = slice(0, last + 1)
-    way = _integrate(v[part], 1.0 / rate_hz)
-    turned = (R[0] - R[part])[:, :, ::2].reshape(-1, 2)
-    return np.asarray(np.linalg.lstsq(turned, way.reshape(-1), rcond=None)[0])
+    off, most = first, -np.inf
+    for k in range(first, highest + 1):
+        before, after = max(first, k - 1), min(last - 1, k + 1)
+        speed = (_find_rise(R, after) - _find_rise(R, before)) / (after - before)
+        if speed > most:
+            off, most = k, speed
+    for k in range(first, off):
+        if _find_rise(R, k) - start > ROLLS:
+            off = k
+            break
+    return off if _find_rise(R, off) - start >= LEAST_ROLL else -1
 
 
-def _differentiate(x: Floats) -> Floats:
-    """Difference (m,) from sample to sample, the mean of both sides: `np.gradient` without its checks."""
-    steps = np.diff(x)
-    middle = (x[2:] - x[:-2]) / 2.0
-    return np.concatenate((steps[:1], middle, steps[-1:]))
-
-
-@lru_cache(maxsize=256)
-def _ramp(length: int) -> Floats:
-    """From 0 to 1 (length, 1); strides of a walk have few lengths."""
-    ramp = np.linspace(0.0, 1.0, length)[:, None]
-    ramp.setflags(write=False)
-    return ramp
-
-
-def _integrate(x: Floats, dt: float) -> Floats:
-    """Integral (m, 3) of x (m, 3) from its first sample on, by trapezia."""
-    steps = np.cumsum(dt * (x[1:] + x[:-1]) / 2.0, axis=0)
-    return np.concatenate((np.zeros((1, x.shape[1])), steps))
+@inner_njit()
+def _find_rise(R, k):  # type: ignore[no-untyped-def]
+    """How steep the sole is, rad."""
+    return -asin(min(max(R[k, 2, 2], -1.0), 1.0))

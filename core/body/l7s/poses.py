@@ -25,7 +25,7 @@ from core.errors import Notice
 from core.estimators import L7S_2I, L7S_3I
 from core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
-from core.held_samples import SampleSeries, give_pages_back, make_room
+from core.held_samples import SampleSeries, cut_blocks, give_pages_back, make_room
 from core.rotation import angle_between, from_matrix
 
 STRETCHED_M: Final = 1e-6
@@ -136,19 +136,21 @@ class _Figure:
 
     def add(self, window: PlacedWindow) -> None:
         """The next samples."""
-        legs = solve_legs(window.R, window.p, self._model)
-        at = slice(window.first, window.first + len(legs.q))
-        for i, s in enumerate(FIGURE):
-            self.q[s][at], self.p[s][at] = legs.q[:, i], legs.p[:, i]
-        give_pages_back((*self.q.values(), *self.p.values()))
-        self.seen.put(at, SeenWalk.of(window.inputs, window.track))
         length = self._model.thigh + self._model.shank
         self._passes = max(self._passes, window.passes)
-        self._straight += np.count_nonzero(legs.reach[self._moving[at]] > length - STRETCHED_M, axis=0)
-        self._hinge = np.maximum(self._hinge, np.abs(legs.hinge).max(axis=0))
-        self._excess = np.maximum(self._excess, (legs.reach - length).max(axis=0))
-        turned, measured = (from_matrix(x[:, 1:].reshape(-1, 3, 3)) for x in (window.R, window.inputs.R))
-        self._turned.append(angle_between(turned, measured).reshape(-1, 2))
+        for part in cut_blocks(len(window.R)):
+            R, inputs, track = window.R[part], window.inputs.part(part), window.track.part(part)
+            legs = solve_legs(R, window.p[part], self._model)
+            at = slice(window.first + part.start, window.first + part.stop)
+            for i, s in enumerate(FIGURE):
+                self.q[s][at], self.p[s][at] = legs.q[:, i], legs.p[:, i]
+            self.seen.put(at, SeenWalk.of(inputs, track))
+            self._straight += np.count_nonzero(legs.reach[self._moving[at]] > length - STRETCHED_M, axis=0)
+            self._hinge = np.maximum(self._hinge, np.abs(legs.hinge).max(axis=0))
+            self._excess = np.maximum(self._excess, (legs.reach - length).max(axis=0))
+            turned, measured = (from_matrix(x[:, 1:].reshape(-1, 3, 3)) for x in (R, inputs.R))
+            self._turned.append(angle_between(turned, measured).reshape(-1, 2))
+        give_pages_back((*self.q.values(), *self.p.values()))
 
     def measure(self) -> dict[str, object]:
         """The diagnostics of `l7s_poses` that the windows give."""
