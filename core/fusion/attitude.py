@@ -23,7 +23,7 @@ import numpy as np
 from core.errors import EstimationError, ParameterError
 from core.frames import Bools, Floats
 from core.held_samples import SampleSeries, cut_blocks
-from core.rotation import compiled, normalise, slerp
+from core.rotation import compiled, find_middle
 
 
 @dataclass(frozen=True)
@@ -210,7 +210,7 @@ def estimate_orientation(
         backward = np.empty_like(into)
         run(last, b, a, out=backward)
         for part in cut_blocks(len(into)):
-            into[part] = normalise(slerp(backward[part], into[part], 0.5))
+            into[part] = find_middle(backward[part], into[part])
 
     out = np.empty((len(valid), 4))
     stretches = _stretches(valid, round(params.relearn_s * rate_hz))

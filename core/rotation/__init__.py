@@ -13,6 +13,7 @@ from core.rotation.arrays import (
     conjugate,
     exp,
     find_lengths,
+    find_middle,
     find_squares,
     find_vertical,
     from_matrix,
@@ -21,7 +22,6 @@ from core.rotation.arrays import (
     multiply,
     normalise,
     rotate,
-    slerp,
     split_heading,
     to_matrix,
     wrap_angle,
@@ -29,7 +29,7 @@ from core.rotation.arrays import (
 )
 
 __all__ = [
-    "about", "angle_between", "conjugate", "exp", "find_lengths", "find_squares", "find_vertical",
-    "from_matrix", "log", "mean", "multiply", "normalise", "rotate", "slerp", "split_heading", "to_matrix",
-    "wrap_angle", "yaw",
+    "about", "angle_between", "conjugate", "exp", "find_lengths", "find_middle", "find_squares",
+    "find_vertical", "from_matrix", "log", "mean", "multiply", "normalise", "rotate", "split_heading",
+    "to_matrix", "wrap_angle", "yaw",
 ]  # fmt: skip

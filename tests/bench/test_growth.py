@@ -13,6 +13,7 @@ import sys
 import time
 from itertools import islice
 from pathlib import Path
+from statistics import median
 from typing import Final
 
 import numpy as np
@@ -38,6 +39,7 @@ import sys
 from dataclasses import replace
 from math import pi
 from pathlib import Path
+from statistics import median
 from core.formats import write_recording
 from core.simulate import Arc, Stand, Straight, simulate
 
@@ -56,6 +58,7 @@ FEET = """
 import sys
 from dataclasses import replace
 from pathlib import Path
+from statistics import median
 import numpy as np
 from core.formats import list_source_files, read_recording, write_recording
 
@@ -76,6 +79,7 @@ target.write_bytes(write_recording(replace(take, streams=streams, segments=feet)
 ANALYSE = """
 import json, sys, time
 from pathlib import Path
+from statistics import median
 from server.processes.memory import share_allocator
 share_allocator()
 from core.formats import list_source_files
@@ -281,7 +285,8 @@ def test_few_sensors_are_measured(worn: str, tmp_path: Path) -> None:
     run(MAKE, str(tmp_path), f"1:{worn}", f"14:{worn}")
     warm, path = (str(tmp_path / f"{laps}:{worn}.parquet") for laps in (1, 14))
     name, goal = FEW[worn]
-    record_goal(name, goal, json.loads(run(ANALYSE, warm, path))["cpu_s"], "s")
+    # memory that is touched for the first time takes .1 s more in some processes than in others
+    record_goal(name, goal, median(json.loads(run(ANALYSE, warm, path))["cpu_s"] for _ in range(5)), "s")
 
 
 @where_figures_are_written

@@ -14,7 +14,7 @@ from core.calibration.table_top import TableTopParams, calibrate_table_top
 from core.errors import CalibrationError
 from core.frames import R_NEUTRAL, Floats, Segment
 from core.recording import SensorSignals, Subject, UniformRecording
-from core.rotation import angle_between, conjugate, exp, from_matrix, log, multiply, slerp
+from core.rotation import angle_between, conjugate, exp, from_matrix, log, multiply
 from core.simulate.mems import MEMS, SensorNoise, add_sensor_errors
 from core.simulate.sensors import SensorPath, SimulatedSignals, ideal_signals
 from core.simulate.shapes import smoothstep
@@ -33,7 +33,7 @@ def carry(
     """2 s on the table, a way with turns of up to some 100°, 2 s on the body in the orientation `target`."""
     t = np.arange(round((move_s + 4.0) * RATE * EVERY) + 1) / (RATE * EVERY)
     into = smoothstep((t - 2.0) / move_s)
-    q = slerp(np.array([1.0, 0.0, 0.0, 0.0]), target, into)
+    q = exp(into[:, None] * log(target))
     for _ in range(3):
         turns = 2.0 * np.pi * rng.uniform(0.5, 2.5) * into + rng.uniform(0.0, 2.0 * np.pi)
         swing = rng.uniform(-1.0, 1.0, 3) * np.sin(np.pi * into)[:, None] ** 2
