@@ -26,9 +26,9 @@ def _run(command: str, given: dict[str, object]) -> int:
     from importlib import import_module
 
     from core.errors import SagittalError
-    from server.processes.compile_cache import share_compile_cache
     from server.processes.memory import share_allocator
     from server.settings import SettingsError, load_settings
+    from server.storage.compile_cache import share_compile_cache
 
     share_allocator()
     try:

@@ -14,9 +14,9 @@ from typing import Final
 import hypothesis
 import pytest
 
-from server.processes.compile_cache import has_compiled_filters, share_compile_cache
 from server.processes.compiling import compile_filters
 from server.processes.environment import ONE_THREAD
+from server.storage.compile_cache import has_compiled_filters, share_compile_cache
 from tests.accuracy.report import WRITE
 from tests.data import ENGINE
 from tests.passed import Passed

@@ -11,11 +11,11 @@ from typing import Any, Self
 
 from core.errors import InputError, SagittalError
 from core.formats.json_tree import read_json
-from server.processes.compile_cache import has_compiled_filters
 from server.processes.compiling import OFFLINE, compile_filters_once, is_compiling
 from server.report import activity_files
 from server.report.estimator import estimator_view
 from server.storage import fs
+from server.storage.compile_cache import has_compiled_filters
 
 
 def analyse(

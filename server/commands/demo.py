@@ -14,9 +14,9 @@ from pathlib import Path
 from sqlalchemy import func, select
 
 from server.commands.serve import run, say
-from server.processes.compile_cache import has_compiled_filters
 from server.processes.compiling import is_compiling
 from server.settings import load_settings
+from server.storage.compile_cache import has_compiled_filters
 from server.storage.db import Database, Source
 
 DEMO_WORKERS = 2

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from server.commands.serve import say
-from server.processes.compile_cache import VARIABLE
 from server.processes.compiling import compile_filters
 from server.storage import fs
+from server.storage.compile_cache import VARIABLE
 
 
 def warm() -> int:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 import re
 from collections.abc import Callable, Mapping, MutableMapping
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
 from fastapi import Request
-from jinja2 import Environment, FileSystemLoader
+from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader
+from jinja2.bccache import Bucket
 from starlette.requests import HTTPConnection
 from starlette.responses import Response
 from starlette.templating import Jinja2Templates
@@ -16,10 +21,13 @@ from starlette.templating import Jinja2Templates
 import web
 from core.body.model import NOMINAL_HEIGHT_M
 from core.condition import CHOICES
+from server.storage.compile_cache import VARIABLE
 from web.language import LANGUAGES, SOURCE, choose_language, load_catalogue, script_texts
 from web.shown import Shown
 from web.template_texts import speak_template
 from web.words import FILTERS
+
+FOLDER: Final = Path(web.__file__).parent
 
 
 class FlushLeftLoader(FileSystemLoader):
@@ -40,6 +48,35 @@ class SpokenLoader(FlushLeftLoader):
         return speak_template(source), name, is_newest
 
 
+@cache
+def fingerprint_pages() -> str:
+    """Digest of all that pages are made of."""
+    digest = hashlib.sha256()
+    for path in sorted(FOLDER.rglob("*")):
+        if path.is_file() and path.suffix != ".pyc":
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+class KeptBytecode(FileSystemBytecodeCache):
+    """What the templates of a language are in Python, kept in the folder of compiled filters.
+
+    To make it is a third of the first page of a process. Where nothing can be written, every process does.
+    """
+
+    def __init__(self, language: str) -> None:
+        super().__init__(os.environ[VARIABLE], f"{language}_%s.template")
+
+    def get_source_checksum(self, source: str) -> str:
+        """Of a template and of what is worked out with it: words, texts, addresses of files."""
+        return hashlib.sha256(f"{fingerprint_pages()}{source}".encode()).hexdigest()
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        """Keep a template for the next process."""
+        with suppress(OSError):
+            super().dump_bytecode(bucket)
+
+
 class SettledEnvironment(Environment):
     """An environment whose globals all stand before the first template is loaded.
 
@@ -54,10 +91,13 @@ class SettledEnvironment(Environment):
 
 def load_templates(language: str) -> Jinja2Templates:
     """Return the environment in which every page of a language is rendered."""
-    folder = Path(web.__file__).parent / "templates"
+    folder = FOLDER / "templates"
     is_source = language == SOURCE
     loader = FlushLeftLoader(folder) if is_source else SpokenLoader(folder)
-    templates = Jinja2Templates(env=SettledEnvironment(loader=loader, autoescape=True))
+    kept = KeptBytecode(language) if VARIABLE in os.environ else None
+    templates = Jinja2Templates(
+        env=SettledEnvironment(loader=loader, autoescape=True, bytecode_cache=kept),
+    )
     templates.env.filters.update(FILTERS)
     templates.env.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
     if not is_source:

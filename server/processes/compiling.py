@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 import core
-from server.processes.compile_cache import VARIABLE, has_compiled_filters
+from server.storage.compile_cache import VARIABLE, has_compiled_filters
 
 Order = tuple[tuple[str, str], ...]
 """Modules and their functions that compile something, in order."""
@@ -44,7 +44,7 @@ what live takes ask for first comes first."""
 
 
 def compile_filters(orders: tuple[Order, Order] = ALL) -> None:
-    """Fill the folder of compiled filters that `server.processes.compile_cache` names.
+    """Fill the folder of compiled filters that `server.storage.compile_cache` names.
 
     Raises
     ------

@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 import server
-from server.processes.compile_cache import share_compile_cache
 from server.settings import Settings
+from server.storage.compile_cache import share_compile_cache
 
 ONE_THREAD = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"

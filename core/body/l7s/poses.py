@@ -182,10 +182,12 @@ def compile_l7s_kernel() -> None:
     """Compile or load the kernels of filter, smoother and legs: the first take does not wait for them."""
     model = LegModel.of(BodyModel.from_height(NOMINAL_HEIGHT_M))
     foot = model.to_isb("foot_l").T
-    n = 20
+    n = 40
     R = np.tile(np.stack((np.eye(3), R_NEUTRAL @ foot, R_NEUTRAL @ foot)), (n, 1, 1, 1))
+    step = np.ones((n, 2), bool)
+    step[10:-10] = False  # a swing, whose ball is looked for
     for worn in get_args(Worn):
-        inputs = L7sInputs(R, np.zeros((n, 3, 3)), np.ones((n, 2), bool), worn)
+        inputs = L7sInputs(R, np.zeros((n, 3, 3)), step, worn)
         track, _ = filter_block(start_l7s_state(inputs, model), inputs, model, 100.0)
         smooth_track(track, inputs, np.ones((n, 3), bool), model, 100.0)
         solve_legs(track.R, track.p, model)

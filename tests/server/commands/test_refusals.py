@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from server.main import main
-from server.processes.compile_cache import VARIABLE
+from server.storage.compile_cache import VARIABLE
 
 
 def test_a_key_in_a_folder_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from server.main import main
-from server.processes.compile_cache import has_compiled_filters
+from server.storage.compile_cache import has_compiled_filters
 
 pytestmark = pytest.mark.slow
 

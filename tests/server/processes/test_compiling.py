@@ -11,7 +11,7 @@ from threading import Event
 import pytest
 
 from server.processes import compiling
-from server.processes.compile_cache import VARIABLE, has_compiled_filters
+from server.storage.compile_cache import VARIABLE, has_compiled_filters
 
 
 def test_of_many_that_ask_at_once_one_compiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

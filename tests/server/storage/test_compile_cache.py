@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from server.processes.compile_cache import (
+from server.processes.environment import make_environment
+from server.settings import Settings
+from server.storage.compile_cache import (
     KEEP_S,
     find_compile_cache,
     fingerprint_filters,
     share_compile_cache,
 )
-from server.processes.environment import make_environment
-from server.settings import Settings
 from tests.data import ROOT
 
 FILTER = """from numba import njit
