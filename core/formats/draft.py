@@ -29,6 +29,8 @@ MOST_OUT_OF_ORDER: Final = 0.01
 
 
 _SUMMED: Final = 16
+_WEIGHTS: Final = np.array([pow(0x9E3779B97F4A7C15, i, 1 << 64) for i in range(_SUMMED)], np.uint64)
+"""Odd, so that no bit of a word is lost; without them words in another order have the same sum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,8 +287,8 @@ def digest(d: Draft) -> str:
 def signal_digest(acc: Floats, gyr: Floats | None, mag: Floats | None) -> str:
     """What tells the samples of one sensor from those of another, (n, 3) each, for `digest`.
 
-    SHA-256 over sums of `_SUMMED` words of 64 bits, in a fifth of the time that it takes over the words. Who
-    wants to can make two takes with one digest; a copy is found by it, nothing is secured.
+    SHA-256 over weighted sums of `_SUMMED` words of 64 bits, in a quarter of the time that it takes over the
+    words. Who wants to can make two takes with one digest; a copy is found by it, nothing is secured.
     """
     h = hashlib.sha256()
     for name, a in (("acc", acc), ("gyr", gyr), ("mag", mag)):
@@ -295,7 +297,10 @@ def signal_digest(acc: Floats, gyr: Floats | None, mag: Floats | None) -> str:
             for part in cut_blocks(len(a)):
                 bits = _bits(a[part]).ravel()
                 end = len(bits) - len(bits) % (2 * _SUMMED)
-                h.update(np.add.reduce(bits[:end].view(np.uint64).reshape(_SUMMED, -1), axis=0))
+                words = bits[:end].view(np.uint64)
+                # the uppermost bit, the sign of every second number, has any odd weight alike
+                words ^= words >> np.uint64(31)
+                h.update(np.einsum("i,ij->j", _WEIGHTS, words.reshape(_SUMMED, -1)))
                 h.update(bits[end:].tobytes())
     return h.hexdigest()
 

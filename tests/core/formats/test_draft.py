@@ -37,6 +37,19 @@ def test_the_digest_tells_signals_lengths_and_the_order_of_samples_apart() -> No
     assert len({signal_digest(acc, None, None), *others}) == 7
 
 
+@pytest.mark.parametrize("rows", [512, 4096, AT_A_TIME, 2 * AT_A_TIME])
+def test_a_take_turned_round_and_the_other_leg_half_a_cycle_later_are_no_copies(rows: int) -> None:
+    acc = np.random.default_rng(0).normal(0, 10, (rows, 3))
+    parts = [rows // 2, rows // 4, rows // 16]
+    assert len({signal_digest(np.roll(acc, part, axis=0), None, None) for part in (0, *parts)}) == 4
+    for cycles in (2, 4, 8):
+        turn = np.sign(np.sin(2.0 * np.pi * cycles * (np.arange(rows) + 0.5) / rows))
+        for axis in range(3):
+            legs = np.zeros((2, rows, 3))
+            legs[:, :, axis] = turn, -turn
+            assert len({signal_digest(leg, None, None) for leg in legs}) == 2
+
+
 @pytest.mark.parametrize("rows", [1, 100, AT_A_TIME + 1])
 def test_the_same_samples_have_one_digest_however_they_are_held(rows: int) -> None:
     acc: Any = np.random.default_rng(0).normal(0, 10, (rows, 3)).astype(np.float32)
