@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from math import degrees, radians
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,9 @@ from core.frames import Bools, Floats, Segment
 from core.held_samples import cut_blocks
 from core.rest import find_runs, index_window
 from core.rotation import about, multiply, yaw
+
+ALIKE_DIGITS: Final = 6
+"""Of drifts in rad that are equal."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,8 @@ def remove_relative_drift(
         largest[segment] = float(np.abs(turn).max())
     notices = []
     if largest and max(largest.values()) > params.tell:
-        worst = max(largest, key=lambda s: largest[s])
+        # two sensors turn apart by the same angle: the first is told of, whatever the last digits are
+        worst = max(largest, key=lambda s: round(largest[s], ALIKE_DIGITS))
         message = (
             f"The heading of {worst} drifted by up to {degrees(largest[worst]):.0f}° against the reference "
             "and was brought back to its mean over straight walking. Slow changes of rotation posture during "

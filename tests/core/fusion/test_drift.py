@@ -1,0 +1,29 @@
+"""Which sensor is told of when relative headings are brought back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import radians
+
+import numpy as np
+import pytest
+
+from core.calibration import calibrate
+from core.frames import Segment
+from core.fusion.drift import DriftParams, remove_relative_drift
+from core.rotation import about
+from tests.walks import simulated
+
+
+@pytest.mark.parametrize("more", [-1e-12, 0.0, 1e-12])
+def test_of_two_feet_that_turn_apart_the_last_digits_do_not_choose(more: float) -> None:
+    rate_hz, n = 50.0, 6000
+    found = calibrate(simulated("comfortable", 2)[0]).calibration
+    walk = replace(found, walking=((0.0, n / rate_hz),))
+    turn = np.linspace(0.0, radians(10.0), n)
+    feet: tuple[Segment, Segment] = ("foot_l", "foot_r")
+    q = {feet[0]: about(2, turn), feet[1]: about(2, -(1.0 + more) * turn)}
+    valid = dict.fromkeys(feet, np.ones(n, np.bool_))
+    _, largest, (notice,) = remove_relative_drift(q, valid, walk, rate_hz, DriftParams())
+    assert largest["foot_l"] == pytest.approx(largest["foot_r"], rel=1e-9)
+    assert notice.sensor == "foot_l"
