@@ -112,11 +112,17 @@ class _Reader:
             self._take_frame(_number(frame.get("index")))
 
     def _take_frame(self, index: float | None) -> None:
-        orientation, free, field = ("".join(self._said.get(name, ())) for name in _WIDTHS)
-        if not field.strip():
-            field = "NaN " * (3 * len(self._labels))
-        cells = f"{orientation} {free} {field}".split()
-        if index is None or len(cells) != len(self._labels) * sum(_WIDTHS.values()):
+        sensors = len(self._labels)
+        cells: list[str] = []
+        whole = index is not None
+        for name, width in _WIDTHS.items():
+            part = "".join(self._said.get(name, ())).split()
+            if not part and name == "sensorMagneticField":
+                part = ["NaN"] * (width * sensors)
+            # what one part lacks another may have too much of
+            whole = whole and len(part) == width * sensors
+            cells += part
+        if index is None or not whole:
             self._broken += 1
             return
         if len(self._rows) > _MOST_FRAMES:

@@ -122,6 +122,10 @@ def test_mvnx_with_entities_is_refused_and_lost_frames_are_holes() -> None:
     assert stream.gyr == pytest.approx(made.GYR[2:], abs=1e-3)
     empty = re.sub(rb"(<sensorMagneticField>).*?(</sensorMagneticField>)", rb"\1\2", made.mvnx())
     assert len(only(read(empty)).t_s) == made.N
+    moved = re.sub(
+        rb"( \S+)(</sensorFreeAcceleration><sensorMagneticField>)", rb"\2\1 ", made.mvnx(), count=3
+    )
+    assert len(only(read(moved)).t_s) == made.N - 3
 
 
 def test_shimmer_reads_the_accelerometer_that_does_not_clip() -> None:
