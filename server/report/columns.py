@@ -216,7 +216,7 @@ def write_json(value: object) -> bytes:
     Raises
     ------
     ValueError
-        a number is not finite.
+        a number is not finite, or a key no text.
     """
     return _write_node(value, "\n").encode()
 
@@ -231,6 +231,8 @@ def _write_node(value: object, line: str) -> str:
         flat = _encoder(inner).encode(value)
         return f"{flat[0]}{inner}{flat[1:-1]}{line}{flat[-1]}"
     if isinstance(value, dict):
+        if not all(isinstance(k, str) for k in value):
+            raise ValueError("A key is no text: JSON knows no other.")
         nodes = [f"{_encoder(inner).encode(k)}: {_write_node(v, inner)}" for k, v in value.items()]
         return f"{{{inner}{f',{inner}'.join(nodes)}{line}}}"
     return f"[{inner}{f',{inner}'.join([_write_node(v, inner) for v in value])}{line}]"

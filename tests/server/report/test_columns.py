@@ -82,6 +82,12 @@ def test_json_is_that_of_python(value: object) -> None:
     assert write_json(value) == json.dumps(value, ensure_ascii=False, allow_nan=False, indent=1).encode()
 
 
+@pytest.mark.parametrize("key", [None, True, 1, 1.5])
+def test_a_key_that_is_no_text_makes_no_file_that_nobody_reads(key: object) -> None:
+    with pytest.raises(ValueError, match="key"):
+        write_json({key: {"a": [1]}})
+
+
 @pytest.mark.parametrize("value", [math.nan, [1.0, math.inf], {"a": {"b": [math.nan]}}])
 def test_json_knows_finite_numbers_alone(value: object) -> None:
     with pytest.raises(ValueError, match="JSON"):
