@@ -64,10 +64,12 @@ REACHES: Final = 8
 
 
 def smooth_gaussian(x: Floats, sd: float) -> Floats:
-    """Gaussian mean of x (n,), n ≥ 1, the ends held: SciPy's `gaussian_filter1d`, mode "nearest", to 1e-15.
+    """Gaussian mean of x (n,), n ≥ 1, the ends held: SciPy's `gaussian_filter1d`, mode "nearest".
+
+    Up to `sd` of a thousand samples it is that to 1e-14 of the largest sample of a piece.
 
     SciPy adds up 1600 products for each sample where `sd` is 200 samples; here pieces go by way of their
-    spectra. A sample that is no number spoils its piece, and no more.
+    spectra. A sample that is no number spoils the one or two pieces that read it, and no more.
 
     Parameters
     ----------
