@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from fastapi import Request
-from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader
+from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, compiler
 from jinja2.bccache import Bucket
 from starlette.requests import HTTPConnection
 from starlette.responses import Response
@@ -50,9 +50,9 @@ class SpokenLoader(FlushLeftLoader):
 
 @cache
 def fingerprint_pages() -> str:
-    """Digest of all that pages are made of."""
+    """Digest of all that pages are made of, and of what makes Python of them."""
     digest = hashlib.sha256()
-    for path in sorted(FOLDER.rglob("*")):
+    for path in (Path(__file__), Path(compiler.__file__), *sorted(FOLDER.rglob("*"))):
         if path.is_file() and path.suffix != ".pyc":
             digest.update(path.read_bytes())
     return digest.hexdigest()
@@ -66,10 +66,19 @@ class KeptBytecode(FileSystemBytecodeCache):
 
     def __init__(self, language: str) -> None:
         super().__init__(os.environ[VARIABLE], f"{language}_%s.template")
+        # now: after an upgrade below a running process the files are no longer those that it has read
+        self._pages = fingerprint_pages()
 
     def get_source_checksum(self, source: str) -> str:
         """Of a template and of what is worked out with it: words, texts, addresses of files."""
-        return hashlib.sha256(f"{fingerprint_pages()}{source}".encode()).hexdigest()
+        return hashlib.sha256(f"{self._pages}{source}".encode()).hexdigest()
+
+    def load_bytecode(self, bucket: Bucket) -> None:
+        """Read what an earlier process has kept; a file that cannot be read is none."""
+        try:
+            super().load_bytecode(bucket)
+        except Exception:  # noqa: BLE001  # a damaged pickle raises anything
+            bucket.reset()
 
     def dump_bytecode(self, bucket: Bucket) -> None:
         """Keep a template for the next process."""

@@ -57,7 +57,7 @@ class _StoredParameters(msgspec.Struct):
 
 
 class _StoredMeans(_StoredParameters):
-    mean_curves: dict[Side, dict[str, list[float]]] | None = None
+    mean_curves: dict[Side, dict[str, list[float | None]]] | None = None
 
 
 class _StoredNumbers(_StoredParameters, kw_only=True):
@@ -76,7 +76,9 @@ def read_means(content: bytes) -> WalkMeans | None:
     stored = _read_means(content)
     if stored.mean_curves is None:
         return None
-    curves = {side: {v: np.array(c) for v, c in own.items()} for side, own in stored.mean_curves.items()}
+    curves = {
+        side: {v: np.array(c, np.float64) for v, c in own.items()} for side, own in stored.mean_curves.items()
+    }
     return WalkMeans(stored.mark(), curves)
 
 

@@ -1,1 +1,1 @@
-"""Database, tables, blobs, the folder of compiled filters; the only module that opens files for writing."""
+"""Database, tables, blobs, compiled filters, and the only module that opens files for writing."""

@@ -86,7 +86,8 @@ class LiveFloor:
         """Change the colours to the theme of the page around."""
         for side in SIDES:
             self._steps[side].node.batched_colors = np.array(to_linear_rgb(TINTS[dark][side]), np.uint8)
-        rows = [np.full((PIECES, 2, 3), TINTS[dark][side], np.uint8) for side in SIDES]
+        # as those of copies: viser takes one colour of all lines as sRGB, many as linear
+        rows = [np.full((PIECES, 2, 3), to_linear_rgb(TINTS[dark][side]), np.uint8) for side in SIDES]
         self._line.colors = np.concatenate(rows)
 
     def _points(self, t_s: float) -> Single:

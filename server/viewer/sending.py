@@ -7,7 +7,7 @@ test_viser_contract.py holds it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, Final
 
 import numpy as np
@@ -83,7 +83,8 @@ def gather_longer(server: viser.ViserServer) -> None:
 def show_at_once(server: viser.ViserServer) -> Iterator[None]:
     """Send all that is changed inside together and at once.
 
-    viser's `atomic` and `flush` do the same and wake its thread twice.
+    viser's `atomic` and `flush` do the same and wake its thread twice. Both its events are set: it may have
+    looked in vain since the last change, and then waits for the next one, not for a flush.
     """
     buffer = server._websock_server.get_message_buffer()  # noqa: SLF001
     buffer.atomic_start()
@@ -92,4 +93,11 @@ def show_at_once(server: viser.ViserServer) -> Iterator[None]:
     finally:
         with buffer.buffer_lock:
             buffer.atomic_counter -= 1
-        buffer.flush()
+        # RuntimeError: the server has stopped, and nobody is to be woken
+        with suppress(RuntimeError):
+            buffer.event_loop.call_soon_threadsafe(_wake, buffer)
+
+
+def _wake(buffer: Any) -> None:
+    buffer.message_event.set()
+    buffer.flush_event.set()

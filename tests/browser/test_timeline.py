@@ -8,7 +8,7 @@ from typing import Any
 from uuid import uuid4
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, Route, expect
+from playwright.sync_api import APIResponse, Browser, Locator, Page, Route, expect
 
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
@@ -120,6 +120,39 @@ def test_numbers_that_no_longer_hold_are_pale_until_the_new_ones_are_there(timel
         timeline.unroute("**/timeline/numbers")
     done(timeline, "left foot-off moved")
     expect(timeline.locator("#numbers")).to_have_css("opacity", "1")
+
+
+def test_numbers_that_do_not_come_stay_pale_and_it_is_said(timeline: Page) -> None:
+    timeline.route("**/timeline/numbers", lambda route: route.abort())
+    drag(timeline, handle(timeline, "tc"), 20)
+    done(timeline, "left foot-off moved")
+    expect(timeline.locator("[data-problem]")).to_contain_text("The numbers could not be loaded")
+    expect(timeline.locator("#numbers")).to_have_css("opacity", "0.4")
+    timeline.unroute("**/timeline/numbers")
+
+
+def test_numbers_of_an_earlier_change_that_come_late_are_not_shown(timeline: Page) -> None:
+    late: list[tuple[Route, APIResponse]] = []
+
+    def hold_first(route: Route) -> None:
+        answer = route.fetch()
+        if late:
+            route.fulfill(response=answer)
+        else:
+            late.append((route, answer))
+
+    timeline.route("**/timeline/numbers", hold_first)
+    with timeline.expect_request("**/timeline/numbers"):
+        drag(timeline, handle(timeline, "tc"), 25)
+    drag(timeline, handle(timeline, "tc", side="right"), 25)
+    done(timeline, "right foot-off moved")
+    after = numbers(timeline)
+    expect(timeline.locator("#numbers")).to_have_css("opacity", "1")
+    ((route, answer),) = late
+    route.fulfill(response=answer)
+    done(timeline, "left foot-off moved")
+    assert numbers(timeline) == after
+    timeline.unroute("**/timeline/numbers")
 
 
 def test_an_event_stops_at_its_neighbour_of_the_same_foot(

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
-from jinja2 import Environment
+from jinja2 import Environment, compiler
+from jinja2.bccache import bc_magic
 
 from server.http import templates
 from server.storage.compile_cache import VARIABLE
@@ -37,7 +39,10 @@ def test_the_next_process_makes_none(kept: Path, language: str) -> None:
     assert len(list(kept.iterdir())) == 2
 
 
-@pytest.mark.parametrize("damaged", [b"", b"j2", b"no bytecode of Jinja"])
+@pytest.mark.parametrize(
+    "damaged",
+    [b"", b"j2", b"no bytecode of Jinja", bc_magic, bc_magic + b"no checksum", bc_magic + b"\x80\x02X"],
+)
 def test_a_damaged_file_is_made_anew(kept: Path, damaged: bytes) -> None:
     for path in kept.iterdir():
         path.write_bytes(damaged)
@@ -49,6 +54,42 @@ def test_other_words_are_other_templates(kept: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(templates, "fingerprint_pages", lambda: "of the next version")
     with pytest.raises(CompiledError):
         templates.load_templates("en").env.get_template(PAGE)
+
+
+def test_an_upgrade_below_a_running_process_is_not_mixed_with_what_it_has_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    running = templates.load_templates("en").env
+    monkeypatch.setattr(templates, "fingerprint_pages", lambda: "of the next version")
+    running.get_template(PAGE)
+    made: list[object] = []
+    compile_plainly = Environment.compile
+
+    def note(env: Environment, *given: Any, **others: Any) -> Any:
+        made.append(given)
+        return compile_plainly(env, *given, **others)
+
+    monkeypatch.setattr(Environment, "compile", note)
+    templates.load_templates("en").env.get_template(PAGE)
+    assert made
+
+
+def test_what_makes_templates_is_a_part_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = templates.fingerprint_pages.__wrapped__()
+    for module in (templates, compiler):
+        changed = tmp_path / "changed.py"
+        changed.write_text(Path(module.__file__ or "").read_text("utf-8") + "\n")
+        with monkeypatch.context() as other:
+            other.setattr(module, "__file__", str(changed))
+            assert templates.fingerprint_pages.__wrapped__() != before
+
+
+def test_a_folder_that_is_a_file_keeps_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "file"))
+    templates.load_templates("en").env.get_template(PAGE)
+    assert (tmp_path / "file").read_bytes() == b""
 
 
 def test_pages_are_shown_where_nothing_can_be_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,3 +35,11 @@ def test_without_a_standing_there_is_no_level_and_an_earlier_version_kept_none()
     data = json.loads(files["analysis.json"])
     del data["mean_curves"]
     assert read_means(json.dumps(data).encode()) is None
+
+
+def test_a_curve_with_a_gap_keeps_it() -> None:
+    data = json.loads(analysed.files()["analysis.json"])
+    data["mean_curves"]["left"]["knee_flexion"][3] = None
+    kept = read_means(json.dumps(data).encode())
+    assert kept is not None
+    assert np.flatnonzero(np.isnan(kept.curves["left"]["knee_flexion"])).tolist() == [3]

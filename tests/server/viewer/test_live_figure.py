@@ -161,6 +161,18 @@ def test_the_trails_are_the_last_seconds_of_the_soles_way(server: viser.ViserSer
         assert nearest.max() < 1e-5
 
 
+@pytest.mark.parametrize("dark", [False, True])
+def test_a_trail_has_the_colour_of_its_leg(server: viser.ViserServer, poses: Poses, dark: bool) -> None:
+    scene = Scene(server)
+    scene.figure = LiveFigure(server, walk.BODY, dark)
+    scene.play(poses, 1.0)
+    line = scene["/trails"]
+    for side, own in zip(SIDES, np.split(np.asarray(line.colors), 2), strict=True):
+        assert {tuple(c) for c in own.reshape(-1, 3).tolist()} == {to_linear_rgb(TINTS[dark][side])}
+        part = scene["/thighs"].batched_colors[SIDES.index(side)]
+        assert tuple(np.asarray(part).tolist()) == to_linear_rgb(TINTS[dark][side])
+
+
 def test_a_trail_has_a_gap_where_poses_were_lost(server: viser.ViserServer, poses: Poses) -> None:
     scene = Scene(server)
     scene.play(poses, 4.0)

@@ -160,3 +160,32 @@ def test_a_picture_is_sent_whole_and_at_once_however_long_viser_would_gather() -
         assert taken.get(timeout=30) == ["nothing more"]
     finally:
         server.stop()
+
+
+def test_a_picture_that_took_longer_than_viser_gathers_is_sent_when_it_ends() -> None:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        buffer = server._websock_server._broadcast_buffer
+        buffer.window_duration_sec = 0.01
+        batch = prepare_motion(walk.poses(1.0)).batches["thighs"]
+        part = DrawnBatch(server.scene, "thighs", batch, None)
+        taken: Queue[list[str]] = Queue()
+
+        async def take() -> None:
+            async with aclosing(buffer.window_generator(1)) as windows:
+                async for window in windows:
+                    taken.put([m.name for m in window if isinstance(m, ArraysChanged)])
+
+        taking = asyncio.run_coroutine_threadsafe(take(), buffer.event_loop)
+        assert taken.get(timeout=30) == []  # what was there before
+        with show_at_once(server):
+            part.move(batch.wxyz[1], batch.position[1])
+            # viser's thread is woken by something else, looks, and finds that it may not send yet
+            for _ in range(100):
+                looked = asyncio.run_coroutine_threadsafe(asyncio.sleep(0.002), buffer.event_loop)
+                looked.result(timeout=30)
+            assert not buffer.message_event.is_set()
+        assert taken.get(timeout=30) == ["/room/thighs"]
+        taking.cancel()
+    finally:
+        server.stop()

@@ -24,6 +24,7 @@ class TakeTimeline extends HTMLElement {
     this.editable = this.hasAttribute("editable");
     this.win = new TimeWindow(clock.duration);
     this.review = new Review(this.session);
+    this.asked = 0;
     this.find = (name) => this.querySelector(`[data-${name}]`);
     this.prepareStrides();
     this.prepareLanes();
@@ -280,12 +281,17 @@ class TakeTimeline extends HTMLElement {
     this.find("said").textContent = speak`${said} ${used} of ${this.review.strides.length} strides count.`;
   }
 
-  // The numbers are written by the server, as on the other pages.
+  // The numbers are written by the server, as on the other pages. An answer to what was asked before the last change
+  // is late: another one comes.
   async numbers() {
+    const asked = ++this.asked;
     document.getElementById("numbers").setAttribute("aria-busy", "true"); // until others stand there they do not hold
-    const answer = await fetch(`/sessions/${this.session}/timeline/numbers`, { credentials: "same-origin", headers: { "X-Sagittal-Fragment": "numbers" } });
-    if (!answer.ok) throw { title: speak`The numbers could not be loaded`, detail: speak`Load the page again.` };
-    const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+    const path = `/sessions/${this.session}/timeline/numbers`;
+    const answer = await fetch(path, { credentials: "same-origin", headers: { "X-Sagittal-Fragment": "numbers" } }).catch(() => null);
+    const text = await answer?.text().catch(() => null);
+    if (asked !== this.asked) return;
+    if (!answer?.ok || !text) throw { title: speak`The numbers could not be loaded`, detail: speak`Load the page again.` };
+    const page = new DOMParser().parseFromString(text, "text/html");
     document.getElementById("numbers").replaceWith(page.getElementById("numbers"));
   }
 
