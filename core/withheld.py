@@ -45,7 +45,7 @@ OF_LEG: Final = ("leg_excess_mm", "hinge_mm", "longest_moving_s", "knee_straight
 
 OF_TAKE: Final = (
     "feet_out_of_place_pct", "phase_off_pct", "toward_foot_mps2", "inner_foot_m", "pelvis_tilt_sd_deg",
-    "pelvis_rise_cm",
+    "pelvis_rise_cm", "places_moved_mm",
 )  # fmt: skip
 """Findings of the whole take: all that the model of the legs estimates."""
 

@@ -49,6 +49,7 @@ QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
     "toward_foot_mps2": ("Pelvis falls toward the standing foot", 2, "m/s²"),
     "inner_foot_m": ("Inner foot ahead in turns; up to the limit, sides are undecided", 2, "m/rad"),
     "pelvis_rise_cm": ("Pelvis rises and sinks by", 0, "cm"),
+    "places_moved_mm": ("Places still moving by", 1, "mm"),
     "pelvis_tilt_sd_deg": ("Pelvis tilt, standard deviation", 1, "°"),
 }
 """Name of a finding → label, decimals, unit."""

@@ -43,6 +43,10 @@ STRAIGHT_PCT: Final = (30.0, 50.0)
 without disease, neura_walk, qmt_fullbody, ipol_walks); healthy knees are within 3° of straight for a tenth of
 the cycle, and one that rests there for most of the time was not estimated at all."""
 
+MOVED_MM: Final = (1.0, 10.0)
+"""In the last pass of Gauss–Newton, which ends below 0.1 or after 20 passes. A walk whose foot was lost for
+half of it still moves by millimetres then, and noise of 1e-12 m/s² changes its places by as much."""
+
 FOOT_GAP_S: Final = (0.1, 0.3)
 """Holes up to 0.1 s are interpolated. With one sensor a leg nothing knows where the foot went: in one of
 0.5 s flexion is up to 65° off, and within 10 s of its end 3 to 17° (simulation; live 50 to 90°)."""
@@ -87,6 +91,7 @@ def l7s_health(poses: Poses) -> tuple[HealthFinding, ...]:
 
 
 JUDGED: Final = (
+    ("moved_m", "places_moved_mm", 1e3, MOVED_MM),
     ("out_of_place_share", "feet_out_of_place_pct", 100.0, OUT_OF_PLACE_PCT),
     ("phase_off", "phase_off_pct", 100.0, PHASE_PCT),
     ("toward_foot_mps2", "toward_foot_mps2", 1.0, TOWARD_MPS2),
@@ -94,7 +99,7 @@ JUDGED: Final = (
     ("pelvis_tilt_sd_rad", "pelvis_tilt_sd_deg", 180.0 / pi, TILT_DEG),
     ("pelvis_rise_m", "pelvis_rise_cm", 100.0, RISE_CM),
 )
-"""Quantity of `walking_checks`, name of its finding, scale to its unit, limits."""
+"""Diagnostic of the run, or quantity of `walking_checks`, name of its finding, scale to its unit, limits."""
 
 TOLD: Final[Mapping[str, tuple[str, str]]] = {
     "feet_out_of_place_pct": (
@@ -147,6 +152,14 @@ TOLD: Final[Mapping[str, tuple[str, str]]] = {
         (
             "{of} was lost for {value:.1f} s in one piece. L7S has no second sensor on a leg that could "
             "bridge it; angles and positions are doubtful for some ten seconds from there on."
+        ),
+    ),
+    "places_moved_mm": (
+        "places_not_found",
+        (
+            "The places of pelvis and feet still moved by {value:.0f} mm when their calculation ended, up to "
+            "{warn:.0f} mm are expected: the sensors contradict each other or were lost for long. Angles and "
+            "positions are doubtful; check losses and which foot each sensor is on."
         ),
     ),
     "hinge_mm": (

@@ -63,6 +63,7 @@ def l7s_poses(
     length, so that the knee is a bound and no measurement; `hinge_m`, `excess_m`, largest residuals of the
     constraints; `step_share`; `sensor_ahead_m`, how far the foot's sensor was found ahead of the foot's
     middle (0 both_ways=False); `foot_turned_rad`, mean angle from measured to reported.
+    `passes` of Gauss–Newton and `moved_m`, how far places moved in the last.
     At the end: `position_sd_m` by body, `min_eigenvalue` of P. By sensor: `gap_s`, the longest loss.
     And those of `walking_checks`. Health and notices as of health.py; a notice `foot_never_still` when a
     foot has no step.
@@ -130,14 +131,14 @@ class _Figure:
         self._model = take.model
         both = take.step.all(axis=1)
         self._moving: Bools = np.asarray(~both | both.all())
-        self._passes = 0
+        self._passes, self._moved = 0, 0.0
         self._straight, self._hinge, self._excess = np.zeros(2, np.int64), np.zeros(2), np.zeros(2)
         self._turned: list[Floats] = []
 
     def add(self, window: PlacedWindow) -> None:
         """The next samples."""
         length = self._model.thigh + self._model.shank
-        self._passes = max(self._passes, window.passes)
+        self._passes, self._moved = max(self._passes, window.passes), max(self._moved, window.moved)
         for part in cut_blocks(len(window.R)):
             R, inputs, track = window.R[part], window.inputs.part(part), window.track.part(part)
             legs = solve_legs(R, window.p[part], self._model)
@@ -158,6 +159,7 @@ class _Figure:
         self._turned.clear()
         return {
             "passes": self._passes,
+            "moved_m": self._moved,
             "knee_straight_share": {s: float(self._straight[i] / moving) for i, s in enumerate(LEGS)},
             "hinge_m": {s: float(self._hinge[i]) for i, s in enumerate(LEGS)},
             "excess_m": {s: float(self._excess[i]) for i, s in enumerate(LEGS)},

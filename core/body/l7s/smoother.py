@@ -81,13 +81,15 @@ class WholeTrack:
 
     Parameters
     ----------
-    R : (n, 3, 3, 3) and p : (n, 3, 3) in Sy's frames. passes : of Gauss–Newton. offsets : (2, 3) from each
-    foot's sensor to the foot's middle (`find_sensor_offsets`).
+    R : (n, 3, 3, 3) and p : (n, 3, 3) in Sy's frames. passes : of Gauss–Newton. moved : the longest move of a
+    place in the last of them, m. offsets : (2, 3) from each foot's sensor to the foot's middle
+    (`find_sensor_offsets`).
     """
 
     R: Floats
     p: Floats
     passes: int
+    moved: float
     offsets: Floats
 
 
@@ -123,12 +125,12 @@ def smooth_track(
     lengths = np.array([0.5 * model.hip_width, 0.5 * model.foot, leg, CARRIED * leg])
     if offsets is None:
         offsets = find_sensor_offsets(inputs, valid, model, rate_hz)
-    p, passes = track.p.copy(), 0
+    p, passes, moved = track.p.copy(), 0, 0.0
     if len(at) > 2:
         free = _integrate_twice(acc, dt)
         free[:, 1:] += np.einsum("nbij,bj->nbi", R[:, 1:], offsets)
         filtered = p[at].reshape(-1, 9)
-        x, passes = solve_nodes(
+        x, passes, moved = solve_nodes(
             filtered, filtered, free[at].reshape(-1, 9), np.ascontiguousarray(R[at]),
             np.maximum.reduceat(density, at, axis=0), np.minimum.reduceat(inputs.step, at, axis=0), hop * dt,
             lengths, np.array([model.hip_height, model.foot_height]),
@@ -144,7 +146,7 @@ def smooth_track(
             f"The leg constraints cannot be met at sample {failed}; check which foot each sensor is on and "
             "the body height.",
         )
-    return WholeTrack(R, p, passes, offsets)
+    return WholeTrack(R, p, passes, moved, offsets)
 
 
 def find_hop(rate_hz: float) -> int:
@@ -160,8 +162,8 @@ NOT_FOUND: Final = (
 def solve_nodes(
     x: Floats, pull: Floats, free: Floats, R: Floats, density: Floats, still: Bools, hop_s: float,
     lengths: Floats, heights: Floats,
-) -> tuple[Floats, int]:  # fmt: skip
-    """Places (T, 9) of the nodes by Gauss–Newton, and the passes it took.
+) -> tuple[Floats, int, float]:  # fmt: skip
+    """Places (T, 9) of the nodes by Gauss–Newton, the passes it took, and the longest move of the last, m.
 
     Parameters
     ----------
@@ -184,7 +186,7 @@ def solve_nodes(
     ])  # fmt: skip
     spread = hop_s / np.array([HINGE, CARRIES, LONGER])
     kept = np.empty((len(x), KEPT))
-    passes = 0
+    passes, most = 0, 0.0
     while passes < PASSES:
         passes += 1
         most = move_nodes(x, pull, R, bent, stiff, still, hold, spread, lengths, heights, kept)
@@ -192,7 +194,7 @@ def solve_nodes(
             raise EstimationError("l7s_diverged", NOT_FOUND)
         if most < SETTLED_M:
             break
-    return x, passes
+    return x, passes, most
 
 
 def _level_pelvis(R: Floats) -> Floats:

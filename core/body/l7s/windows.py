@@ -39,7 +39,8 @@ class PlacedWindow:
     Parameters
     ----------
     first : sample of the take that it begins with. inputs, track : of the filter. R : (n, 3, 3, 3) and
-    p : (n, 3, 3) of BODIES in Sy's frames. passes : of Gauss–Newton. P : (27, 27) of the filter after it.
+    p : (n, 3, 3) of BODIES in Sy's frames. passes, moved : of `WholeTrack`. P : (27, 27)
+    of the filter after it.
     """
 
     first: int
@@ -48,6 +49,7 @@ class PlacedWindow:
     R: Floats
     p: Floats
     passes: int
+    moved: float
     P: Floats
 
 
@@ -106,11 +108,11 @@ def _windows(
             inputs, track = join_inputs(inputs.part(left), fresh), join_tracks(track.part(left), found)
         del fresh, found
         first = solved.start
-        R, p, passes = track.R[own], track.p[own], 0
+        R, p, passes, moved = track.R[own], track.p[own], 0, 0.0
         if valid is not None:
             whole = smooth_track(track, inputs, valid[solved], model, rate_hz, offsets, first)
-            R, p, passes = whole.R[own], whole.p[own], whole.passes
-        yield PlacedWindow(first + own.start, inputs.part(own), track.part(own), R, p, passes, state.P)
+            R, p, passes, moved = whole.R[own], whole.p[own], whole.passes, whole.moved
+        yield PlacedWindow(first + own.start, inputs.part(own), track.part(own), R, p, passes, moved, state.P)
 
 
 def join_inputs(before: L7sInputs, after: L7sInputs) -> L7sInputs:

@@ -69,7 +69,7 @@ def wearing(recording: UniformRecording, **sensors: SensorSignals) -> UniformRec
 
 ACCUSING = {
     "feet_drift_apart", "feet_out_of_step", "feet_exchanged", "not_a_pelvis", "gap_not_bridged",
-    "legs_do_not_fit", "foot_never_still", "pelvis_rises",
+    "legs_do_not_fit", "foot_never_still", "pelvis_rises", "places_not_found",
 }  # fmt: skip
 
 

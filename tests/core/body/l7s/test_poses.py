@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from core.angles.measure import measure_angles
+from core.body.l7s import smoother
 from core.body.l7s.constraints import constraint_rows
 from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
 from core.body.l7s.health import l7s_health
@@ -252,6 +253,17 @@ def test_what_cannot_be_estimated_is_refused_with_its_name() -> None:
         L7sParams(acceleration=0.0)
     with pytest.raises(ParameterError):
         L7sParams(adjoint="wrong")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("passes", "verdict"), [(20, "good"), (1, "bad")])
+def test_places_that_were_not_found_are_told(
+    passes: int, verdict: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calibrated, orientations, steps, truth = walk()
+    monkeypatch.setattr(smoother, "PASSES", passes)
+    found = l7s_poses(orientations, free_acceleration(calibrated, orientations), steps, truth.body)
+    assert [f.verdict for f in found.health if f.name == "places_moved_mm"] == [verdict]
+    assert ("places_not_found" in {n.code for n in found.notices}) == (verdict == "bad")
 
 
 def test_a_foot_that_never_rests_is_told() -> None:

@@ -69,7 +69,7 @@ class Problem:
             rng.random((T, 2)) < 0.5,
         )
 
-    def solve(self) -> tuple[Floats, int]:
+    def solve(self) -> tuple[Floats, int, float]:
         return solve_nodes(
             self.x, self.pull, self.free, self.R, self.density, self.still, HOP_S, LENGTHS, HEIGHTS
         )
@@ -115,8 +115,9 @@ def test_a_pass_is_that_of_gauss_newton_on_what_is_made_small(monkeypatch: pytes
     ways = step * np.eye(flat.size)
     J = np.stack([(of.rows(flat + way) - of.rows(flat - way)) / (2.0 * step) for way in ways], axis=1)
     monkeypatch.setattr(smoother, "PASSES", 1)
-    found, passes = of.solve()
+    found, passes, moved = of.solve()
     assert passes == 1
+    assert moved == pytest.approx(np.abs(found - of.x).max())
     expected = of.x - np.linalg.solve(J.T @ J, J.T @ of.rows(flat)).reshape(of.x.shape)
     np.testing.assert_allclose(found, expected, atol=1e-6)
 
@@ -132,6 +133,7 @@ def test_it_settles_and_meets_the_constraints(worn: Worn) -> None:
     found, (_, _, model, _) = whole(worn), walk(worn)
     legs = solve_legs(found.R, found.p, model)
     assert found.passes < smoother.PASSES
+    assert found.moved < smoother.SETTLED_M
     assert legs.reach.max() < model.thigh + model.shank + 1e-5
     assert np.abs(legs.hinge).max() < 1e-5
 
