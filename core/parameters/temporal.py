@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import inf, isnan
+from math import inf
 
 import numpy as np
 
-from core.events.result import Stride, Strides
+from core.events.result import Stride, Strides, list_known
 from core.frames import SIDES, Floats
 from core.parameters.catalogue import CATALOGUE, unit_of
 from core.parameters.plausible import IMPOSSIBLE, is_impossible
@@ -23,10 +23,7 @@ from core.parameters.variability import summarise_values
 
 def stride_values(stride: Stride) -> dict[str, float | None]:
     """Temporal parameters of one stride by name, s or % of the stride; None where undefined."""
-    return {
-        name: None if isnan(v := float(x[0])) else v
-        for name, x in temporal_values(Strides((stride,))).items()
-    }
+    return {name: list_known(x)[0] for name, x in temporal_values(Strides((stride,))).items()}
 
 
 def per_stride(strides: Strides) -> dict[str, Column]:

@@ -181,23 +181,19 @@ def parameter_row(p: Parameter) -> dict[str, object]:
         "name": p.name,
         "side": p.side,
         "n": p.n,
-        "mean": _finite(p.mean),
-        "sd": _finite(p.sd),
+        "mean": reduce_to_plain(p.mean),
+        "sd": reduce_to_plain(p.sd),
         "unit": p.unit,
         "reason": p.reason,
-        "cv_pct": _finite(p.cv_pct),
-        "ci_low": _finite(p.ci_low),
-        "ci_high": _finite(p.ci_high),
+        "cv_pct": reduce_to_plain(p.cv_pct),
+        "ci_low": reduce_to_plain(p.ci_low),
+        "ci_high": reduce_to_plain(p.ci_high),
         "note": p.note,
-        "uncertainty": _finite(p.uncertainty),
-        "u_own": _finite(p.u_own),
-        "u_common": _finite(p.u_common),
+        "uncertainty": reduce_to_plain(p.uncertainty),
+        "u_own": reduce_to_plain(p.u_own),
+        "u_common": reduce_to_plain(p.u_common),
         "estimated": p.estimated,
     }
-
-
-def _finite(value: float | None) -> float | None:
-    return float(value) if value is not None and math.isfinite(value) else None
 
 
 def _body(analysis: TakeAnalysis) -> dict[str, object] | None:

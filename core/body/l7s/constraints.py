@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import Final
 
 import numba
 import numpy as np
@@ -11,7 +12,7 @@ from core.body.l7s.updates import WIDTH, inject
 from core.body.se3 import move_pose
 from core.inner import inner_njit
 
-MOST = 4
+MOST: Final = 4
 """Rows: two of a leg."""
 
 
