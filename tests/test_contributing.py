@@ -29,10 +29,10 @@ from server.pages.live import list_terms
 from server.pages.prescription import group_trainable
 from server.report.exports import analysis_files
 from tests.data import ROOT
-from tests.parameter_page import PAGE, render_page
+from tests.helpers.parameter_page import PAGE, render_page
+from tests.helpers.true_walks import true_tracks
 from tests.server import analysed, feedback
 from tests.server.clinic import open_clinic
-from tests.true_walks import true_tracks
 
 API: Final = "/api/v1"
 
@@ -116,6 +116,7 @@ def _measured_names(tracks: Tracks) -> set[str]:
     return {p.name for p in measure_gait(tracks).parameters if p.mean is not None}
 
 
+@pytest.mark.slow
 def test_what_a_parameter_needs_is_what_it_is_missing_without() -> None:
     """Without paths, angles or sensors of the feet: exactly those that say so have no number."""
     tracks = true_tracks(simulate_scenario("comfortable", 5).truth)
@@ -164,6 +165,7 @@ def _hold_first(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     return replace(analysis, fused=replace(fused, q=held))
 
 
+@pytest.mark.slow
 def test_a_filter_in_a_recipe_is_what_later_stages_take() -> None:
     source = simulate_scenario("comfortable", 1, worn=("foot_l", "foot_r")).recording
     held = PipelineStage("orientation", 0.1, _hold_first, ("fused",), ("fusion",))
@@ -183,6 +185,7 @@ def _count_rests(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
     return replace(analysis, problem=said)
 
 
+@pytest.mark.slow
 def test_a_protocol_is_a_tuple_of_stages_that_the_loop_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     standing = (*SIGNALS, PipelineStage("rests", 0.5, _count_rests, ("problem",)))
     monkeypatch.setattr(recipes, "choose_recipe", lambda analysis: standing)

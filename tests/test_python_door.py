@@ -100,6 +100,7 @@ def test_the_example_of_the_page_runs(monkeypatch: pytest.MonkeyPatch) -> None:
         walk.parameter("nothing")
 
 
+@pytest.mark.slow
 def test_a_simulated_walk_is_analysed_with_other_parameters_and_unknown_ones_are_named() -> None:
     made = sagittal.simulate(seed=1, segments=["pelvis"])
     told: list[str] = []

@@ -10,7 +10,7 @@ from babel.messages.pofile import read_po
 
 from server.report.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
 from tests.data import ROOT
-from tests.texts import STAYS_ENGLISH, list_messages, python_texts, script_texts
+from tests.helpers.texts import STAYS_ENGLISH, list_messages, python_texts, script_texts
 from web.language import (
     LANGUAGES,
     PLACEHOLDER,
@@ -30,7 +30,9 @@ OTHERS: Final = [language for language in LANGUAGES if language != SOURCE]
 MOST_OF_HEADLINE: Final = 95
 """Characters of a sentence that a person reads first."""
 
-HINT: Final = "python -m tests.texts brings the catalogue up to date; then give each new message its text"
+HINT: Final = (
+    "python -m tests.helpers.texts brings the catalogue up to date; then give each new message its text"
+)
 
 
 def entries(language: str) -> dict[str, str]:
@@ -38,6 +40,7 @@ def entries(language: str) -> dict[str, str]:
         return {str(entry.id): str(entry.string) for entry in read_po(file) if entry.id}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", OTHERS)
 def test_every_message_of_the_sources_has_a_text(language: str) -> None:
     known = entries(language)

@@ -353,7 +353,7 @@ SCRIPT_PLACES: Final = (
     "server/report/wording.py",
     "server/pages/session_context.py",
     "server/pages/words.py",
-    "tests/texts.py",
+    "tests/helpers/texts.py",
 )
 """Where the messages come from that scripts say, or are sent to say."""
 

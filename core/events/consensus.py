@@ -3,7 +3,7 @@
 Detectors mean different moments by a contact (a zero crossing, a peak 50 ms later): each is first moved by
 its own median distance from the leading one, then contacts within a window are one. The lead's time is kept,
 so that a consensus is never less exact than the lead where both found a contact. A detector that abstained on
-a foot has no vote on it. All of this is our choice; tests/accuracy/test_events_consensus.py measures it.
+a foot has no vote on it. All of this is our choice; validation/accuracy/test_events_consensus.py measures it.
 """
 
 from __future__ import annotations

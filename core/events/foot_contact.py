@@ -25,7 +25,7 @@ from core.frames import Bools, Floats
 class FootContactParams:
     """Parameters of refinement and of swings without pitch.
 
-    The three sets are ipol_walks, gaitmap_foot and force_plate_steps; docs/accuracy.md, "Contacts against
+    The three sets are ipol_walks, gaitmap_foot and force_plate_steps; validation/report.md, "Contacts against
     every reference", has every one of them.
 
     Parameters

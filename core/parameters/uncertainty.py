@@ -28,7 +28,7 @@ GONIOMETER_DEG: Final = 3.0
 ESTIMATED_DEG: Final[Mapping[str, float]] = {"hip": 7.5, "knee": 10.5, "ankle": 5.5}
 """Joint → RMS error of a level or range that pelvis and feet do not measure: the worst of maximum, minimum,
 range, contact and mean of a stride, over neura_walk, qmt_fullbody and simulated people with and without
-disease (docs/accuracy.md, "L7S: levels and ranges" and "L7S: parameters of whole analyses"). The knee's is
+disease (validation/report.md, "L7S: levels and ranges" and "L7S: parameters of whole analyses"). The knee's is
 that of people who stand with bent knees."""
 
 FEET_ALONE_DEG: Final[Mapping[str, float]] = {"hip": 9.0, "knee": 11.0, "ankle": 7.0}
@@ -36,7 +36,7 @@ FEET_ALONE_DEG: Final[Mapping[str, float]] = {"hip": 9.0, "knee": 11.0, "ankle":
 
 FEET_ALONE_AT_CONTACT_DEG: Final[Mapping[str, float]] = {"knee": 12.5}
 """The same of the angle at contact, which feet alone find at another moment: the knee is 10° more bent than
-it is (docs/accuracy.md, "L7S: parameters of whole analyses")."""
+it is (validation/report.md, "L7S: parameters of whole analyses")."""
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ class PipelineConfig:
     Parameters
     ----------
     events : of the foot-pitch rule, by which contacts are found. contacts : of their refinement.
-    detector : "foot_contact" has the smallest error (tests/accuracy/test_events_references.py);
+    detector : "foot_contact" has the smallest error (validation/accuracy/test_events_references.py);
         "foot_pitch" is the published rule, to compare with; the consensus asks the shanks too and is led by
         "foot_contact".
     bouts : of the feet's contacts; those of a trunk sensor's steps are `lumbar.bouts`.

@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.data import ROOT, data_folder
-from tests.marks import slow_beyond
+from tests.helpers.marks import slow_after
 
 NEURA = {
     "subject": {"height_m": 1.70},
@@ -96,6 +96,7 @@ def analysed(simulated: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple
     return out, done.stdout
 
 
+@pytest.mark.slow
 def test_simulated_walk_is_analysed_and_agrees_with_its_truth(
     simulated: Path, analysed: tuple[Path, str]
 ) -> None:
@@ -113,7 +114,7 @@ def test_simulated_walk_is_analysed_and_agrees_with_its_truth(
     )
     late = [np.abs(true_contacts - float(e["time_s"])).min() for e in contacts]
     assert len(contacts) >= 0.9 * len(true_contacts)
-    # the sole has touched when the foot begins to slap (docs/accuracy.md, "Contacts on simulated walks")
+    # the sole has touched when the foot begins to slap (validation/report.md, "Contacts on simulated walks")
     assert np.median(late) < 0.035
 
 
@@ -142,6 +143,7 @@ def test_same_input_gives_the_same_bytes(simulated: Path, analysed: tuple[Path, 
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
 
 
+@pytest.mark.slow
 def test_an_unknown_script_is_a_usage_error_that_names_the_scripts(tmp_path: Path) -> None:
     done = sagittal("simulate", "--out", tmp_path, "--script", "moonwalk")
     assert done.returncode == 2
@@ -202,7 +204,8 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", slow_beyond(1, list(BAD)))
+@pytest.mark.slow
+@pytest.mark.parametrize("case", slow_after(1, list(BAD)))
 def test_nothing_analysable_is_exit_1_with_a_sentence(case: str, tmp_path: Path) -> None:
     name, content, code = BAD[case]
     (tmp_path / name).write_bytes(content)

@@ -13,7 +13,7 @@ import pytest
 from core.online import compile_live_kernels
 from server.demo.clinic import PRESCRIBED
 from server.demo.live import plan_training, stream_walk
-from tests.service import served
+from tests.helpers.service import served
 
 SPEED = 6.0
 """The walk is streamed so much faster than it was walked."""

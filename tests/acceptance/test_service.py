@@ -11,7 +11,7 @@ import pytest
 
 from tests.acceptance.test_cli import NEURA, result, sagittal
 from tests.data import data_folder
-from tests.service import Service, new_session, served, upload, wait_for
+from tests.helpers.service import Service, new_session, served, upload, wait_for
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +84,7 @@ def test_an_unreadable_recording_fails_with_a_sentence_and_the_next_one_works(se
     assert client.get(f"/sessions/{session}").status_code == 200
 
 
+@pytest.mark.slow
 def test_the_server_ends_within_ten_seconds_and_all_is_well(service: Service) -> None:
     service.process.send_signal(signal.SIGTERM)
     assert service.process.wait(timeout=10) == 0

@@ -40,7 +40,7 @@ from server.storage.migrate import upgrade
 from server.storage.tables import device_check, job
 from tests.browser import filling
 from tests.data import ROOT
-from tests.kept import keep_served
+from tests.helpers.kept import keep_served
 
 expect.set_options(timeout=30_000)  # beside other tests a page may take long; nobody waits unless it does
 

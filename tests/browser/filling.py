@@ -10,7 +10,7 @@ from urllib.parse import quote
 import httpx
 
 from core.simulate import mt_files, simulate_scenario
-from tests.kept import keep
+from tests.helpers.kept import keep
 
 
 @keep

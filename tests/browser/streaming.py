@@ -16,7 +16,7 @@ from server.demo import live as demo_live
 from server.demo.clinic import STROKE
 from tests.browser import filling
 from tests.browser.conftest import RunningServer
-from tests.kept import keep
+from tests.helpers.kept import keep
 
 LONGER: Mapping[str, Any] = {
     "parameter": "step_length_m",

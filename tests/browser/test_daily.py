@@ -11,7 +11,7 @@ from core.simulate.setup import RecordingSetup
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
 from tests.browser.design import all_faults
-from tests.kept import keep
+from tests.helpers.kept import keep
 
 LIVED = (
     PostureHold("stand", 20.0),

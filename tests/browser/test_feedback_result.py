@@ -15,7 +15,7 @@ from server.storage.db import Database
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
 from tests.browser.design import all_faults
-from tests.feedback import Walked
+from tests.helpers.feedback import Walked
 from tests.server.feedback import ended_take
 
 GIVEN = {

@@ -20,7 +20,7 @@ from core.simulate.tug import ChairSimulation, simulate_tug
 from server.demo import live as demo_live
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
-from tests.kept import keep
+from tests.helpers.kept import keep
 
 SITS_ON_S = 60.0
 """The person stays on the chair until the therapist has seen the result."""

@@ -21,8 +21,8 @@ from tests.browser import filling
 from tests.browser.conftest import DESK, PACED, REST, Filled, Opener, RunningServer, is_ours
 from tests.browser.picture import wait_for_picture, wait_until_still
 from tests.data import data_folder
+from tests.helpers.walks import NEURA
 from tests.server.viewer.seeing import pixels_of, shot
-from tests.walks import NEURA
 
 
 @pytest.fixture(scope="module")

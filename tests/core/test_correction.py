@@ -10,7 +10,7 @@ import pytest
 from core.correction import SensorCorrection, name_axes, to_axes_matrix
 from core.errors import ManifestError, ParameterError
 from core.formats import parse_manifest
-from tests.setup_mistakes import SIGNED
+from tests.helpers.setup_mistakes import SIGNED
 
 VALUES = np.array([[1.0, 2.0, 3.0]])
 

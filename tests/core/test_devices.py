@@ -15,7 +15,7 @@ from core.recording import ImuStream
 from core.simulate.mems import SensorNoise, add_sensor_errors
 from core.simulate.sensors import SimulatedSignals
 from tests.core.formats.making import stream
-from tests.ipol import WALKS, ipol_recording
+from tests.helpers.ipol import WALKS, ipol_recording
 
 RATE = 100.0
 UP = np.array([0.6, 0.0, 0.8])

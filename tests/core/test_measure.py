@@ -17,8 +17,8 @@ from core.rotation import about, from_matrix, multiply, rotate
 from server.report.bundle import load_bundle
 from server.report.exports import analysis_files
 from server.report.tracks import NAME, read_tracks
+from tests.helpers.walks import analysed, assert_same_figures
 from tests.server import walk
-from tests.walks import analysed, assert_same_figures
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +30,7 @@ def figure(measured: MeasuredGait, name: str, side: str | None = "left") -> Para
     return next(p for p in measured.parameters if (p.name, p.side) == (name, side))
 
 
+@pytest.mark.slow
 def test_the_pipeline_gives_what_measure_gives_on_its_tracks(analysis: TakeAnalysis) -> None:
     assert analysis.tracks is not None
     again = measure_gait(analysis.tracks)

@@ -249,6 +249,7 @@ def test_movement_sorts_nine_real_sensors_and_sets_ankles_and_copies_aside(neura
     assert segments == {d: NEURA.get(d) for d in neura.streams}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("script", ["comfortable", "fast_with_turns", "slow"])
 def test_movement_tells_segments_and_sides_of_simulated_walks(script: str) -> None:
     recording, truth = nameless(simulate_scenario(script, seed=1).recording)
@@ -328,6 +329,7 @@ def test_turning_on_the_spot_while_the_trunk_is_level_is_no_wrong_unit() -> None
     assert measure_signal(acc, everywhere, 100.0).still_gyro == pytest.approx(3**0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("until_s", [6.0, np.inf], ids=["before the walk", "all the time"])
 def test_a_pelvis_without_any_acceleration_is_described_all_the_same(until_s: float) -> None:
     """Which leg is the left one is read from the pelvis."""
@@ -372,6 +374,7 @@ def test_two_sensors_that_name_their_side_alone_are_taken_for_the_feet() -> None
         ) == {None}
 
 
+@pytest.mark.slow
 def test_a_table_is_judged_without_a_compiler() -> None:
     """The web process does: numba would cost it seconds and memory."""
     code = "import sys, numpy as np; from core.quality.signals import measure_signal; "

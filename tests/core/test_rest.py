@@ -19,7 +19,7 @@ from core.rest import (
     measure_quietness,
 )
 from tests.data import data_folder
-from tests.walks import lost, neura_walk
+from tests.helpers.walks import lost, neura_walk
 
 RATE = 100.0
 

@@ -16,7 +16,7 @@ from core.parameters.kinematic import MEAN_ZERO
 from core.parameters.result import CycleCurves
 from core.scores import Scores, score_curves
 from core.standing_angles import NAMES
-from tests.wbds import people
+from tests.helpers.wbds import people
 
 
 def session(curves: Mapping[str, Mapping[Side, Floats]], strides: int = 12) -> CycleCurves:

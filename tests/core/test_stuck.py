@@ -19,12 +19,12 @@ from core.quality.stuck import CODES, StuckWatch, drop_stuck_sensors, mark_stuck
 from core.recording import ImuStream, Recording, SensorSignals, Subject, UniformRecording
 from core.simulate import SCRIPTS, simulate_scenario
 from core.timeline import synchronise
-from tests.accuracy import gaitmap, mobgap
 from tests.core.formats.making import stream, take
 from tests.data import data_folder
-from tests.live_walks import live
-from tests.marks import slow_beyond
-from tests.walks import cut, neura_walk, simulated
+from tests.helpers import gaitmap, mobgap
+from tests.helpers.live_walks import live
+from tests.helpers.marks import slow_after
+from tests.helpers.walks import cut, neura_walk, simulated
 
 Spoil = Callable[[Floats, Floats, int], None]
 """Changes acc, gyr (n, 3) in place from sample k on."""
@@ -90,6 +90,7 @@ def comfortable() -> UniformRecording:
     return simulated("comfortable")[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("segment", ["pelvis", "thigh_l", "foot_r"])
 @pytest.mark.parametrize(("spoil", "code"), FAULTS, ids=lambda x: getattr(x, "__name__", ""))
 def test_a_sensor_that_does_not_measure_is_named_and_left_out_from_there(
@@ -244,7 +245,8 @@ def test_real_sensors_all_measure(takes: Callable[[], list[UniformRecording]]) -
         assert mark_stuck(rounded) is rounded
 
 
-@pytest.mark.parametrize("script", slow_beyond(1, [s for s in SCRIPTS if s != "five_minutes"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("script", slow_after(1, [s for s in SCRIPTS if s != "five_minutes"]))
 def test_simulated_sensors_all_measure(script: str) -> None:
     recording = synchronise(simulate_scenario(script, 0).recording)
     assert mark_stuck(recording) is recording
@@ -276,6 +278,7 @@ def without(segment: Segment, spoil: Spoil) -> TakeAnalysis:
     return analyse(recording_of(spoilt(cut(comfortable(), 0.0, 30.0), segment, spoil, 0.0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", [dead_gyroscope, stuck_accelerometer], ids=["gyroscope", "accelerometer"])
 @pytest.mark.parametrize("segment", ["pelvis", "thigh_l"])
 def test_a_dead_channel_leaves_no_plausible_number_of_its_sensor(segment: Segment, spoil: Spoil) -> None:
@@ -313,6 +316,7 @@ def test_a_take_without_a_sensor_that_measures_stops_with_a_sentence() -> None:
     assert found.parameters == ()
 
 
+@pytest.mark.slow
 def test_a_dead_gyroscope_is_left_out_of_a_live_take_before_it_starts() -> None:
     """Known while the walk for calibration goes on, in the words that the file gets; the others go on."""
     take = cut(comfortable(), 0.0, 26.0)
@@ -329,6 +333,7 @@ def test_a_dead_gyroscope_is_left_out_of_a_live_take_before_it_starts() -> None:
     assert row.stuck
 
 
+@pytest.mark.slow
 def test_a_thigh_that_stops_measuring_live_has_no_angles_from_then_on() -> None:
     _, frames = live(spoilt(cut(comfortable(), 0.0, 30.0), "thigh_l", stuck_accelerometer, 22.0))
     assert [n.code for f in frames for n in f.notices if n.code in CODES] == ["channel_stuck"]

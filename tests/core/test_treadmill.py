@@ -57,6 +57,7 @@ def test_angles_and_times_are_those_of_the_same_steps_on_the_floor() -> None:
             assert belt[key] == pytest.approx(floor[key]), key
 
 
+@pytest.mark.slow
 def test_a_belts_speed_without_a_treadmill_is_refused() -> None:
     with pytest.raises(ParameterError) as caught:
         replace(recording(), belt_speed_mps=BELT)

@@ -39,8 +39,8 @@ from server.report.table import NOBODY
 from server.report.tables import curves_csv
 from server.report.tracks import read_tracks
 from server.report.wording import REASONS
-from tests.marks import slow_beyond
-from tests.walks import neura_recording
+from tests.helpers.marks import slow_after
+from tests.helpers.walks import neura_recording
 
 
 def worn(recording: Recording, segments: dict[Segment, Segment] | None = None, *only: Segment) -> Recording:
@@ -104,6 +104,7 @@ def test_the_level_people_see_is_the_worst_of_signals_and_estimator() -> None:
     assert box.kind == "bad"
 
 
+@pytest.mark.slow
 def test_angles_of_a_joint_whose_estimator_is_bad_are_withheld_with_the_reason() -> None:
     found = exchanged()
     assert found.angles is not None
@@ -162,6 +163,7 @@ def test_distances_of_a_chain_that_does_not_hang_together_are_withheld_in_files_
     assert {p.reason for p in again.parameters if p.name in DISTANCES} == {"estimator_bad"}
 
 
+@pytest.mark.slow
 def test_distances_of_a_foot_that_refuses_its_own_rests_are_withheld_of_it_alone() -> None:
     found = sparse()
     assert found.poses is not None
@@ -228,6 +230,7 @@ def test_a_figure_that_rests_on_the_bound_of_the_leg_model_is_withheld() -> None
 HINGED = {f"{v}_{side}" for v in HINGES for side in "lr"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("take", "fixed"), [(sparse, HINGED), (feet_alone, HINGED | {"pelvis_tilt", "pelvis_obliquity"})]
 )
@@ -262,8 +265,9 @@ def test_what_the_leg_model_holds_fixed_is_no_result(
     assert {"shank_l", "thigh_l", "pelvis"} <= set(found.poses.q)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "walk", slow_beyond(2, ["neura", "comfortable", "hemiparetic", "stiff_knee", "crouch"])
+    "walk", slow_after(2, ["neura", "comfortable", "hemiparetic", "stiff_knee", "crouch"])
 )
 def test_nothing_is_withheld_of_a_right_setup(walk: str) -> None:
     recording = neura_recording() if walk == "neura" else simulate_scenario(walk, 0).recording

@@ -19,9 +19,9 @@ from server.storage.blob_opening import open_blobs
 from server.storage.db import Database
 from server.storage.high_water import set_mark
 from server.storage.tables import job
-from tests.databases import write_database
-from tests.engines import choose_url
-from tests.postgres import make_lasting_database
+from tests.helpers.databases import write_database
+from tests.helpers.engines import choose_url
+from tests.helpers.postgres import make_lasting_database
 
 PATIENCE_S = 60.0
 """Longest wait for what must happen: far beyond what it takes, so that a loaded machine is no failure."""

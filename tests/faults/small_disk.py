@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.postgres import give_to_server, run_sql
+from tests.helpers.postgres import give_to_server, run_sql
 
 
 def run(*command: str) -> None:

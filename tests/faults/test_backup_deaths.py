@@ -30,9 +30,9 @@ from server.storage.db import Database
 from server.storage.migrate import exists
 from server.storage.tables import now, recording_file
 from tests.data import ROOT
-from tests.engines import on_both_engines
 from tests.faults.clinic import Clinic, find_room
 from tests.faults.failing import Dying, FailingSystem, PowerError
+from tests.helpers.engines import on_both_engines
 
 BESIDE = {"erased.json"}
 STEP = {"sqlite": 1, "postgresql": 13}

@@ -21,11 +21,11 @@ from server.storage.db import Database
 from server.storage.migrate import MigrationError, upgrade
 from server.storage.readiness import Readiness
 from server.storage.tables import now
-from tests.engines import on_both_engines
 from tests.faults.failing import FailingSystem
 from tests.faults.small_disk import full, mounted, on_small_disk, run
-from tests.marks import about_the_file
-from tests.postgres import run_sql
+from tests.helpers.engines import on_both_engines
+from tests.helpers.marks import sqlite_only
+from tests.helpers.postgres import run_sql
 from tests.server import analysed, walk
 from tests.server.clinic import PASSWORD, Clinic, open_clinic
 
@@ -92,7 +92,7 @@ def changes(v: Visit) -> list[tuple[str, str, dict[str, Any]]]:
     ]
 
 
-@about_the_file
+@sqlite_only
 async def test_a_full_disk_answers_every_change_with_507_and_a_sentence(visit: Visit, disk: Path) -> None:
     async with visit.clinic.client("admin", raises=False) as client:
         before = visit.rows()
@@ -110,7 +110,7 @@ async def test_a_full_disk_answers_every_change_with_507_and_a_sentence(visit: V
             assert answer.status_code < 300, f"{method} {path}: {answer.text}"
 
 
-@about_the_file
+@sqlite_only
 async def test_a_page_on_a_full_disk_says_so_in_a_page(visit: Visit, disk: Path) -> None:
     form = {"Accept": "text/html", "Content-Type": "application/x-www-form-urlencoded"}
     async with visit.clinic.client("clinician", headers=form, raises=False) as client:
@@ -136,7 +136,7 @@ def readings(v: Visit) -> list[str]:
     ]
 
 
-@about_the_file
+@sqlite_only
 async def test_on_a_full_disk_people_sign_in_read_results_and_sign_out(visit: Visit, disk: Path) -> None:
     clinic = visit.clinic
     person = {"name": "viewer", "password": PASSWORD}
@@ -182,7 +182,7 @@ async def test_a_sign_in_from_before_the_disk_was_full_goes_on_and_can_be_ended(
             assert (await client.get(f"{API}/account", headers=cookie)).status_code == 401
 
 
-@about_the_file
+@sqlite_only
 async def test_a_disk_that_became_read_only_is_said_and_can_be_read(disk: Path, tmp_path: Path) -> None:
     frozen = tmp_path / "frozen"
     frozen.mkdir()
@@ -221,7 +221,7 @@ async def _use_read_only(v: Visit) -> None:
         assert "cannot be written" in checks["files"]
 
 
-@about_the_file
+@sqlite_only
 async def test_ready_really_writes_and_says_when_it_cannot(visit: Visit, disk: Path) -> None:
     clinic = visit.clinic
     time_s = 0.0

@@ -17,10 +17,10 @@ from server.live.client import StreamReport, stream
 from server.live.pairing import pair
 from server.services import live, recordings
 from server.services.live_recordings import log_path
-from tests.engines import on_both_engines
 from tests.faults.clinic import Clinic
 from tests.faults.forking import Forker
-from tests.live_takes import HELLO, digest, frame, kept_in, stored
+from tests.helpers.engines import on_both_engines
+from tests.helpers.live_takes import HELLO, digest, frame, kept_in, stored
 
 pytestmark = on_both_engines
 

@@ -9,7 +9,7 @@ import pytest
 from core.formats.live_log import FILE_MARK, hello_json, record
 from server.storage import fs, segments
 from tests.faults.model_disk import ModelDisk
-from tests.live_takes import HELLO, frame
+from tests.helpers.live_takes import HELLO, frame
 
 FRAMES = [frame(i, n=1) for i in range(8)]
 PIECES = [record("B", one) for one in FRAMES]

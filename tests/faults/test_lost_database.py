@@ -28,13 +28,13 @@ from server.storage.trash import KEPT, FolderTrash
 from server.worker.task import load
 from server.worker.worker import Worker
 from tests.data import ROOT
-from tests.engines import choose_url, on_both_engines, tell_commands
 from tests.faults.clinic import Clinic
 from tests.faults.failing import Dying, PowerError
 from tests.faults.model_disk import ModelDisk
-from tests.marks import about_the_file
-from tests.postgres import make_lasting_database
-from tests.service import line_with
+from tests.helpers.engines import choose_url, on_both_engines, tell_commands
+from tests.helpers.marks import sqlite_only
+from tests.helpers.postgres import make_lasting_database
+from tests.helpers.service import line_with
 
 CONTENTS = {b"signals", b"walk two", b"walk three"}
 STEP = {"sqlite": 1, "postgresql": 4}
@@ -118,7 +118,7 @@ def serve(settings: Settings) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("database", ["missing", pytest.param("empty file", marks=about_the_file), "emptied"])
+@pytest.mark.parametrize("database", ["missing", pytest.param("empty file", marks=sqlite_only), "emptied"])
 def test_a_start_is_refused_when_files_are_there_and_the_database_knows_no_patient(
     full: Clinic, database: str
 ) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from server.processes.supervisor import Workers
 from tests.faults.clinic import Clinic, until
-from tests.postgres import stopped_server
+from tests.helpers.postgres import stopped_server
 from tests.server.clinic import open_clinic
 
 pytestmark = pytest.mark.postgres

@@ -15,10 +15,10 @@ from server.services.sweep import sweep
 from server.storage import fs
 from server.worker.task import load
 from server.worker.worker import Worker
-from tests.engines import on_both_engines
 from tests.faults.clinic import Clinic
 from tests.faults.failing import FailingSystem
-from tests.marks import about_the_file
+from tests.helpers.engines import on_both_engines
+from tests.helpers.marks import sqlite_only
 
 
 def fail_at_every_call(
@@ -115,7 +115,7 @@ def write_notes(clinic: Clinic, times: int) -> None:
             c.exec_driver_sql("UPDATE patient SET note = ?", (f"{i:08}" * 8000,))
 
 
-@about_the_file
+@sqlite_only
 def test_a_reader_that_holds_its_snapshot_stops_nobody_and_the_log_shrinks_after(clinic: Clinic) -> None:
     log = clinic.settings.database.with_name("sagittal.db-wal")
     with clinic.db.read() as reader:

@@ -26,9 +26,9 @@ from server.auth.sessions import Logins
 from server.processes.environment import make_environment
 from server.services import recordings
 from tests.data import ROOT
-from tests.engines import on_both_engines
 from tests.faults.clinic import Clinic, alive, until
 from tests.faults.forking import ForkedServer, Forker
+from tests.helpers.engines import on_both_engines
 
 pytestmark = on_both_engines
 

@@ -21,9 +21,9 @@ from server.services.references import list_referenced
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.tables import job
 from tests.core.fusion.algorithms.motion import trial_bytes
-from tests.engines import on_both_engines
 from tests.faults.clinic import Clinic, until
-from tests.kept import keep
+from tests.helpers.engines import on_both_engines
+from tests.helpers.kept import keep
 
 ORDER = tunings.TuningOrder("mahony_2008", ("judge",), particles=10, iterations=70, rounds=2, random_rounds=1)
 """Some seven seconds of work: longer than a worker takes to be killed, replaced and heard of."""

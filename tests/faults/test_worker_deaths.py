@@ -16,9 +16,9 @@ from sqlalchemy.exc import OperationalError
 from server.processes.environment import make_environment
 from server.processes.supervisor import Workers
 from server.settings import Settings
-from tests.engines import on_both_engines, on_both_engines_first
 from tests.faults.clinic import Clinic, alive, state_of, until
 from tests.faults.tiny_tasks import STAGES
+from tests.helpers.engines import on_both_engines, on_both_engines_first
 
 
 def children_of(pid: int) -> list[int]:

@@ -19,8 +19,8 @@ from server.auth import accounts
 from server.auth.roles import Role
 from server.settings import Settings
 from server.storage.db import Database
-from tests.databases import write_database
-from tests.engines import choose_url
+from tests.helpers.databases import write_database
+from tests.helpers.engines import choose_url
 
 PASSWORD = "correct horse battery"
 ORIGIN = "http://127.0.0.1"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from server.auth import passwords
-from tests.engines import bare_source, engine, postgres, source  # noqa: F401 - fixtures
+from tests.helpers.engines import bare_source, engine, postgres, source  # noqa: F401 - fixtures
 from tests.server.clinic import CHEAP
 
 NOBODY = CHEAP.hash("no account has this password")

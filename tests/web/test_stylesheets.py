@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+import pytest
+
 from tests.data import ROOT
 
 WEB: Final = ROOT / "web"
@@ -23,6 +25,7 @@ WORDS: Final = re.compile(rf"[\w{ANY}-]+(?: [\w{ANY}-]+){{0,3}}")
 ATTRIBUTE: Final = re.compile(rf'class="([\w {ANY}-]*)"')
 
 
+@pytest.mark.slow
 def test_every_styled_class_is_used() -> None:
     used = set(template_classes()) | set(script_classes()) | set(python_classes())
     plain = {name for name in used if ANY not in name}
@@ -37,6 +40,7 @@ def test_every_class_of_a_template_is_styled() -> None:
     assert unstyled == HOOKS, f"no rule for {sorted(unstyled - HOOKS)}; not there {sorted(HOOKS - unstyled)}"
 
 
+@pytest.mark.slow
 def test_the_finders_find() -> None:
     assert {"card", "kpi", "ps-msg", "tl-cursor"} <= styled_classes()
     assert {"card", "kpi"} <= set(template_attributes())

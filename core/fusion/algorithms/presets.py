@@ -72,7 +72,7 @@ TUNED_ON_WALKERS: Final[dict[tuple[str, BodyPlace], AlgorithmGains]] = {
 """Algorithm and place → gains without a magnetometer, where they did better than the defaults.
 
 Fitted by `sagittal tune` to eight simulated people and shown on six others, healthy and not
-(`tests/accuracy/tuned_walks.py`), and on sensors of two real people beside optical segments. There
+(`validation/accuracy/tuned_walks.py`), and on sensors of two real people beside optical segments. There
 `nazarahari_2021` is clearly better on the foot, and no other set differs from the defaults by more than 0.3°:
 docs/science/filters.md, "Sets for foot, shank, thigh and pelvis".
 """

@@ -110,10 +110,10 @@ FOOT_PITCH_IC: Final = _angle("zero of the foot, moment of contact", 1.5, 1.5)
 FOOT_PITCH_TC: Final = _angle("zero of the foot, moment of foot-off", 2.0, 2.0)
 TOE_OUT: Final = _angle("heading of the foot", 1.5, 2.5)
 FOOT_TURN: Final = _angle("heading of the foot", 0.0, 1.0)
-"""Own estimates, from headings (docs/accuracy.md, "Headings on neura_walk")."""
+"""Own estimates, from headings (validation/report.md, "Headings on neura_walk")."""
 
 
 TEST_TOTAL: Final = MeasurementErrors("first and last movement, on simulated people", own=0.04)
 TEST_EDGE: Final = MeasurementErrors("where a segment ends, on simulated people", own=0.06)
-"""Simulated timed up and go of the twelve virtual people (tests/accuracy/test_functional_tests.py),
+"""Simulated timed up and go of the twelve virtual people (validation/accuracy/test_functional_tests.py),
 rounded up; real people were not measured against a reference."""

@@ -74,6 +74,7 @@ def cut(stream: LongStream, blocks: list[SampleBlock], rows: int) -> LongStream:
     return replace(stream, open_blocks=open_blocks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lean", "takes"), [(25.0, 1.5), (35.0, 2.5), (45.0, 3.5)])
 def test_all_transitions_are_found_near_their_time(lean: float, takes: float) -> None:
     made = simulate_chest(CHAIR, 1, ChestStyle(lean_rad=radians(lean), change_s=takes))
@@ -131,6 +132,7 @@ def test_inclination_is_positive_forward() -> None:
     assert np.nanmax(found.inclination_deg) > 15.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rows", [977, 200_000])
 def test_how_the_blocks_are_cut_changes_no_bit(
     life: DailySimulation, blocks: list[SampleBlock], lived: ActivityResult, rows: int

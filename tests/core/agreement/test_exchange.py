@@ -13,7 +13,7 @@ from core.agreement.agree import compare_sensors
 from core.agreement.exchange import LEGS, SWAPS, Swap, find_exchange, undo_exchange
 from core.agreement.params import ExchangeParams
 from core.recording import UniformRecording
-from tests.walks import only, simulated
+from tests.helpers.walks import only, simulated
 
 
 @cache
@@ -109,6 +109,7 @@ def test_terms_are_kept_as_long_as_labels_are_judged_and_judge_the_same() -> Non
     )
 
 
+@pytest.mark.slow
 def test_exchanged_sensors_of_a_long_walk_are_compared_anew() -> None:
     """Longer than their labels are judged on, so that no terms of the whole are left."""
     swap: Swap = (("thigh_l", "thigh_r"),)

@@ -15,8 +15,8 @@ from core.agreement.params import JointParams, LagParams
 from core.agreement.windows import JointWindows, compare_at_joint
 from core.frames import Segment
 from core.recording import UniformRecording
-from tests.perturbations import delay_sensor
-from tests.walks import only, simulated
+from tests.helpers.perturbations import delay_sensor
+from tests.helpers.walks import only, simulated
 
 LEG: tuple[Segment, ...] = ("pelvis", "thigh_l", "thigh_r", "shank_r", "foot_r")
 
@@ -41,6 +41,7 @@ def test_a_clean_walk_is_the_same_recording() -> None:
     assert clean().drifts == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("segment", "late_s"), [("shank_r", 0.04), ("foot_r", -0.1), ("pelvis", 0.033)])
 def test_a_late_sensor_is_told_and_laid_where_it_belongs(segment: Segment, late_s: float) -> None:
     found = check_agreement(delay_sensor(walk(), segment, late_s))

@@ -17,8 +17,8 @@ from core.pipeline import resume
 from core.recording import SensorSignals, UniformRecording
 from core.rotation import exp, rotate
 from core.withheld import withhold_at_slips
-from tests.perturbations import find_middle, slip_sensor
-from tests.walks import analysed, only, simulated
+from tests.helpers.perturbations import find_middle, slip_sensor
+from tests.helpers.walks import analysed, only, simulated
 
 AT_S = 17.0
 
@@ -28,6 +28,7 @@ def walk() -> UniformRecording:
     return only(made, *(s for s in made.sensors if s != "chest"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("segment", ["shank_r", "foot_l"])
 def test_a_slip_is_named_with_its_moment_and_angle(segment: Segment) -> None:
     slipped = slip_sensor(walk(), segment, np.radians(15.0), AT_S)
@@ -45,6 +46,7 @@ def test_a_slip_is_named_with_its_moment_and_angle(segment: Segment) -> None:
     assert (found.whole is None) == (segment == "shank_r")
 
 
+@pytest.mark.slow
 def test_a_shank_is_turned_back_and_a_foot_is_left() -> None:
     slipped = slip_sensor(walk(), "shank_r", np.radians(15.0), AT_S)
     repaired = check_agreement(slipped).recording

@@ -12,8 +12,8 @@ from core.agreement.params import SlipParams
 from core.frames import Segment
 from core.pipeline import resume
 from core.recording import UniformRecording
-from tests.perturbations import slip_sensor
-from tests.walks import analysed, cut, neura_walk, only, simulated
+from tests.helpers.perturbations import slip_sensor
+from tests.helpers.walks import analysed, cut, neura_walk, only, simulated
 
 BEFORE_S = 4.5
 """The person walks from 5.3 s on."""
@@ -24,6 +24,7 @@ def walk() -> UniformRecording:
     return only(made, *(s for s in made.sensors if s != "chest"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("segment", ["thigh_l", "shank_r", "foot_l"])
 @pytest.mark.parametrize("by_deg", [15.0, -15.0])
 def test_a_slip_before_the_walk_leaves_the_sensor_out(segment: Segment, by_deg: float) -> None:
@@ -46,6 +47,7 @@ def test_a_real_one_is_found_about_the_first_steps(segment: Segment, at_s: float
         assert [x.segment for x in found.slips] == [segment]
 
 
+@pytest.mark.slow
 def test_a_leg_that_stands_elsewhere_has_not_slipped() -> None:
     """Thigh and shank of a leg put forward turn alike, also where it stands so before the walk only."""
     there = slip_sensor(walk(), "thigh_l", np.radians(12.0), BEFORE_S)

@@ -12,7 +12,7 @@ from core.angles.measure import measure_angles
 from core.frames import R_NEUTRAL, SIDES, SUFFIX, Bools, Floats, Segment
 from core.fusion.orientations import Orientations
 from core.rotation import about, from_matrix, multiply, rotate
-from tests.walks import simulated
+from tests.helpers.walks import simulated
 
 NEUTRAL = from_matrix(R_NEUTRAL)
 LEG = ("pelvis", "thigh", "shank", "foot")
@@ -145,6 +145,7 @@ def test_a_standing_without_signal_is_told() -> None:
     assert "ankle_dorsiflexion_l" not in angles.angles
 
 
+@pytest.mark.slow
 def test_angles_of_the_true_poses_are_the_true_angles() -> None:
     """The simulator takes its angles from rotation matrices on its own."""
     _, truth = simulated("comfortable")

@@ -69,6 +69,7 @@ def test_it_changes_no_angle_beyond_its_zero() -> None:
         assert np.degrees(np.nanstd(angle - wide.angles[name])) < limit, name
 
 
+@pytest.mark.slow
 def test_it_survives_the_uniform_axis() -> None:
     declared = replace(recording(), subject=Subject(HEIGHT, 0.25))
     assert synchronise(declared).subject.standing_width_m == 0.25

@@ -21,7 +21,7 @@ from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import about, conjugate, multiply, rotate, to_matrix
 from core.simulate.soft_tissue import SoftTissue, skin_motion
-from tests.walks import simulated
+from tests.helpers.walks import simulated
 
 WHOLE = PRESETS["lower_body7"]
 BODY = BodyModel.from_height(1.75)

@@ -23,7 +23,7 @@ from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import LastReading
 from core.recording import UniformRecording
 from core.simulate import WalkTruth
-from tests.walks import only, simulated
+from tests.helpers.walks import only, simulated
 
 WHOLE = PRESETS["lower_body7"]
 PELVIS_FEET = PRESETS["feet_pelvis3"]
@@ -76,6 +76,7 @@ def test_what_is_worn_decides(worn: set[Segment], first: str | None) -> None:
     assert (list_possible_estimators(worn) or (None,))[0] == first
 
 
+@pytest.mark.slow
 def test_seven_sensors_walk_through_the_room_as_the_person_did() -> None:
     made = walk()
     assert made.poses.method == "erkf_smoothed"
@@ -116,6 +117,7 @@ def test_feet_are_linked_only_by_a_whole_chain() -> None:
     assert walk("pelvis", "thigh_r", "shank_r").feet is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("worn", "method"), [(PELVIS_FEET, "l7s_3i"), (FEET, "l7s_2i")])
 def test_few_sensors_give_a_figure_and_all_angles_named_as_estimated(
     worn: tuple[Segment, ...], method: str
@@ -131,6 +133,7 @@ def test_few_sensors_give_a_figure_and_all_angles_named_as_estimated(
     assert ("pelvis_tilt" in estimated_names) == (method == "l7s_2i")
 
 
+@pytest.mark.slow
 def test_a_failed_thigh_leaves_the_other_leg_as_measured_and_estimates_the_rest() -> None:
     take = failing(simulated("fast_with_turns", 3)[0], "thigh_l", 15.0)
     made = estimated(take)
@@ -145,6 +148,7 @@ def test_a_failed_thigh_leaves_the_other_leg_as_measured_and_estimates_the_rest(
     assert {(base.split("_")[0], side) for base, _, side in names} == {("hip", "l"), ("knee", "l")}
 
 
+@pytest.mark.slow
 def test_a_failed_foot_leaves_one_leg_with_the_pelvis() -> None:
     made = estimated(failing(simulated("fast_with_turns", 3)[0], "foot_l", 15.0))
     assert made.poses.method == "erkf_smoothed"
@@ -162,6 +166,7 @@ def test_a_short_loss_is_no_failure() -> None:
     assert made.poses.reduced is None
 
 
+@pytest.mark.slow
 def test_another_estimator_runs_on_the_same_take() -> None:
     take = simulated("fast_with_turns", 3)[0]
     for name, method in (("l7s_3i", "l7s_3i"), ("stance_foot_anchor", "stance_foot_anchor")):
@@ -177,6 +182,7 @@ def test_an_estimator_that_lacks_its_sensors_says_which_it_needs() -> None:
     assert caught.value.code == "estimator_impossible"
 
 
+@pytest.mark.slow
 def test_an_unasked_estimator_that_fails_gives_way_to_the_next() -> None:
     sensors = mounted(simulated("fast_with_turns", 3)[0], PoseParams())
     broken = replace(sensors, body=replace(sensors.body, thigh=-0.4))
@@ -188,6 +194,7 @@ def test_an_unasked_estimator_that_fails_gives_way_to_the_next() -> None:
     assert "foot_paths_failed" in {n.code for n in made.poses.notices}
 
 
+@pytest.mark.slow
 def test_without_an_answer_of_the_joints_the_next_estimator_is_used() -> None:
     sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
     assert set(sensors.turned_rad) == set(WHOLE)
@@ -205,6 +212,7 @@ def handed_on(sensors: MountedSensors) -> tuple[MountedSensors, dict[Segment, we
     return replace(sensors, orientations=replace(sensors.orientations, q=passed)), watched
 
 
+@pytest.mark.slow
 def test_the_erkf_lets_go_of_orientations_that_nobody_else_reads_and_finds_the_same() -> None:
     sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
     handed, watched = handed_on(sensors)
@@ -217,6 +225,7 @@ def test_the_erkf_lets_go_of_orientations_that_nobody_else_reads_and_finds_the_s
         np.testing.assert_array_equal(made.poses.p[s], p)
 
 
+@pytest.mark.slow
 def test_where_the_erkf_fails_the_next_estimator_still_reads_the_orientations() -> None:
     sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
     handed, watched = handed_on(replace(sensors, failure=EstimationError("filter_diverged", "It diverged.")))

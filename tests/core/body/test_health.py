@@ -15,8 +15,8 @@ from core.recording import Recording, UniformRecording
 from core.rotation import about, rotate
 from core.simulate import simulate_scenario
 from tests.core.body.test_estimate import estimated
-from tests.marks import slow_beyond
-from tests.walks import simulated
+from tests.helpers.marks import slow_after
+from tests.helpers.walks import simulated
 
 
 def take(seed: int = 3, name: str = "fast_with_turns") -> UniformRecording:
@@ -56,9 +56,10 @@ def test_the_longest_run_is_found_wherever_it_lies() -> None:
     assert longest_run_s(np.zeros(5, bool), 10.0) == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seed"),
-    slow_beyond(1, [("comfortable", 3), ("fast_with_turns", 2), ("hemiparetic", 4), ("drop_foot", 5)]),
+    slow_after(1, [("comfortable", 3), ("fast_with_turns", 2), ("hemiparetic", 4), ("drop_foot", 5)]),
 )
 def test_a_right_set_up_is_not_accused(name: str, seed: int) -> None:
     made = estimated(take(seed, name))

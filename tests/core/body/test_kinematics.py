@@ -16,7 +16,7 @@ from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import rotate
 from core.simulate import WalkTruth
-from tests.walks import only, simulated
+from tests.helpers.walks import only, simulated
 
 BODY = BodyModel.from_height(1.75)
 

@@ -15,7 +15,7 @@ from core.frames import SEGMENTS, Floats, Segment
 from core.recording import UniformRecording
 from core.rotation import exp, from_matrix, log, normalise, rotate, to_matrix
 from core.simulate import Arc, Pivot, Stand, Straight, WalkTruth
-from tests.walks import TOGETHER, cut, only, scripted, simulated, turned
+from tests.helpers.walks import TOGETHER, cut, only, scripted, simulated, turned
 
 LEGS: tuple[Segment, ...] = ("thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r")
 
@@ -52,6 +52,7 @@ def test_gyro_bias_is_the_drawn_one() -> None:
         assert off < 0.1, segment
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["walking_direction", "gyro_pca"])
 def test_any_mounting_gives_the_same_segment_frames(method: Method) -> None:
     """The same signals in turned sensors: R_segment_sensor takes the turn up."""
@@ -123,6 +124,7 @@ def test_turning_after_walking_is_told_as_such() -> None:
     assert "Start" not in told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_walk_that_begins_with_an_arc_still_tells_where_the_pelvis_faces(seed: int) -> None:
     script = (Stand(5.0), Arc(1.5, np.pi / 2, 0.52, 0.56), Straight(12.0, 0.64, 0.54), Stand(4.0))
@@ -131,6 +133,7 @@ def test_a_walk_that_begins_with_an_arc_still_tells_where_the_pelvis_faces(seed:
     assert abs(axial_error_deg(found, truth, "pelvis")) <= 20.0
 
 
+@pytest.mark.slow
 def test_turns_are_not_straight_walking() -> None:
     recording, _ = simulated("fast_with_turns")
     found = calibrate(recording).calibration
@@ -176,6 +179,7 @@ def test_a_mounting_declared_the_wrong_way_round_leaves_the_sensor_out() -> None
     assert alone.value.code == "calibration_sign_conflict"
 
 
+@pytest.mark.slow
 def test_a_pelvis_without_a_rest_near_the_walk_is_left_out_and_the_legs_stay() -> None:
     """Rest, then 8 s of fidgeting on the spot, then the walk: nothing tells where the pelvis faces."""
     recording, _ = simulated("slow")

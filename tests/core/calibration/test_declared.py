@@ -15,7 +15,7 @@ from core.recording import UniformRecording
 from core.rotation import rotate
 from core.setup.repair import SetupRepair
 from core.simulate import WalkTruth
-from tests.walks import cut, only, simulated
+from tests.helpers.walks import cut, only, simulated
 
 NEAR = np.cos(np.radians(20.0))
 """Of an axis that points one of the four ways."""
@@ -52,6 +52,7 @@ def declare(take: UniformRecording, truth: WalkTruth, by: int) -> UniformRecordi
     return replace(take, mounting=said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", [1, 2, 3])
 def test_a_declaration_turned_by_quarters_is_put_right(by: int) -> None:
     take, truth = simulated("comfortable", 3)

@@ -15,7 +15,7 @@ from core.frames import Floats, Segment
 from core.fusion.mahony import estimate_orientations
 from core.recording import UniformRecording
 from core.rotation import angle_between, exp, rotate, wrap_angle, yaw
-from tests.walks import cut, only, simulated, turned
+from tests.helpers.walks import cut, only, simulated, turned
 
 START_S, END_S = 8.0, 20.0
 LEGS: tuple[Segment, ...] = ("shank_l", "shank_r", "foot_l", "foot_r", "thigh_l", "thigh_r")
@@ -30,6 +30,7 @@ def legs() -> UniformRecording:
     return only(mid_walk(), *LEGS)
 
 
+@pytest.mark.slow
 def test_the_walk_gives_what_standing_gives_but_for_the_neutral_posture(legs: UniformRecording) -> None:
     found = calibrate(legs).calibration
     whole = calibrate(simulated()[0]).calibration
@@ -45,6 +46,7 @@ def test_the_walk_gives_what_standing_gives_but_for_the_neutral_posture(legs: Un
         assert found.segments[s].rest_norm == pytest.approx(whole.segments[s].rest_norm, abs=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["comfortable", "hemiparetic", "crouch"])
 def test_segments_are_where_they_are_but_for_a_fixed_turn(name: str) -> None:
     """Whatever posture is called neutral: against the truth a segment is off by one turn, all the time."""

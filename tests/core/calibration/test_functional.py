@@ -25,8 +25,8 @@ from core.rest import find_runs
 from core.rotation import to_matrix
 from core.simulate import FunctionalTruth, RecordingSetup, SwingsAndBows, simulate_swings_and_bows
 from core.timeline import synchronise
-from tests.live_agreement import cut_blocks
-from tests.walks import only, rms_deg, simulated
+from tests.helpers.live_agreement import cut_blocks
+from tests.helpers.walks import only, rms_deg, simulated
 
 LEGS = tuple(s for s in SEGMENTS if s not in ("pelvis", "chest"))
 
@@ -46,6 +46,7 @@ def find_errors(calibrated: CalibratedRecording, truth: FunctionalTruth) -> dict
     return errors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_random_mountings_come_out_within_two_degrees(seed: int) -> None:
     recording, truth = take(seed)
@@ -60,6 +61,7 @@ def test_random_mountings_come_out_within_two_degrees(seed: int) -> None:
     assert found.notices == ()
 
 
+@pytest.mark.slow
 def test_windows_and_repetitions_are_those_that_were_done() -> None:
     recording, truth = take()
     found = find_functional_movements(recording, FunctionalParams())
@@ -129,6 +131,7 @@ def test_labels_hold_and_the_angles_of_swings_come_out() -> None:
         assert rms_deg(angles.angles[name][: len(true)] - true) < 2.0
 
 
+@pytest.mark.slow
 def test_live_it_is_the_same_calibration() -> None:
     whole, truth = take(0, SwingsAndBows(swings=10, bows=5))
     recording = only(whole, "pelvis", "shank_l", "shank_r")

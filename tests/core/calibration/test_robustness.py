@@ -15,7 +15,7 @@ from core.fusion.mahony import estimate_orientations
 from core.recording import UniformRecording
 from core.simulate import simulate_scenario
 from core.timeline import synchronise
-from tests.walks import cut, only, rms_deg, simulated
+from tests.helpers.walks import cut, only, rms_deg, simulated
 
 CODES = {"no_rest", "not_still", "rest_too_short", "no_walking", "not_single_axis", "pelvis_heading_unknown"}
 
@@ -27,6 +27,7 @@ def _attempt(recording: UniformRecording, params: CalibrationParams) -> Calibrat
         return error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(40))
 def test_any_piece_with_any_sensors_ends_in_a_result_or_a_code(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -23,7 +23,7 @@ from core.calibration.score import (
 from core.frames import Floats, Segment
 from core.rest import index_window
 from core.rotation import about, exp, multiply, rotate, to_matrix
-from tests.walks import only, simulated
+from tests.helpers.walks import only, simulated
 
 
 @cache

@@ -69,6 +69,7 @@ def errors_deg(recording: UniformRecording, params: TableTopParams | None = None
     return np.degrees([float(angle_between(from_matrix(found[s]), from_matrix(truth[s]))) for s in found])
 
 
+@pytest.mark.slow
 def test_perfect_sensors_come_home() -> None:
     assert errors_deg(carried(noisy=False, bias_deg=0.0)).max() < 0.02
 
@@ -88,6 +89,7 @@ def test_whoever_faces_elsewhere_says_so() -> None:
     assert errors_deg(recording).min() == pytest.approx(30.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_table_that_is_not_level_is_seen_by_gravity() -> None:
     """Devices that lie 5° off level, as they are agreed to lie but for that."""
     lean = exp(np.array([radians(5.0), 0.0, 0.0]))

@@ -11,7 +11,7 @@ from core.events.result import GaitEvent, GaitEvents
 from core.frames import Side
 from core.pipeline import TakeAnalysis, analyse, resume
 from core.simulate import simulate_scenario
-from tests.perturbations import delay_sensor
+from tests.helpers.perturbations import delay_sensor
 
 PARAMS = AlternationParams()
 
@@ -61,6 +61,7 @@ def codes(found: TakeAnalysis) -> list[str]:
     return [n.code for n in found.notices]
 
 
+@pytest.mark.slow
 def test_a_take_of_two_feet_tells_a_late_one_and_no_patient() -> None:
     right = analyse(simulate_scenario("hemi_mild", 3, worn=("foot_l", "foot_r")).recording)
     assert "feet_out_of_time" not in codes(right)

@@ -13,8 +13,8 @@ from core.fusion.mahony import estimate_orientations
 from core.recording import UniformRecording
 from core.simulate.script import Stand, Straight
 from core.simulate.truth import WalkTruth
-from tests.accuracy.event_scoring import match
-from tests.walks import only, scripted
+from tests.helpers.event_scoring import match
+from tests.helpers.walks import only, scripted
 
 CADENCES = ((0.35, 0.27), (0.64, 0.27), (0.30, 0.22), (0.40, 0.90), (0.30, 1.10), (0.30, 1.30))
 """Step length in m, step time in s: twice the usual cadence, quicker still, slow, slower."""
@@ -24,6 +24,7 @@ def walk(step_m: float, step_s: float) -> tuple[UniformRecording, WalkTruth]:
     return scripted((Stand(5.0), Straight(24 * step_m, step_m, step_s), Stand(4.0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("step_m", "step_s"), CADENCES)
 def test_the_feet_are_found_at_any_cadence(step_m: float, step_s: float) -> None:
     recording, truth = walk(step_m, step_s)
@@ -49,6 +50,7 @@ def test_a_trunk_sensor_gives_the_cadence_or_says_why_not(step_m: float, step_s:
     assert len(found.steps) == pytest.approx(contacts, abs=2)
 
 
+@pytest.mark.slow
 def test_steps_too_slow_to_be_walking_are_refused_by_every_part() -> None:
     recording, _ = walk(0.25, 1.6)
     assert detect_steps(only(recording, "pelvis")).steps == ()

@@ -14,9 +14,9 @@ from core.events.foot_movement import measure_foot_movements
 from core.events.result import GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES
 from core.fusion.mahony import estimate_orientations
-from tests.accuracy.event_scoring import match
-from tests.marks import slow_beyond
-from tests.walks import simulated
+from tests.helpers.event_scoring import match
+from tests.helpers.marks import slow_after
+from tests.helpers.walks import simulated
 
 PEOPLE = (
     "comfortable", "slow", "fast_with_turns", "hemiparetic", "drop_foot", "parkinson", "severe_shuffle",
@@ -77,7 +77,8 @@ def test_confidence_alone_adds_and_takes_away_nothing() -> None:
     assert [e.confidence for e in alone.events] == [None] * 3
 
 
-@pytest.mark.parametrize("name", slow_beyond(4, PEOPLE))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", slow_after(4, PEOPLE))
 def test_simulated_people_are_found_whole_or_said_to_be_led_by_another_detector(name: str) -> None:
     agreed = agree_on_contacts(detectors(name))
     truth = simulated(name)[1]
@@ -88,6 +89,7 @@ def test_simulated_people_are_found_whole_or_said_to_be_led_by_another_detector(
     assert ("led_by_other" in codes) == ("no_toe_off" in codes) == (name == "severe_shuffle")
 
 
+@pytest.mark.slow
 def test_with_feet_alone_the_shuffle_stays_refused() -> None:
     take = estimate_orientations(calibration.calibrate(simulated("severe_shuffle")[0]))
     feet = replace(take, q={s: take.q[s] for s in FOOT.values()})

@@ -221,7 +221,7 @@ def test_a_flat_landing_is_where_the_foot_stops_turning_and_less_certain() -> No
 
 def test_motion_of_the_feet_is_without_bias_and_in_their_axes() -> None:
     from core import calibration
-    from tests.walks import simulated
+    from tests.helpers.walks import simulated
 
     calibrated = calibration.calibrate(simulated()[0])
     motions = measure_foot_movements(calibrated)

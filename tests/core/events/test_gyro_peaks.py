@@ -15,8 +15,8 @@ from core.frames import R_NEUTRAL, SIDES, Floats
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import about, from_matrix, multiply
-from tests.accuracy.event_scoring import match
-from tests.walks import simulated
+from tests.helpers.event_scoring import match
+from tests.helpers.walks import simulated
 
 PRESETS = GyroPeakPresets().by_name
 

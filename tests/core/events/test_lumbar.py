@@ -17,9 +17,9 @@ from core.frames import GRAVITY, SIDES, Floats
 from core.recording import SensorSignals, Subject, UniformRecording
 from core.rotation import normalise
 from core.simulate import SCRIPTS
-from tests.accuracy.event_scoring import match
-from tests.marks import slow_beyond
-from tests.walks import cut, lost, only, simulated, turned
+from tests.helpers.event_scoring import match
+from tests.helpers.marks import slow_after
+from tests.helpers.walks import cut, lost, only, simulated, turned
 
 WALKS = tuple(n for n in SCRIPTS if n not in ("five_minutes", "lost_sensor"))
 
@@ -68,7 +68,8 @@ def test_every_walk_gives_its_steps_once(name: str) -> None:
     assert found.cadence_spm == pytest.approx(60.0 / float(np.mean(steps[steps < 1.5])), rel=0.05)
 
 
-@pytest.mark.parametrize("name", slow_beyond(4, WALKS))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", slow_after(4, WALKS))
 def test_feet_are_told_on_nearly_all_walks(name: str) -> None:
     found = detect_steps(trunk(name))
     assert sum(s.side is not None for s in found.steps) >= 0.9 * len(found.steps)

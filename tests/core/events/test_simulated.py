@@ -1,7 +1,7 @@
 """Contacts and temporal parameters against the exact truth of simulated walks.
 
 The rule sees the landing pitch peak that the simulator shapes to be at contact (docs/science/simulation.md),
-so the small errors here say that the code is right, not how people land; tests/accuracy says that.
+so the small errors here say that the code is right, not how people land; validation/accuracy says that.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.parameters import stride_values, summarise_times
 from core.simulate import Simulation, simulate_scenario
-from tests.accuracy.event_scoring import match
+from tests.helpers.event_scoring import match
 
 SCENARIOS = ("comfortable", "fast_with_turns")
 
@@ -48,6 +48,7 @@ def walked(request: pytest.FixtureRequest) -> Walked:
     return Walked(simulation, events.detect(exact), found, strides)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["of_truth", "of_chain"])
 def test_every_contact_is_found_and_none_is_invented(walked: Walked, source: str) -> None:
     """docs/science/events.md, "Limits on real walks": none extra, IC ±10 ms; TC against the 5 mm lift."""

@@ -12,7 +12,7 @@ from core.events.lumbar import split_about_vertical
 from core.events.turns import Turn, body_yaw_rate, find_turns
 from core.frames import Floats, Segment
 from core.fusion.orientations import Orientations
-from tests.walks import neura_analysis, simulated
+from tests.helpers.walks import neura_analysis, simulated
 
 RATE = 100.0
 

@@ -15,7 +15,7 @@ from core.errors import ParameterError
 from core.feedback import Baseline, Cue, FeedbackEngine, Prescription
 from core.feedback.engine import LATE_S, OPENING
 from core.feedback.prescription import LEVELS
-from tests.feedback import NAME, OPEN, prescription, train, walked
+from tests.helpers.feedback import NAME, OPEN, prescription, train, walked
 
 IN, NEAR, AWAY = 0.60, 0.53, 0.45
 """Values at level 0: within 0.55 to 0.65, within a level beside it, further off."""

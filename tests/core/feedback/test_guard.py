@@ -13,7 +13,7 @@ from core.feedback.guard import FIRST, LAST
 from core.frames import Floats
 from core.norms.adults import adult_reference
 from core.norms.profile import SAGITTAL
-from tests.feedback import OPEN, prescription, walked
+from tests.helpers.feedback import OPEN, prescription, walked
 
 
 def curves(added_deg: float = 0.0) -> Mapping[str, Floats]:

@@ -13,7 +13,7 @@ from core.parameters.catalogue import CATALOGUE, list_curve_figures, list_traina
 from core.parameters.catalogue.entry import PHASES, SUPPORT, TIMING
 from core.parameters.kinematic import FOOT_PITCH
 from core.parameters.spatial import NAMES as SPATIAL
-from tests.feedback import prescription
+from tests.helpers.feedback import prescription
 
 
 def record(**changes: Any) -> dict[str, Any]:

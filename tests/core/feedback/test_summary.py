@@ -8,7 +8,7 @@ import pytest
 
 from core.feedback import AnalysedStride, Cue, split
 from core.feedback.summary import TOLERANCE_S
-from tests.feedback import prescription, train
+from tests.helpers.feedback import prescription, train
 
 BLOCKS = {"kind": "every", "probe_every": 10, "probe_strides": 5}
 

@@ -16,7 +16,7 @@ from core.formats.orientation_table import OrientationTable
 from core.frames import Floats
 from core.rotation import about, angle_between, exp, multiply, normalise
 from core.simulate import WalkTruth
-from tests.walks import analysed, simulated
+from tests.helpers.walks import analysed, simulated
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,7 @@ from core.flags import judge_flags
 from core.frames import SIDES
 from core.parameters.result import CycleCurves
 from core.standing_angles import NAMES
-from tests.wbds import people
+from tests.helpers.wbds import people
 
 OFTEN = {"knee_hyperextension": 0.15}
 """Rule → share of healthy sides beyond it, where more than 5 % are: the limit is an unverified one."""

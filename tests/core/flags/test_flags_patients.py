@@ -17,7 +17,7 @@ from core.norms.controls import ControlSession, control_group
 from core.norms.lookup import Norms
 from core.parameters import cycle_curves, take_figures
 from core.parameters.result import CycleCurves, Parameter
-from tests.walks import simulated
+from tests.helpers.walks import simulated
 
 STRAIGHT = np.radians(10.0)
 
@@ -70,6 +70,7 @@ def test_a_healthy_walker_raises_nothing(name: str) -> None:
     assert raised(name) == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "expected"),
     [

@@ -41,6 +41,7 @@ def test_members_are_read_only_when_asked() -> None:
         b.read()
 
 
+@pytest.mark.slow
 def test_a_bomb_is_refused_before_it_is_unpacked() -> None:
     data = zipped({"bomb.txt": b"0" * 50_000_000})
     assert len(data) < 100_000

@@ -79,6 +79,7 @@ def damaged(data: bytes, rng: random.Random) -> bytes:
     return bytes(out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(UPLOADS))
 def test_damaged_bytes_are_read_or_refused(name: str) -> None:
     data, manifest = UPLOADS[name]

@@ -17,6 +17,7 @@ VALUES = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(VALUES)
 def test_what_json_can_say_is_read_as_it_is(value: object) -> None:
     text = json.dumps(value, ensure_ascii=False)

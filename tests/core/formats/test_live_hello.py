@@ -17,7 +17,7 @@ from core.formats.live_log import (
     parse_finish,
     parse_hello,
 )
-from tests.live import SMALL_HELLO
+from tests.helpers.live import SMALL_HELLO
 
 
 def test_a_hello_comes_back_and_its_token_is_not_in_the_log() -> None:

@@ -31,7 +31,7 @@ from core.formats.live_log import (
     scan_records,
     view_samples,
 )
-from tests.live import SMALL_HELLO, small, small_batch
+from tests.helpers.live import SMALL_HELLO, small, small_batch
 
 
 def refused(frame: bytes) -> str:

@@ -24,8 +24,8 @@ from core.formats.live_log import (
 from core.formats.live_reader import read_live_log
 from core.recording import Recording
 from core.timeline import synchronise
-from tests.live import SMALL_HELLO, LiveTake, send, shared, small, small_batch
-from tests.walks import neura_recording
+from tests.helpers.live import SMALL_HELLO, LiveTake, send, shared, small, small_batch
+from tests.helpers.walks import neura_recording
 
 
 def read(data: bytes) -> Recording:
@@ -62,6 +62,7 @@ def test_neura_walk_streamed_is_neura_walk_uploaded() -> None:
         assert np.array_equal(signals.valid, b.sensors[segment].valid)
 
 
+@pytest.mark.slow
 def test_a_take_cut_at_every_byte_is_read_or_refused_with_its_reason() -> None:
     take = small()
     log = take.log()

@@ -114,6 +114,7 @@ def test_a_column_may_be_null_only_where_its_sensor_has_holes() -> None:
     }
 
 
+@pytest.mark.slow
 def test_many_sensors_with_and_without_holes_keep_their_own_samples() -> None:
     """More than fit into one piece of memory, and some that are read into an array of their own."""
     n, rng = 20_000, np.random.default_rng(0)

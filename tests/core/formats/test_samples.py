@@ -12,7 +12,7 @@ from core.errors import FormatError, InputError
 from core.formats import SourceFile, parse_manifest, read_recording, write_recording
 from core.recording import Recording
 from tests.data import data_folder
-from tests.ipol import ipol_recording
+from tests.helpers.ipol import ipol_recording
 
 MT = "opensense_xsens_apdm/xsens_formats/"
 WALK = "opensense_xsens_apdm/walk_8imu_noGyr/MT_012005D6_009-001_"

@@ -249,6 +249,7 @@ FUZZED: dict[str, Callable[[], dict[str, bytes]]] = {
 MOST_GROWTH_KB = 200_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("label", FUZZED)
 def test_damaged_files_are_read_or_refused_within_bounds(label: str) -> None:
     parts = FUZZED[label]()

@@ -88,6 +88,7 @@ def test_a_timed_up_and_go_starts_and_stops_by_itself(segment: Segment) -> None:
     assert (last.start_s, last.end_s) == pytest.approx((file.start_s, file.end_s), abs=REFINED_S)
 
 
+@pytest.mark.slow
 def test_any_blocks_give_the_same_bits() -> None:
     one, *others = (followed(pelvis_tug(), "tug", size)[-1] for size in (1, 10, 37))
     assert one.final
@@ -251,6 +252,7 @@ def strides_of_a_walk(start_s: float, end_s: float) -> tuple[list[LiveStride], l
     return strides, events
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("protocol", "seconds", "name", "expected"),
     [

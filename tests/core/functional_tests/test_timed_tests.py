@@ -21,7 +21,7 @@ from core.simulate import PostureHold, simulate_day
 from core.simulate.scripts import ON_SKIN
 from core.simulate.tug import ChairTruth, simulate_chair_rises, simulate_tug
 from core.timeline import synchronise
-from tests.kept import keep
+from tests.helpers.kept import keep
 
 WORN: tuple[Segment, ...] = ("pelvis", "chest")
 
@@ -79,6 +79,7 @@ def test_the_pelvis_is_asked_before_the_chest() -> None:
     assert follow_trunk(tug()[0]).segment == "pelvis"
 
 
+@pytest.mark.slow
 def test_turns_have_their_angle_and_direction() -> None:
     for left in (True, False):
         motion = follow_trunk(wear(tug(left=left)[0], "pelvis"))

@@ -49,6 +49,7 @@ def test_it_starts_from_any_sample_of_the_take(at: int) -> None:
     assert angle_between(found, q).max() < 1e-6
 
 
+@pytest.mark.slow
 @given(st.lists(st.integers(1, 399), max_size=6, unique=True), st.integers(0, 5))
 @settings(max_examples=25, deadline=None)
 def test_one_run_equals_any_split_into_blocks_bit_for_bit(cuts: list[int], seed: int) -> None:

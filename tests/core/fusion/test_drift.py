@@ -12,9 +12,10 @@ from core.calibration import calibrate
 from core.frames import Segment
 from core.fusion.drift import DriftParams, remove_relative_drift
 from core.rotation import about, exp, multiply
-from tests.walks import simulated
+from tests.helpers.walks import simulated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 6, 10, 11])
 def test_of_two_feet_alone_the_last_digits_do_not_choose(seed: int) -> None:
     """Their reference is half way between them, so that both turn from it by the same angle."""

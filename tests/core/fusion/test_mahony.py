@@ -18,7 +18,7 @@ from core.fusion.drift import DriftParams
 from core.fusion.mahony import MahonyParams, estimate_orientations
 from core.rest import index_window
 from core.rotation import about, angle_between, from_matrix, mean, multiply, normalise, rotate, yaw
-from tests.walks import lost, only, rms_deg, simulated, turned
+from tests.helpers.walks import lost, only, rms_deg, simulated, turned
 
 NO_DRIFT = MahonyParams(drift=DriftParams(reference_s=1e9))
 

@@ -15,7 +15,7 @@ from core.norms.values import Sex
 from core.parameters.kinematic import MEAN_ZERO
 from core.parameters.result import CycleCurves, Parameter
 from core.scores import score_curves
-from tests.wbds import people
+from tests.helpers.wbds import people
 
 
 def session(

@@ -15,7 +15,7 @@ from core.norms.tables import read_rows
 from core.norms.values import COARSE_S
 from core.parameters.catalogue import CATALOGUE, list_curve_figures
 from tests.data import data_folder
-from tests.wbds import people
+from tests.helpers.wbds import people
 
 TABLES = (
     "kinematics_wbds_adult", "kinematic_parameters_wbds", "gps_reference_wbds", "spatiotemporal_age_sex",

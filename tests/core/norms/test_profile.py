@@ -18,7 +18,7 @@ from core.norms.profile import (
     side_profile,
 )
 from core.norms.tables import read_rows
-from tests.wbds import people
+from tests.helpers.wbds import people
 
 
 def test_the_healthy_side_score_is_the_published_one_leave_one_out() -> None:

@@ -25,7 +25,7 @@ from core.recording import Subject, UniformRecording
 from core.rotation import conjugate, exp, multiply, rotate
 from core.simulate import Arc, Pivot, Stand, Straight
 from core.timeline.live import UniformBlock
-from tests.walks import TOGETHER, cut, lost, neura_walk, only, scripted, simulated
+from tests.helpers.walks import TOGETHER, cut, lost, neura_walk, only, scripted, simulated
 
 Seen = tuple[int, Stage, CalibrationView]
 
@@ -134,6 +134,7 @@ def test_it_is_the_offline_calibration_of_the_same_samples() -> None:
         assert np.array_equal(ours.gyro_bias, mounted.gyro_bias)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 7, 333, 10_000])
 def test_no_border_of_a_block_is_seen_in_it(n: int) -> None:
     found, again = walked().found[0], run(walk(), n).found[0]
@@ -198,6 +199,7 @@ def test_redo_begins_anew_with_the_next_sample() -> None:
     assert second.calibrated.recording.t_s[0] == 0.0
 
 
+@pytest.mark.slow
 def test_blocks_need_not_be_pushed_while_it_runs() -> None:
     first = walked().found[0]
     calibrator = LiveCalibrator(wearer(walk()))
@@ -213,6 +215,7 @@ def test_blocks_need_not_be_pushed_while_it_runs() -> None:
     assert np.array_equal(mounts[0], mounts[1])
 
 
+@pytest.mark.slow
 def test_a_person_may_stand_for_long_and_only_the_last_of_it_is_kept() -> None:
     recording, _ = scripted((Stand(60.0), Straight(14.0, 0.6, 0.55), Stand(2.0)))
     found = run(recording).found[0]
@@ -222,6 +225,7 @@ def test_a_person_may_stand_for_long_and_only_the_last_of_it_is_kept() -> None:
     assert found.ok
 
 
+@pytest.mark.slow
 def test_who_moves_before_walking_stands_again() -> None:
     """Shifting from foot to foot for a while is no walk; the standing has to be had anew."""
     still = cut(walk(), 0.0, 4.0)
@@ -241,6 +245,7 @@ def test_who_moves_before_walking_stands_again() -> None:
     assert done.found[0].ok
 
 
+@pytest.mark.slow
 def test_turning_on_the_spot_is_no_walk_and_it_says_so() -> None:
     spin = tuple(Pivot(3.0, 0.6, 0.55) for _ in range(6))
     recording, _ = scripted((Stand(5.0), *spin, Stand(6.0), Straight(14.0, 0.6, 0.55), Stand(2.0)))
@@ -252,6 +257,7 @@ def test_turning_on_the_spot_is_no_walk_and_it_says_so() -> None:
     assert done.found[0].ok
 
 
+@pytest.mark.slow
 def test_a_walk_round_a_corner_has_twelve_seconds() -> None:
     """Few straight steps, so the time decides."""
     recording, _ = scripted(
@@ -301,6 +307,7 @@ def test_strapping_sensors_on_is_no_walk(seed: int) -> None:
         assert np.allclose(mounted.R_segment_sensor, alone[segment].R_segment_sensor, atol=0.03)
 
 
+@pytest.mark.slow
 def test_a_sensor_turned_between_two_standings_makes_the_second_count() -> None:
     recording, _ = scripted(
         (
@@ -334,6 +341,7 @@ def test_a_take_in_which_hardly_anybody_walks_begins_anew() -> None:
     assert done.found == ()
 
 
+@pytest.mark.slow
 def test_a_contradicting_mounting_is_told_and_not_calibrated() -> None:
     recording, _ = scripted((Stand(5.0), Straight(16.0, 0.6, 0.55), Stand(4.0)))
     left, right = (run(replace(recording, mounting={"shank_l": f"face {way}"})) for way in ("left", "right"))
@@ -379,6 +387,7 @@ def test_without_any_sensor_it_waits() -> None:
     assert done.found == ()
 
 
+@pytest.mark.slow
 def test_the_standing_width_leans_the_legs() -> None:
     wide = replace(walk(), subject=Subject(1.75, 0.30))
     narrow = replace(walk(), subject=Subject(1.75, None))

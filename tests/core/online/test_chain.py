@@ -22,9 +22,9 @@ from core.online import LiveFrame, LiveStride, OnlineSession
 from core.online.chain import COURSES
 from core.parameters.live_stride import NOT_YET
 from core.recording import UniformRecording
-from tests.live_walks import Run, batches, hello_of, live, recorded
-from tests.marks import slow_beyond
-from tests.walks import cut, lost, neura_walk, only, simulated
+from tests.helpers.live_walks import Run, batches, hello_of, live, recorded
+from tests.helpers.marks import slow_after
+from tests.helpers.walks import cut, lost, neura_walk, only, simulated
 
 FILTER_DELAY_S = {"neura_walk": 0.07, "simulated": 0.08}
 """Time from the refined moment of a contact to the sample at which it is told, at 100 Hz, of 95 % of
@@ -118,8 +118,9 @@ def same(a: Told, b: Told) -> None:
         assert all(one[t] == other[t] for t in both)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SETS)
-@pytest.mark.parametrize("sizes", slow_beyond(1, [7, ((64, 3, 21, 1, 40),), 200, 1]))
+@pytest.mark.parametrize("sizes", slow_after(1, [7, ((64, 3, 21, 1, 40),), 200, 1]))
 def test_batches_of_any_size_give_the_same_bits(name: str, sizes: int | tuple[int, ...]) -> None:
     same(streamed(name)[1], told(live(worn(name), sizes)[1]))
 
@@ -140,6 +141,7 @@ def test_the_worn_sensors_decide_what_is_shown(name: str) -> None:
         assert max(heights) < 0.3
 
 
+@pytest.mark.slow
 def test_a_chest_sensor_beside_the_seven_stops_neither_calibration_nor_strides() -> None:
     take = worn("seven")
     frames = live(replace(take, sensors={**take.sensors, "chest": take.sensors["pelvis"]}))[1]
@@ -166,6 +168,7 @@ def test_a_redone_calibration_starts_at_the_next_sample_and_nothing_else_changes
     same(again[sizes], again[20])
 
 
+@pytest.mark.slow
 def test_the_log_of_a_take_gives_the_same_bits_as_its_stream() -> None:
     take = worn("seven")
     log = FILE_MARK

@@ -14,9 +14,9 @@ from core.frames import SIDES, Segment
 from core.online import LiveFrame, LiveStride, OnlineSession
 from core.parameters.spatial import NAMES as SPATIAL
 from core.recording import SensorSignals, UniformRecording
-from tests.live_walks import batches, hello_of, live, recorded
-from tests.perturbations import delay_sensor
-from tests.walks import cut, lost, only, simulated
+from tests.helpers.live_walks import batches, hello_of, live, recorded
+from tests.helpers.perturbations import delay_sensor
+from tests.helpers.walks import cut, lost, only, simulated
 
 BELT = 1.1
 
@@ -33,6 +33,7 @@ def codes(frames: list[LiveFrame]) -> list[str]:
     return [n.code for f in frames for n in f.notices]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [BELT, None])
 def test_on_a_belt_distances_are_the_belts_or_none(speed: float | None) -> None:
     take = walk()
@@ -103,6 +104,7 @@ def test_feet_by_themselves_begin_anew_at_their_next_rest(seconds: float) -> Non
         assert other == pytest.approx(one, abs=0.03), (s.side, s.end_s)
 
 
+@pytest.mark.slow
 def test_a_filter_that_breaks_says_so_once_and_contacts_go_on() -> None:
     take = walk()
     online = OnlineSession(hello_of(take), take.subject)
@@ -171,6 +173,7 @@ def test_what_cannot_be_calibrated_gives_frames_all_the_same() -> None:
     assert all(len(f.health) == len(take.sensors) for f in frames)
 
 
+@pytest.mark.slow
 def test_health_is_of_the_last_seconds() -> None:
     take = lost(walk(), "foot_r", 12.0, 14.5)
     _, frames = live(take)
@@ -185,6 +188,7 @@ def test_health_is_of_the_last_seconds() -> None:
     assert not after["foot_l"].still or not after["foot_r"].still
 
 
+@pytest.mark.slow
 def test_contact_follows_the_events() -> None:
     _, frames = live(only(walk(), "foot_l", "foot_r", "pelvis"), 1)
     running = [f for f in frames if f.stage == "running"][1:]
@@ -209,6 +213,7 @@ def test_exchanged_sensors_are_told_while_they_stream(a: Segment, b: Segment) ->
     assert len({n.message for n in told}) == len(told)
 
 
+@pytest.mark.slow
 def test_one_foot_may_walk_on_while_the_other_is_away() -> None:
     """Many contacts of one side between two of the other: no stride is lost or told twice as complete."""
     run = recorded(lost(walk(30.0), "foot_r", 14.0, 19.0))
@@ -230,6 +235,7 @@ def compared(take: UniformRecording, sizes: int | tuple[int, ...]) -> tuple[Onli
     return online, told
 
 
+@pytest.mark.slow
 def test_a_late_sensor_is_told_and_marked_until_calibrated_again() -> None:
     late = delay_sensor(only(walk(), *PRESETS["lower_body7"]), "shank_l", 0.05)
     online, told = compared(late, 10)

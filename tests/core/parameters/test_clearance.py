@@ -16,7 +16,7 @@ from core.parameters.clearance import SoleHeights, lay_out, measure_floor_height
 from core.rotation import about, from_matrix, multiply, rotate
 from core.shoe import Shoe
 from core.simulate import simulate_scenario
-from tests.true_walks import true_tracks
+from tests.helpers.true_walks import true_tracks
 
 ANKLE = 0.08
 BODY = replace(
@@ -88,6 +88,7 @@ def test_the_shoe_reaches_the_feet() -> None:
     assert nominal_body(1.7)[0].sole_front is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["comfortable", "drop_foot"])
 def test_simulated_toes_pass_the_floor_as_their_soles_do(name: str) -> None:
     """The tip stands off the floor by the sole's rocker; its dip is compared with the path of the tip."""

@@ -20,7 +20,7 @@ from core.parameters.rows import read_row
 from core.parameters.spatial import measure_distances
 from core.parameters.symmetry import compare_sides
 from core.simulate import simulate_scenario
-from tests.true_walks import true_tracks
+from tests.helpers.true_walks import true_tracks
 
 STRIDE = Stride("left", 1.0, 1.7, 2.2, 1.15, 1.55)
 
@@ -43,6 +43,7 @@ def test_percent_is_never_a_fraction_and_time_never_percent() -> None:
             assert value == pytest.approx(100.0 * seconds / 1.2)  # type: ignore[operator]
 
 
+@pytest.mark.slow
 def test_every_number_has_the_unit_that_its_name_says() -> None:
     """Seen: documentation says hours, the code gives minutes."""
     tracks = true_tracks(simulate_scenario("comfortable", 5).truth)
@@ -108,6 +109,7 @@ def test_the_lift_of_a_sensor_is_not_the_clearance_of_the_toe() -> None:
     assert row["min_toe_clearance_m"] == "no_shoe_geometry"
 
 
+@pytest.mark.slow
 def test_no_gait_gives_a_clean_empty_result() -> None:
     """Seen: crash when there is no gait, or "done" without saying anything."""
     tracks = true_tracks(simulate_scenario("comfortable", 5).truth)

@@ -14,8 +14,8 @@ from core.parameters.catalogue import CATALOGUE
 from core.simulate import simulate_scenario
 from core.squat.measures import MEASURES
 from server.report.wording import REASONS
-from tests.parameter_page import PAGE, render_page
-from tests.true_walks import true_tracks
+from tests.helpers.parameter_page import PAGE, render_page
+from tests.helpers.true_walks import true_tracks
 
 TESTS = {*tug.NAMES, *chair.NAMES, *walks.TEN, *walks.SIX, *sway.NAMES}
 """Parameters of functional tests; each measures all of its own (tests/core/functional_tests)."""
@@ -30,13 +30,14 @@ def names() -> set[str]:
     return {p.name for p in measure_gait(whole).parameters} | others
 
 
+@pytest.mark.slow
 def test_the_catalogue_knows_what_is_measured_and_nothing_else(names: set[str]) -> None:
     assert set(CATALOGUE) == names
 
 
 def test_the_document_has_the_tables_of_the_catalogue() -> None:
     text = PAGE.read_text("utf-8")
-    assert render_page(text) == text, "write them: python -m tests.parameter_page"
+    assert render_page(text) == text, "write them: python -m tests.helpers.parameter_page"
 
 
 def test_a_table_without_a_group_is_found() -> None:
@@ -44,6 +45,7 @@ def test_a_table_without_a_group_is_found() -> None:
         render_page(PAGE.read_text("utf-8") + "\n<!-- catalogue: Beauty -->\n<!-- end -->\n")
 
 
+@pytest.mark.slow
 def test_every_reason_has_words() -> None:
     """Without any sensor, any event or any shoe: whatever is said is said in words."""
     tracks = true_tracks(simulate_scenario("comfortable", 5).truth)

@@ -21,7 +21,7 @@ from core.parameters.kinematic import measure_cycles, per_stride_figures, stride
 from core.parameters.result import CycleCurves
 from tests.core.events.foot_signal import orientations
 from tests.data import data_folder
-from tests.walks import simulated
+from tests.helpers.walks import simulated
 
 RATE = 100.0
 T = np.arange(3000) / RATE

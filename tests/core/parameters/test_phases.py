@@ -18,7 +18,7 @@ from core.parameters.phases import NAMES, measure_phases
 from core.parameters.rows import Row, read_row, side_parameters
 from core.parameters.stance import find_stances
 from core.simulate import simulate_scenario
-from tests.true_walks import true_tracks
+from tests.helpers.true_walks import true_tracks
 
 T = np.arange(0.0, 8.0, 0.01)
 BODY = BodyModel.from_height(1.7)

@@ -15,6 +15,7 @@ SIGNALS = np.stack((np.sin(3.0 * T), T**2))
 PLACES = st.lists(st.tuples(st.floats(0.0, 4.0), st.floats(0.05, 0.99)), min_size=1, max_size=6)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(PLACES, st.integers(2, 130))
 def test_pieces_are_interpolated_linearly(places: list[tuple[float, float]], points: int) -> None:

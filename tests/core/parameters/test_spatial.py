@@ -24,7 +24,7 @@ from core.parameters.spatial import (
 )
 from core.rotation import about, from_matrix, multiply
 from core.simulate import WalkTruth
-from tests.walks import simulated
+from tests.helpers.walks import simulated
 
 RATE = 100.0
 BODY = BodyModel(
@@ -234,6 +234,7 @@ def true_strides(truth: WalkTruth) -> Strides:
     return Strides(tuple(made))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["fast_with_turns", "hemiparetic", "drop_foot"])
 def test_true_paths_give_the_true_lengths_and_widths(name: str) -> None:
     truth = simulated(name, 5)[1]
@@ -260,6 +261,7 @@ def test_an_affected_side_shows_in_sign_and_size() -> None:
     assert found["circumduction_m", "right"].mean == pytest.approx(0.03, abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_way_of_a_walk_is_that_of_its_footprints() -> None:
     truth = simulated("comfortable", 5)[1]
     tracks = true_tracks(truth)

@@ -15,7 +15,7 @@ from core.parameters.rows import side_parameters
 from core.parameters.stance import FLAT_RAD, NAMES, Stances, find_stances, foot_pitches
 from core.rotation import about, from_matrix, multiply
 from core.simulate import simulate_scenario
-from tests.true_walks import true_tracks
+from tests.helpers.true_walks import true_tracks
 
 T = np.arange(0.0, 12.0, 0.01)
 
@@ -78,6 +78,7 @@ def test_what_is_missing_has_its_own_reason() -> None:
     assert find_stances(no_tc, T, walked()).parts["loading_pct"].reasons[0] == "no_terminal_contact"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["comfortable", "hemiparetic", "antalgic", "drop_foot"])
 def test_simulated_feet_are_flat_when_they_really_are(name: str) -> None:
     """The exact flat begins and ends at 0°, ours 3° away from it: it lasts longer, by what 3° take."""

@@ -17,7 +17,7 @@ from core.parameters.result import Parameter
 from core.parameters.trunk import NAMES, choose_foot, harmonic_ratios, trunk_regularity
 from core.parameters.walking import step_strides
 from core.simulate import simulate_scenario
-from tests.true_walks import true_tracks
+from tests.helpers.true_walks import true_tracks
 
 RATE = 100.0
 STRIDE_S = 1.07

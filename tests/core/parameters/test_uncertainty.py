@@ -192,6 +192,7 @@ def walk(rng: np.random.Generator, n: int) -> tuple[tuple[Parameter, ...], GaitE
     return state_uncertainty(summarise_times(Strides(tuple(strides))), found), found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [6, 25])
 def test_the_truth_lies_within_as_often_as_said(n: int) -> None:
     """300 takes with errors drawn as declared: 95 % of the values ± hold the truth, of 6 strides as of 25."""

@@ -19,7 +19,7 @@ from core.pipeline import TakeAnalysis, analyse
 from core.recording import UniformRecording
 from core.rotation import to_matrix
 from core.simulate import simulate_scenario, simulate_tug
-from tests.walks import analysed
+from tests.helpers.walks import analysed
 
 OFF_DEG = 20.0
 
@@ -66,6 +66,7 @@ def test_the_trunk_of_a_pelvis_20_degrees_off_is_as_regular_as_of_one_that_is_no
         assert value == pytest.approx(known[name], rel=0.3 if "harmonic" in name else 0.02), name
 
 
+@pytest.mark.slow
 def test_the_mounting_that_is_told_is_the_one_that_was_used(right: TakeAnalysis, off: TakeAnalysis) -> None:
     assert right.calibration is not None
     assert off.calibration is not None
@@ -75,6 +76,7 @@ def test_the_mounting_that_is_told_is_the_one_that_was_used(right: TakeAnalysis,
     assert turn < 3.0
 
 
+@pytest.mark.slow
 def test_a_chest_sensor_worn_on_a_walk_gets_an_axis_of_its_own() -> None:
     made = simulate_tug()
     walked = replace(made.recording, protocol="walk")

@@ -17,7 +17,7 @@ from core.simulate.tug import simulate_tug
 from server.report.bundle import load_bundle
 from server.report.exports import analysis_files
 from server.report.model import report_model
-from tests.kept import keep
+from tests.helpers.kept import keep
 
 
 @keep
@@ -26,6 +26,7 @@ def analysis() -> TakeAnalysis:
     return analyse(simulate_tug("hemi_mild", 2, setup=ON_SKIN).recording)
 
 
+@pytest.mark.slow
 def test_the_protocol_decides_the_recipe() -> None:
     a = analysis()
     assert a.problem is None

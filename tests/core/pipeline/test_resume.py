@@ -46,6 +46,7 @@ def fields(x: Any) -> tuple[Any, ...]:
     return dataclasses.fields(x)
 
 
+@pytest.mark.slow
 def test_the_comparison_sees_a_bit() -> None:
     a = whole("pelvis")
     assert a.uniform is not None
@@ -54,6 +55,7 @@ def test_the_comparison_sees_a_bit() -> None:
     assert not same(a, dataclasses.replace(a, uniform=later))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stage", [s.name for s in WALK])
 def test_resumed_at_any_stage_is_the_whole(stage: str) -> None:
     worn: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")

@@ -27,7 +27,7 @@ from server.report.exports import analysis_files
 from server.report.model import report_model
 from tests.core.body.chain.squats import HEIGHT_M, squat_on
 from tests.core.calibration.test_table_top import RATE, WORN, carry
-from tests.walks import assert_same_figures
+from tests.helpers.walks import assert_same_figures
 
 
 @cache
@@ -104,6 +104,7 @@ def test_an_analysis_goes_on_from_any_stage() -> None:
     assert report_model(load_bundle(analysis_files(none))).quality.word == "No squats"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["squats_both_legs", "squats_together"])
 def test_both_legs_of_a_take_are_measured_and_compared(name: str) -> None:
     a, truth = analysis(name), made(name).truth

@@ -18,7 +18,7 @@ from core.simulate import simulate_scenario
 from server.report.bundle import load_bundle
 from server.report.exports import analysis_files
 from server.report.tracks import NAME, read_tracks
-from tests.accuracy.mobgap import TRIALS, recording
+from tests.helpers.mobgap import TRIALS, recording
 
 
 @cache
@@ -30,6 +30,7 @@ def figures(a: TakeAnalysis) -> dict[str, Parameter]:
     return {p.name: p for p in a.parameters if p.side is None}
 
 
+@pytest.mark.slow
 def test_a_single_pelvis_sensor_gives_cadence_steps_bouts_and_turns() -> None:
     a = analysis("pelvis")
     assert a.problem is None
@@ -71,12 +72,14 @@ def test_its_files_read_back_to_the_same_numbers() -> None:
     assert again.bouts == a.measured.bouts  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 def test_thighs_and_pelvis_without_feet_keep_their_angles_and_get_steps() -> None:
     a = analysis("pelvis", "thigh_l", "thigh_r", name="comfortable")
     assert a.angles is not None
     assert figures(a)["step_count"].mean == pytest.approx(72, abs=3)
 
 
+@pytest.mark.slow
 def test_shanks_without_feet_give_strides_by_their_own_detectors_and_say_so() -> None:
     a = analysis("pelvis", "shank_l", "shank_r", name="comfortable")
     assert a.measured is not None
@@ -86,6 +89,7 @@ def test_shanks_without_feet_give_strides_by_their_own_detectors_and_say_so() ->
     assert "led_by_other" in {n.code for n in a.notices}
 
 
+@pytest.mark.slow
 def test_with_a_foot_sensor_the_foot_decides() -> None:
     a = analysis("pelvis", "foot_l", "foot_r", name="comfortable")
     assert a.measured is not None
@@ -120,6 +124,7 @@ def test_what_cannot_be_calibrated_leaves_the_steps_of_the_trunk_and_says_why() 
     assert figures(walked)["cadence_spm"].mean == pytest.approx(figures(whole)["cadence_spm"].mean, rel=0.02)
 
 
+@pytest.mark.slow
 def test_sitting_with_a_trunk_sensor_says_that_nobody_walked() -> None:
     take = simulate_scenario("comfortable", 1, worn=("pelvis",)).recording
     (stream,) = take.streams.values()

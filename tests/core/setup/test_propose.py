@@ -14,7 +14,7 @@ from core.pipeline import PipelineConfig, analyse
 from core.recording import Recording
 from core.setup import SetupParams, SetupRepair
 from core.simulate import simulate_scenario
-from tests.setup_mistakes import TURNS, apply_repair, change_axes, exchange_labels, look_at
+from tests.helpers.setup_mistakes import TURNS, apply_repair, change_axes, exchange_labels, look_at
 
 LEFT_HANDED = np.diag([-1.0, 1.0, 1.0])
 
@@ -39,6 +39,7 @@ def require(recording: Recording) -> SetupRepair:
     return repair
 
 
+@pytest.mark.slow
 def test_nothing_is_said_of_a_right_set_up_however_sensors_are_turned() -> None:
     recording = take()
     for k, segment in enumerate(s for s in take().segments.values() if s is not None):
@@ -50,6 +51,7 @@ def test_nothing_is_said_of_a_right_set_up_however_sensors_are_turned() -> None:
     assert exchange.swap == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("segment", ["thigh_l", "shank_r"])
 @pytest.mark.parametrize(
     ("acc", "gyr"), [(LEFT_HANDED, LEFT_HANDED), (1.0, -1.0), (-1.0, 1.0)], ids=["left-handed", "gyr", "acc"]
@@ -64,6 +66,7 @@ def test_one_sensor_with_wrong_signs_is_found_and_put_right(
     assert look_at(apply_repair(wrong, repair))[0] is None
 
 
+@pytest.mark.slow
 def test_a_file_with_left_handed_axes_is_told_from_one_with_a_turned_gyroscope() -> None:
     both, gyroscope = require(change_all(LEFT_HANDED, LEFT_HANDED)), require(change_all(1.0, -1.0))
     against = ("-x", "-y", "-z")
@@ -79,6 +82,7 @@ def test_units_are_proposed_sensor_by_sensor() -> None:
     assert [x.gyr_times for x in require(deg).corrections.values()] == [pytest.approx(np.radians(1.0))] * 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "names",
     [

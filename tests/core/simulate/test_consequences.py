@@ -38,6 +38,7 @@ def error_deg(made: Simulation, found: TakeAnalysis, name: str) -> float:
     return float(np.degrees(np.sqrt(np.mean(difference**2))))
 
 
+@pytest.mark.slow
 def test_a_healthy_walk_is_told_without_a_word() -> None:
     assert told()[1].notices == ()
 

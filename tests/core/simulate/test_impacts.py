@@ -107,6 +107,7 @@ def test_shocks_do_not_depend_on_the_grid(move_steadily: Callable[[float, float]
     assert peak(400.0) == pytest.approx(peak(1600.0), rel=0.12)
 
 
+@pytest.mark.slow
 def test_hard_steps_leave_the_range_of_a_real_sensor_and_are_cut_off() -> None:
     """docs/science/simulation.md, "Impacts": at 200 Hz and twice the impact 0.3 % of the foot's samples."""
     script = (Stand(3.0), Straight(24.0, 0.72, 0.5), Stand(3.0))

@@ -15,7 +15,7 @@ from core.simulate.human import Motion, move
 from core.simulate.script import plan
 from core.simulate.truth import joint_angles
 from tests.data import data_folder
-from tests.walks import joint_gap
+from tests.helpers.walks import joint_gap
 
 NORM_LIMITS_DEG = {
     "hip_flexion": 3.0,
@@ -30,6 +30,7 @@ NORM_LIMITS_DEG = {
 NORM_CORRELATION = {"hip_flexion": 0.98, "knee_flexion": 0.98, "ankle_dorsiflexion": 0.90}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["comfortable", "mixed"])
 def test_joints_close(name: str, request: pytest.FixtureRequest) -> None:
     assert joint_gap(request.getfixturevalue(name).truth) <= 1e-12
@@ -120,6 +121,7 @@ def test_accelerations_do_not_depend_on_the_grid(move_steadily: Callable[[float,
         assert fine[segment] == pytest.approx(value, rel=0.12), segment
 
 
+@pytest.mark.slow
 def test_a_taller_person_walks_with_the_same_angles(move_steadily: Callable[[float, float], Motion]) -> None:
     small, tall = move_steadily(400.0, 1.5), move_steadily(400.0, 1.9)
     for name, values in joint_angles(small.q).items():

@@ -35,10 +35,10 @@ from core.simulate.script import Script, plan
 from core.simulate.truth import truth_of
 from core.simulate.walker import REFERENCE_HEIGHT_M
 from core.timeline import synchronise
-from tests.accuracy.event_scoring import match
-from tests.gait_features import Features, features
-from tests.marks import slow_beyond
-from tests.walks import joint_gap
+from tests.helpers.event_scoring import match
+from tests.helpers.gait_features import Features, features
+from tests.helpers.marks import slow_after
+from tests.helpers.walks import joint_gap
 
 SEEDS = (5, 11, 23, 31)
 
@@ -170,6 +170,7 @@ def test_every_person_can_turn_stop_and_walk_arcs(name: str) -> None:
     assert motion.guard_m < 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_contacts_of_healthy_walking_are_found_when_they_happen(seed: int) -> None:
     """docs/science/simulation.md, "Virtual people"."""
@@ -182,7 +183,8 @@ def test_contacts_of_healthy_walking_are_found_when_they_happen(seed: int) -> No
         assert abs(ic.mean_ms) <= 10
 
 
-@pytest.mark.parametrize("name", slow_beyond(3, list(SIGNATURES)))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", slow_after(3, list(SIGNATURES)))
 @pytest.mark.parametrize("rising", [True, False])
 def test_the_rule_invents_nothing_and_finds_all_heel_contacts(name: str, rising: bool) -> None:
     """In both ways of landing: the counts must not rest on the shaped pitch
@@ -209,6 +211,7 @@ def test_contacts_stay_in_place_on_estimated_orientations_with_shocks(name: str)
         assert abs(float(np.median(ic.errors))) < 0.040
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_severe_shuffle_is_refused_with_its_figure(seed: int) -> None:
     found = contacts("severe_shuffle", seed)
@@ -219,6 +222,7 @@ def test_a_severe_shuffle_is_refused_with_its_figure(seed: int) -> None:
         assert -0.15 < figures.s_min < -0.09  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 def test_a_landing_on_the_forefoot_has_no_largest_pitch_at_contact() -> None:
     """The pitch rises through contact until the foot is flat, so on a smooth foot the rule finds nothing.
 

@@ -40,6 +40,7 @@ def _lag_s(early: Floats, late: Floats, rate_hz: float) -> float:
     return float((k - len(early) + 1 + 0.5 * (before - after) / (before - 2.0 * at + after)) / rate_hz)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("late_s", [0.010, 0.0137, -0.025])
 def test_a_lagging_clock_shows_everything_later(late_s: float) -> None:
     plain = simulate(SCRIPT, seed=4, setup=EXACT)

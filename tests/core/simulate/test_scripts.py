@@ -23,6 +23,7 @@ def test_named_scripts_are_long_enough_for_an_analysis(name: str) -> None:
     assert max(share.mean() for share in simulation.clipped.values()) < 0.002
 
 
+@pytest.mark.slow
 def test_the_lost_sensor_is_lost_and_comes_back() -> None:
     simulation = simulate_scenario("lost_sensor", seed=2)
     device = next(d for d, s in simulation.recording.segments.items() if s == "shank_r")
@@ -36,6 +37,7 @@ def test_five_minutes_last_five_minutes() -> None:
     assert simulate_scenario("five_minutes", seed=1).truth.t_s[-1] == pytest.approx(300.0, abs=10.0)
 
 
+@pytest.mark.slow
 def test_height_reaches_the_recording_and_the_lengths() -> None:
     simulation = simulate_scenario("slow", seed=2, height_m=1.60)
     assert simulation.recording.subject.height_m == 1.60

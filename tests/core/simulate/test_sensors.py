@@ -91,6 +91,7 @@ def test_a_flat_foot_reads_gravity_and_no_rate(mixed: Simulation) -> None:
         assert np.abs(np.linalg.norm(signals.acc[flat], axis=1) - GRAVITY).max() < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("impacts", [False, True])
 def test_increments_integrate_back_to_the_truth(impacts: bool) -> None:
     """Limits of docs/science/simulation.md, "Signals", shocks or not."""
@@ -136,6 +137,7 @@ def test_the_field_is_constant_in_the_world(mixed: Simulation) -> None:
         assert np.linalg.norm(world[0]) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_errors_are_of_the_declared_size() -> None:
     still = SimulatedSignals(*(np.zeros((20_000, 3)) for _ in range(3)))
     noise = SensorNoise(gyr_walk=0.0, acc_walk=0.0)

@@ -9,6 +9,7 @@ from core.fusion.orientations import Orientations
 from core.simulate import Simulation, angle_table, event_table, stride_table
 
 
+@pytest.mark.slow
 def test_truth_and_analysis_mean_the_same_angles(mixed: Simulation) -> None:
     """Two derivations of docs/science/joint-angles.md, one here and one in core/angles."""
     truth = mixed.truth

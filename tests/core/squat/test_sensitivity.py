@@ -52,6 +52,7 @@ def table() -> SensitivityTable:
     return analyse_sensitivity(case())
 
 
+@pytest.mark.slow
 def test_the_24_parameters_of_the_paper() -> None:
     assert len(PARAMETERS) == 24
     assert tuple(row.name for row in table().rows) == PARAMETERS
@@ -165,6 +166,7 @@ def both_legs() -> CalibratedRecording:
     )
 
 
+@pytest.mark.slow
 def test_without_a_reference_errors_are_changes_of_the_legs_own_angles() -> None:
     legs = [measure_leg(HEIGHT_M, side) for side in SIDES]
     told: list[float] = []
@@ -189,6 +191,7 @@ def test_changes_are_of_the_samples_in_which_the_foot_stands() -> None:
     assert not analyse_errors(leg).any()
 
 
+@pytest.mark.slow
 def test_a_reference_of_one_leg_judges_that_leg() -> None:
     legs = [measure_leg(HEIGHT_M, side) for side in SIDES]
     t_s = both_legs().recording.t_s

@@ -19,8 +19,8 @@ from core.frames import Bools, Floats, Segment
 from core.recording import UniformRecording
 from core.timeline import synchronise
 from core.timeline.live import LiveAxis, UniformBlock, compile_axis_kernels
-from tests.live import Device, LiveTake, Samples, send, shared
-from tests.walks import cut, neura_recording
+from tests.helpers.live import Device, LiveTake, Samples, send, shared
+from tests.helpers.walks import cut, neura_recording
 
 FEET: tuple[Segment, ...] = ("foot_l", "foot_r")
 
@@ -126,6 +126,7 @@ def test_however_the_samples_are_cut_into_batches_the_bits_are_the_same(n: int) 
         assert getattr(cut, name).tobytes() == getattr(whole, name).tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 7, 20])
 def test_streams_of_unequal_rates_meet_on_the_faster_one(n: int) -> None:
     take = send([device(0, 100.0, ("pelvis", "shank_l")), device(4, 60.0, FEET, start_s=1.007)], n)
@@ -172,6 +173,7 @@ def test_jittering_samples_are_interpolated_as_in_the_file() -> None:
     assert again.acc.tobytes() == block.acc.tobytes()
 
 
+@pytest.mark.slow
 @given(st.integers(0, 1 << 32), st.sampled_from([41.7, 60.0, 99.0, 100.0]), st.integers(1, 40))
 @settings(max_examples=40, deadline=None)
 @example((1 << 32) - 1, 60.0, 1)  # a sample as far beside a point as still counts as on it, but for rounding

@@ -63,6 +63,7 @@ async def visit(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) ->
             workers.stop()
 
 
+@pytest.mark.slow
 async def test_progress_is_pushed_until_the_job_is_done(visit: Visit) -> None:
     for job in (visit.inspection, visit.analysis):
         assert job[-1]["state"] == "done", job[-1]
@@ -160,6 +161,7 @@ async def test_opening_a_report_is_audited_once(visit: Visit) -> None:
         assert await count() == before + 1
 
 
+@pytest.mark.slow
 async def test_every_page_about_a_person_leaves_one_audit_row(visit: Visit) -> None:
     clinic = visit.clinic
     async with clinic.client("admin", headers={"Accept": "text/html"}) as client:
@@ -294,6 +296,7 @@ async def test_a_reference_that_cannot_be_used_fails_the_job_with_a_reason(visit
             assert (await client.post(f"{visit.path}/filter-runs", json=body)).status_code == status
 
 
+@pytest.mark.slow
 async def test_who_reads_results_sees_comparisons_and_only_who_analyses_asks_for_one(visit: Visit) -> None:
     for role, asks, reads in (("viewer", 403, 200), ("assistant", 403, 403)):
         async with visit.clinic.client(role) as client:

@@ -23,7 +23,7 @@ from server.services.signed_reports import DOCUMENT, PSEUDONYMISED
 from server.storage.field_cipher import make_keys
 from server.storage.tables import job, new_id, tuning
 from server.trail import MOST_REFUSED, QUIET_S, AuditTrail
-from tests.engines import on_both_engines
+from tests.helpers.engines import on_both_engines
 from tests.server import analysed, walk
 from tests.server.clinic import PASSWORD, Clinic, open_clinic
 from tests.server.serving import serve
@@ -262,6 +262,7 @@ async def test_every_route_that_shows_patient_data_leaves_an_audit_row(tmp_path:
         assert silent == []
 
 
+@pytest.mark.slow
 @on_both_engines
 async def test_every_route_that_changes_patient_data_leaves_an_audit_row(tmp_path: Path) -> None:
     async with opened(tmp_path) as v:
@@ -351,6 +352,7 @@ async def test_a_failed_sign_in_is_a_row_without_what_was_typed(tmp_path: Path) 
             assert token_hash(client.cookies["sid"]) not in str(v.rows(1))
 
 
+@pytest.mark.slow
 async def test_somebody_who_guesses_all_day_cannot_fill_the_disk(tmp_path: Path) -> None:
     time_s = 0.0
     async with opened(tmp_path) as v:

@@ -16,7 +16,7 @@ from server.processes.supervisor import Workers
 from server.services import checks
 from server.services.sweep import sweep
 from server.storage.readiness import Readiness
-from tests.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
+from tests.helpers.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
 from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio

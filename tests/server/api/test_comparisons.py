@@ -58,6 +58,7 @@ def _since(report: dict[str, Any]) -> str | None:
     return None if report["since"] is None else report["since"]["session_id"]
 
 
+@pytest.mark.slow
 async def test_the_report_of_a_visit_says_what_changed_since_the_one_before(clinic: Clinic) -> None:
     patient = _patient(clinic)
     first, belt = _session(clinic, patient, 0), _session(clinic, patient, 3, protocol="treadmill")

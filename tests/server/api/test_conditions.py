@@ -51,6 +51,7 @@ async def test_a_condition_is_stated_with_a_session_and_changed_later(clinic: Cl
         assert {name: made[name] for name in FAST} == FAST
 
 
+@pytest.mark.slow
 async def test_a_fast_walk_is_not_what_a_comfortable_one_is_compared_with(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
     first = feedback.walked(clinic, patient, 0, **OWN)
@@ -144,6 +145,7 @@ async def test_walks_of_unstated_condition_are_compared_with_a_caution(clinic: C
     assert "condition not stated" in await _get(clinic, f"/patients/{patient}")
 
 
+@pytest.mark.slow
 async def test_a_training_with_feedback_is_a_small_mark_and_never_a_baseline(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
     told = feedback.walked(clinic, patient, 0, feedback=True, **OWN)
@@ -226,6 +228,7 @@ async def test_only_unaided_walks_of_controls_are_a_reference(clinic: Clinic) ->
     assert {v.found.session_id for v in known if v.person == code} == {plain, fast, silent}
 
 
+@pytest.mark.slow
 async def test_the_pages_ask_for_the_condition_and_say_it(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
     new = re.sub(r">\s+<", "><", await _get(clinic, f"/patients/{patient}/sessions/new"))

@@ -15,7 +15,7 @@ from server.commands.export import export
 from server.jobs.queue import EXPORT
 from server.main import main
 from server.services import analyses, exports
-from tests.engines import on_both_engines
+from tests.helpers.engines import on_both_engines
 from tests.server import analysed
 from tests.server.clinic import Clinic
 
@@ -48,6 +48,7 @@ def work(clinic: Clinic, session: str) -> None:
     assert state.queue.finish(claim, lambda c: exports.publish(c, claim, stored))
 
 
+@pytest.mark.slow
 async def test_an_export_is_written_once_and_anew_after_an_edit(clinic: Clinic) -> None:
     session = await visit(clinic, "exported")
     path = f"{API}/sessions/{session}"
@@ -88,6 +89,7 @@ async def test_an_export_is_written_once_and_anew_after_an_edit(clinic: Clinic) 
         assert (await client.post(f"{path}/exports", json={"kind": "csv"})).status_code == 403
 
 
+@pytest.mark.slow
 async def test_the_signed_report_goes_into_the_bundle_and_only_there(clinic: Clinic) -> None:
     session = await visit(clinic, "handed-on")
     path = f"{API}/sessions/{session}"

@@ -10,7 +10,7 @@ import pytest
 
 from core.feedback import Baseline, Cue, FeedbackEngine, Prescription
 from server.services import analyses, edit_log, prescriptions
-from tests.feedback import Walked
+from tests.helpers.feedback import Walked
 from tests.server import feedback
 from tests.server.clinic import Clinic
 
@@ -66,6 +66,7 @@ async def _train(
     return session, cues
 
 
+@pytest.mark.slow
 async def test_strides_with_and_without_feedback_are_told_apart(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
     session, cues = await _train(clinic, patient, await _prescribe(clinic, patient), 0)

@@ -11,7 +11,7 @@ from urllib.parse import quote
 import httpx
 import pytest
 
-from tests.engines import on_both_engines
+from tests.helpers.engines import on_both_engines
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
@@ -37,6 +37,7 @@ async def stored_names(clinic: Clinic, session: str) -> list[str]:
     return [f["name"] for f in answer.json()["files"]] if answer.status_code == 200 else []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [

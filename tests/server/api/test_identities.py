@@ -130,6 +130,7 @@ async def test_the_name_stands_on_paper_only_where_it_was_ticked(ward: tuple[Cli
         assert [r["action"] for r in rows].count("identity.printed") == 1
 
 
+@pytest.mark.slow
 async def test_the_export_of_one_patient_has_it_and_nothing_else_has(
     ward: tuple[Clinic, str, str], caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -6,7 +6,7 @@ import httpx
 import pytest
 
 from server.jobs.queue import Claim
-from tests.engines import on_both_engines_first
+from tests.helpers.engines import on_both_engines_first
 from tests.server.clinic import Clinic
 from tests.server.serving import serve
 
@@ -29,6 +29,7 @@ async def queued_job(clinic: Clinic, code: str) -> str:
     return job
 
 
+@pytest.mark.slow
 async def test_a_session_without_files_has_nothing_to_inspect_or_analyse(clinic: Clinic) -> None:
     async with clinic.client("clinician") as client:
         patient = (await client.post(f"{API}/patients", json={"code": "empty"})).json()["id"]
@@ -83,6 +84,7 @@ async def test_a_queued_job_is_cancelled_at_once_and_only_active_ones_are_listed
         assert (await client.get(f"{API}/jobs/{'0' * 32}/events")).status_code == 404
 
 
+@pytest.mark.slow
 async def test_watching_does_not_write_audit_rows(clinic: Clinic) -> None:
     job = await queued_job(clinic, "quiet")
     async with clinic.client("admin") as client:

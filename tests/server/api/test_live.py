@@ -19,8 +19,8 @@ from server.services import patients, sessions
 from server.services.live import ALPHABET
 from server.storage.live_tables import live_event, live_take
 from server.storage.tables import now, prescription, recording
-from tests.live_clinic import closed, heard, new_session, open_code, visit
-from tests.live_takes import finish_text, frame
+from tests.helpers.live_clinic import closed, heard, new_session, open_code, visit
+from tests.helpers.live_takes import finish_text, frame
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
@@ -48,6 +48,7 @@ async def pairing(client: httpx.AsyncClient, code: str) -> httpx.Response:
     return await client.post("/api/v1/live/pairings", json={"code": code})
 
 
+@pytest.mark.slow
 async def test_a_code_joins_one_tablet_once(clinic: Clinic) -> None:
     session = new_session(clinic)
     async with clinic.client("clinician") as http, clinic.client() as stranger:

@@ -53,6 +53,7 @@ def _charts(html: str) -> list[str]:
     return _texts(html, r"<figcaption>\s*<h3>(.*?)</h3>") or _texts(html, r"<figure>\s*<h3>(.*?)</h3>")
 
 
+@pytest.mark.slow
 async def test_no_name_occurs_twice_with_different_values(clinic: Clinic) -> None:
     earlier, session = _visits(clinic)
     async with clinic.client("clinician") as client:

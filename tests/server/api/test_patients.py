@@ -6,7 +6,7 @@ import pytest
 
 from server import audit
 from server.api.documents import openapi
-from tests.engines import on_both_engines
+from tests.helpers.engines import on_both_engines
 from tests.server.clinic import Clinic
 
 pytestmark = [pytest.mark.anyio, on_both_engines]
@@ -126,6 +126,7 @@ async def test_a_member_given_twice_is_refused_and_named(clinic: Clinic) -> None
     assert "the key 'code' is given twice" in answer.json()["detail"]
 
 
+@pytest.mark.slow
 async def test_every_operation_that_takes_json_reads_it_strictly(clinic: Clinic) -> None:
     refused = {}
     async with clinic.client("admin") as client:

@@ -12,8 +12,8 @@ from server.services import prescriptions
 from server.services.histories import list_analysed
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.tables import audit
-from tests.engines import on_both_engines
-from tests.feedback import prescription, train
+from tests.helpers.engines import on_both_engines
+from tests.helpers.feedback import prescription, train
 from tests.server import feedback
 from tests.server.clinic import Clinic
 

@@ -15,7 +15,7 @@ from server.auth.roles import Action
 from server.http.problems import Problem, as_problem
 from server.services.errors import NotFound
 from server.storage import sqlite_file
-from tests.marks import about_the_file
+from tests.helpers.marks import sqlite_only
 from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
@@ -107,7 +107,7 @@ async def test_an_unforeseen_error_tells_neither_client_nor_log_whose_data_it_wa
     assert CANARY not in caplog.text
 
 
-@about_the_file
+@sqlite_only
 async def test_a_busy_database_is_said_and_not_an_internal_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

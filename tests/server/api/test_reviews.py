@@ -14,7 +14,7 @@ from server.report.exports import analysis_files
 from server.report.tracks import NAME, tracks_parquet
 from server.services import patients, sessions
 from server.storage.tables import new_id
-from tests.engines import on_both_engines
+from tests.helpers.engines import on_both_engines
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic
 
@@ -98,6 +98,7 @@ async def test_an_undone_state_and_another_edit_are_not_confused(clinic: Clinic,
     assert len(other["edits"]) == 1
 
 
+@pytest.mark.slow
 async def test_report_tables_and_pages_follow_the_edits(clinic: Clinic, path: str) -> None:
     async with clinic.client("clinician") as client:
 

@@ -105,6 +105,7 @@ async def test_both_legs_against_themselves_and_against_a_reference(
         assert (await client.post(path, json={})).status_code == 403
 
 
+@pytest.mark.slow
 async def test_it_is_cancelled_like_other_jobs(clinic: Clinic, made: SquatSimulation) -> None:
     session = await visit(clinic, made, "stopped")
     async with clinic.client("clinician") as client:

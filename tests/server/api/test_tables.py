@@ -31,6 +31,7 @@ async def uploaded(clinic: Clinic, code: str, files: dict[str, bytes]) -> str:
     return f"{API}/sessions/{session}"
 
 
+@pytest.mark.slow
 async def test_a_table_is_described_once_and_its_shape_is_known_from_then_on(clinic: Clinic) -> None:
     files = {"one_lf.csv": table(), "two_rf.csv": table()}
     at = await uploaded(clinic, "TABLES-1", {**files, "notes.txt": b"no table"})

@@ -12,7 +12,7 @@ import pytest
 from core.frames import Protocol
 from server.services import patients, sessions
 from server.storage.tables import new_id
-from tests.engines import on_both_engines
+from tests.helpers.engines import on_both_engines
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic
 

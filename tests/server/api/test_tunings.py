@@ -55,6 +55,7 @@ def work(clinic: Clinic, job_id: str) -> list[tuple[str, float, str | None]]:
     return said
 
 
+@pytest.mark.slow
 async def test_a_tuning_is_asked_for_and_its_result_is_downloaded(clinic: Clinic) -> None:
     session = await session_with_trials(clinic, "tuned")
     async with clinic.client("clinician") as client:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from server.services import erasure, sweep, uploads
-from tests.engines import on_both_engines
+from tests.helpers.engines import on_both_engines
 from tests.server.api.test_files import API, blobs, new_session, stored_names
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
@@ -35,6 +35,7 @@ async def finish(client: httpx.AsyncClient, path: str, content: bytes) -> httpx.
     return await client.post(f"{path}/finish", json={"sha256": hashlib.sha256(content).hexdigest()})
 
 
+@pytest.mark.slow
 async def test_parts_in_any_order_and_twice_become_the_file_once(clinic: Clinic) -> None:
     """A sender that loses answers, repeats itself and skips is only told where to go on."""
     session = await new_session(clinic, "parts")

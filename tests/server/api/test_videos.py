@@ -100,6 +100,7 @@ async def test_an_alignment_is_a_time_and_can_be_taken_back(clinic: Clinic) -> N
         assert (await client.patch(path, json={"offset_s": 0.0})).status_code == 403
 
 
+@pytest.mark.slow
 async def test_a_video_is_on_the_page_and_in_no_report_and_goes_with_its_session(clinic: Clinic) -> None:
     patient, session = await session_of(clinic, "F-5")
     analysed.finish(clinic, patient, session, analysed.files())

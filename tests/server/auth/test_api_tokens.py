@@ -14,7 +14,7 @@ from server.auth.api_tokens import SCOPES, Scope
 from server.auth.roles import POLICY, Action
 from server.storage.person_tables import api_token
 from server.storage.tables import audit, now
-from tests.marks import about_the_file
+from tests.helpers.marks import sqlite_only
 from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
@@ -67,7 +67,7 @@ async def test_a_token_does_what_its_scopes_and_its_person_may(clinic: Clinic) -
         assert (await client.post(f"{API}/patients", json={"code": "TK-3"})).status_code == 403
 
 
-@about_the_file
+@sqlite_only
 async def test_a_token_is_stored_as_a_hash_and_ends(clinic: Clinic) -> None:
     made = await make(clinic, "admin", "read")
     assert re.fullmatch(r"sgt_[\w-]{43}", made["token"])

@@ -23,7 +23,7 @@ from server.auth.tokens import new_token, token_hash
 from server.storage.care_tables import emergency_access
 from server.storage.person_tables import api_token, second_factor, security_key
 from server.storage.tables import login_session, metadata, new_id, user
-from tests.engines import on_both_engines
+from tests.helpers.engines import on_both_engines
 from tests.server.belongings import OF_NOBODY, add_belongings, fill_address
 from tests.server.clinic import ORIGIN, PASSWORD, Clinic, open_clinic
 from tests.server.sockets import ask_websocket
@@ -135,6 +135,7 @@ STRANGERS: dict[str, Callable[[Ward], dict[str, str]]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("who", STRANGERS)
 async def test_a_stranger_reaches_nothing_that_is_there(ward: Ward, who: str) -> None:
     headers = STRANGERS[who](ward)
@@ -153,6 +154,7 @@ async def test_a_stranger_reaches_nothing_that_is_there(ward: Ward, who: str) ->
     assert ward.rows() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("role", Role)
 async def test_a_role_reads_and_changes_nothing_it_may_not(ward: Ward, role: Role) -> None:
     headers = {"Cookie": f"sid={ward.clinic.token(role)}"}
@@ -166,6 +168,7 @@ async def test_a_role_reads_and_changes_nothing_it_may_not(ward: Ward, role: Rol
     assert ward.rows() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scope", Scope)
 async def test_a_token_does_nothing_beyond_its_scope(ward: Ward, scope: Scope) -> None:
     headers = _token(ward, "admin", [scope], used_at=dt.datetime.now(dt.UTC))
@@ -280,6 +283,7 @@ def with_owner(ward: Ward) -> list[str]:
     return [r for r in ward.actions if any(f"{{{name}}}" in r for name in names)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("role", [Role.CLINICIAN, Role.ASSISTANT, Role.VIEWER])
 async def test_outside_the_care_team_nothing_of_a_patient_is_seen_or_changed(
     guarded: Ward, role: Role
@@ -298,6 +302,7 @@ async def test_outside_the_care_team_nothing_of_a_patient_is_seen_or_changed(
     assert guarded.rows() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("role", [Role.CLINICIAN, Role.ASSISTANT, Role.VIEWER])
 async def test_no_list_shows_a_patient_of_another_team(guarded: Ward, role: Role) -> None:
     lists = {

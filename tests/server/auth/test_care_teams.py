@@ -159,6 +159,7 @@ def leads(clinic: Clinic, made: dict[str, Any]) -> bool:
             return False
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", ["locum", "admin"])
 async def test_an_emergency_ends_now_with_its_links(clinic: Clinic, by: str) -> None:
     clinic.app.state.throttle = Throttle()
@@ -278,6 +279,7 @@ async def test_guessed_codes_at_one_address_do_not_close_the_sign_in(clinic: Cli
     await switch(clinic, on=False)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("counted")
 @pytest.mark.parametrize("way", ["add", "change"])
 async def test_a_refused_code_of_another_team_tells_no_spelling_and_is_counted(

@@ -23,10 +23,11 @@ from server.auth.throttle import (
 )
 from server.http.problems import Problem
 from server.storage.db import Database
-from tests.databases import write_database
+from tests.helpers.databases import write_database
 from tests.server.clinic import PASSWORD
 
 
+@pytest.mark.slow
 def test_a_password_is_stored_as_argon2id_and_only_it_verifies() -> None:
     stored = hash_password(PASSWORD)
     assert stored.startswith("$argon2id$v=19$m=65536,t=3,p=4$")
@@ -36,6 +37,7 @@ def test_a_password_is_stored_as_argon2id_and_only_it_verifies() -> None:
     assert not verify_password(PASSWORD, "not a hash")
 
 
+@pytest.mark.slow
 def test_an_unknown_account_takes_as_long_as_a_wrong_password() -> None:
     def seconds(stored: str | None) -> float:
         start = time.perf_counter()
@@ -169,6 +171,7 @@ def test_what_was_counted_beforehand_can_be_taken_back_and_old_failures_go(store
     assert store.work(lambda times: len(times.list_times(("anna", "10.0.0.1")))) in (1, MAX_PER_PAIR + 1)
 
 
+@pytest.mark.slow
 def test_a_burst_of_sign_ins_neither_takes_the_memory_nor_waits_for_ever(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -11,7 +11,7 @@ from starlette.routing import Mount
 from server.auth.access import require
 from server.auth.roles import POLICY, PUBLIC, Action, Role, is_permitted
 from server.auth.routes import UndeclaredRouteError, list_declared_actions
-from tests.engines import on_both_engines
+from tests.helpers.engines import on_both_engines
 from tests.server.clinic import Clinic
 from tests.server.sockets import ask_websocket
 

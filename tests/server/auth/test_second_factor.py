@@ -14,7 +14,7 @@ from server.auth.throttle import Throttle
 from server.commands import user as user_command
 from server.storage.archive import make_key
 from server.storage.person_tables import second_factor as table
-from tests.engines import tell_commands
+from tests.helpers.engines import tell_commands
 from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio

@@ -69,6 +69,7 @@ async def sign_in(
         return await client.post(f"{API}/sign-in", json=body)
 
 
+@pytest.mark.slow
 async def test_a_key_takes_the_place_of_the_code(
     clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
 ) -> None:

@@ -13,7 +13,7 @@ from server.auth.throttle import MAX_PER_PAIR, Throttle
 from server.auth.tokens import token_hash
 from server.storage.db import Database
 from server.storage.tables import login_session, metadata, one_time_token
-from tests.engines import on_both_engines
+from tests.helpers.engines import on_both_engines
 from tests.server.clinic import PASSWORD, Clinic, open_clinic
 
 pytestmark = [pytest.mark.anyio, on_both_engines]
@@ -50,6 +50,7 @@ async def test_a_sign_in_ends_after_fifteen_idle_minutes(clinic: Clinic) -> None
     assert logins.find(token) is None
 
 
+@pytest.mark.slow
 async def test_a_running_view_counts_as_activity_until_the_absolute_end(clinic: Clinic) -> None:
     clock = Clock()
     logins, token = open_login(clinic, clock)

@@ -28,6 +28,7 @@ def take(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_take_with_a_reference_gives_the_tables(
     take: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -74,6 +75,7 @@ def test_what_is_missing_is_said(
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_take_alone_is_held_against_itself(take: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sensitivity", str(take / "recording.parquet"), "--from-standing"]) == 0
     said = capsys.readouterr().out

@@ -37,6 +37,7 @@ def test_no_clinic_begins_in_a_wrong_folder(
         assert list(wrong.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_user_of_a_new_clinic_is_told_that_it_is_new(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -135,6 +135,7 @@ def test_levels_of_strides_have_the_mean_of_the_take() -> None:
     assert compared >= 3
 
 
+@pytest.mark.slow
 def test_nothing_that_a_person_typed_becomes_a_formula() -> None:
     _, content = left_out()
     assert {r["what"]: r["value"] for r in tables(content)["about.csv"]}["code"] == "'=HYPERLINK(1)"

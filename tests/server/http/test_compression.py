@@ -75,6 +75,7 @@ async def both_ways(visit: Visit, path: str) -> tuple[httpx.Response, bytes, byt
     return answer, raw, plain.content
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["/sessions/{session}", SHEET, "/api/v1/openapi.json"])
 async def test_pages_sheets_and_json_come_compressed_and_whole(visit: Visit, path: str) -> None:
     answer, raw, plain = await both_ways(visit, path.format(session=visit.session_id))

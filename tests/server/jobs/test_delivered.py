@@ -14,7 +14,7 @@ from server.jobs.opening import open_queue
 from server.jobs.queue import Claim, Wait
 from server.jobs.table import TableQueue
 from server.storage.db import Database
-from tests.postgres import run_sql
+from tests.helpers.postgres import run_sql
 
 pytestmark = pytest.mark.postgres
 

@@ -20,7 +20,7 @@ from server.jobs.queue import Claim, JobView, LeaseState, Priority
 from server.jobs.table import MAX_DEATHS
 from server.storage.db import Database, Source
 from server.storage.tables import job
-from tests.databases import write_database
+from tests.helpers.databases import write_database
 
 LEASE_S = 15.0
 

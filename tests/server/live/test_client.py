@@ -12,8 +12,8 @@ from core.formats.live_log import Hello
 from server.live import client
 from server.live.client import LiveError, StreamFaults, StreamReport, stream
 from server.services import live, recordings
-from tests.live_clinic import Visit, visit
-from tests.live_takes import HELLO, digest, frame, kept_in
+from tests.helpers.live_clinic import Visit, visit
+from tests.helpers.live_takes import HELLO, digest, frame, kept_in
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
@@ -37,6 +37,7 @@ def recorded(clinic: Clinic, v: Visit) -> list[bytes]:
     return kept_in(clinic.app.state.blobs.read(made.patient_id, file.sha256))
 
 
+@pytest.mark.slow
 async def test_a_stream_is_recorded_as_it_was_sent(clinic: Clinic, port: int) -> None:
     frames = [frame(i) for i in range(40)]
     async with visit(clinic, port) as v:

@@ -15,7 +15,7 @@ from core.online import LiveFrame, OnlineSession
 from core.simulate import simulate_scenario
 from server.live.follower import Follower
 from server.live.messages import FeedItem, FollowTake, Report
-from tests.live import send, shared
+from tests.helpers.live import send, shared
 
 FEET: dict[Segment | None, Segment] = {"foot_l": "foot_r", "foot_r": "foot_l"}
 
@@ -30,6 +30,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_sensors_are_compared_when_strides_and_cues_are_out(
     log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

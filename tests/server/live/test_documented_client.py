@@ -15,7 +15,7 @@ from core.formats.live_log import decode_batch, parse_hello, record
 from server.live.protocol import FINAL, CloseCode
 from server.services import live
 from tests.data import ROOT
-from tests.live_clinic import new_session
+from tests.helpers.live_clinic import new_session
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

@@ -14,8 +14,8 @@ import pytest
 from server.live.client import stream
 from server.services import films, live, sweep
 from server.storage import segments
-from tests.live_clinic import Visit, visit
-from tests.live_takes import HELLO, frame
+from tests.helpers.live_clinic import Visit, visit
+from tests.helpers.live_takes import HELLO, frame
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.live.test_client import given
 from tests.server.serving import serve
@@ -61,6 +61,7 @@ def code_of(answer: httpx.Response) -> tuple[int, str]:
     return answer.status_code, answer.json()["code"]
 
 
+@pytest.mark.slow
 async def test_a_film_stands_beside_its_take_aligned_though_pieces_came_twice_and_early(
     clinic: Clinic, port: int
 ) -> None:

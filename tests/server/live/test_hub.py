@@ -28,9 +28,9 @@ from server.live.take import STEERING
 from server.services import live, prescriptions, recordings, sessions
 from server.services.live_recordings import log_path
 from server.storage.live_tables import live_event
-from tests.live_clinic import Visit, heard, new_session, visit
-from tests.live_takes import finish_text
-from tests.live_walk import items, replayed, walk, walk_hello
+from tests.helpers.live_clinic import Visit, heard, new_session, visit
+from tests.helpers.live_takes import finish_text
+from tests.helpers.live_walk import items, replayed, walk, walk_hello
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
@@ -194,6 +194,7 @@ async def test_what_was_told_live_is_what_the_recording_says_commands_and_a_kill
     assert [e.content["value"] for e in events if e.kind == "mark"] == ["shoes changed"]
 
 
+@pytest.mark.slow
 async def test_a_later_browser_gets_the_state_the_last_frame_and_the_last_strides(
     estimating: tuple[Clinic, int],
 ) -> None:
@@ -388,6 +389,7 @@ def test_a_take_that_throws_is_told_and_leaves_the_others_alone(tmp_path: Path) 
     estimator.obey(Command("bad", 0, "pause", True))  # of a take that was given up: nothing to do
 
 
+@pytest.mark.slow
 def test_a_take_without_a_mapped_sensor_is_told_why_it_cannot_be_estimated(tmp_path: Path) -> None:
     hello = walk_hello("a" * 32)
     stream_ = hello.streams[0]

@@ -12,8 +12,8 @@ from websockets.exceptions import ConnectionClosed
 
 from server.live.client import stream
 from server.live.protocol import ack
-from tests.live_clinic import Visit, heard, visit
-from tests.live_takes import finish_text, frame
+from tests.helpers.live_clinic import Visit, heard, visit
+from tests.helpers.live_takes import finish_text, frame
 from tests.server.clinic import Clinic
 from tests.server.live.test_client import given, hello, recorded
 
@@ -93,6 +93,7 @@ async def test_a_tablet_that_reads_nothing_gets_acknowledgements_that_replace_ea
     assert recorded(clinic, v) == frames
 
 
+@pytest.mark.slow
 async def test_many_tablets_at_once_are_kept_apart(clinic: Clinic, port: int) -> None:
     frames = [[frame(i, n=1 + k) for i in range(30)] for k in range(12)]
 

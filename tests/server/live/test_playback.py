@@ -17,7 +17,7 @@ from core.recording import ImuStream, Recording
 from core.simulate import simulate_scenario
 from core.timeline import synchronise
 from server.live.playback import DueBatch, cut, hello_of, pace_batches
-from tests.walks import neura_recording
+from tests.helpers.walks import neura_recording
 
 
 def log_of(recording: Recording, batches: list[DueBatch]) -> bytes:
@@ -37,6 +37,7 @@ def as_sent(x: Floats | None) -> Floats | None:
     return None if x is None else x.astype(np.float32).astype(float)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("per_batch", [1, 7, 10, 1000])
 def test_a_walk_comes_back_sample_by_sample(per_batch: int) -> None:
     walk = simulate_scenario("comfortable", 3).recording

@@ -17,7 +17,7 @@ from core.formats.live_log import Finish, Hello, decode_batch, hello_json
 from server.live import protocol
 from server.live.intake import MISMATCH, Intake, IntakeAnswer
 from server.live.protocol import FINAL, MAX_UNACKED, MOST_UNACKED, CloseCode, ProtocolError, parse
-from tests.live_takes import HELLO, digest, finish_text, frame
+from tests.helpers.live_takes import HELLO, digest, finish_text, frame
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),

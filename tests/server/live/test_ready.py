@@ -19,9 +19,9 @@ from server.live.messages import EstimateFailed, FollowTake, ForgetTake, LogGrow
 from server.processes.channel import Channel
 from server.services.live_recordings import log_path
 from tests.data import ROOT
-from tests.live_clinic import heard, visit
-from tests.live_takes import finish_text
-from tests.live_walk import walk, walk_hello
+from tests.helpers.live_clinic import heard, visit
+from tests.helpers.live_takes import finish_text
+from tests.helpers.live_walk import walk, walk_hello
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.live.unready_estimator import UNTIL
 from tests.server.serving import serve

@@ -19,7 +19,7 @@ from server.live.protocol import MAX_UNACKED, MOST_UNACKED, CloseCode, ProtocolE
 from server.live.recorder import Recorder, open_recorder
 from server.storage import fs
 from tests.faults.failing import FailingSystem
-from tests.live_takes import HELLO, Heard, digest, finish_text, frame, stored
+from tests.helpers.live_takes import HELLO, Heard, digest, finish_text, frame, stored
 
 
 @asynccontextmanager

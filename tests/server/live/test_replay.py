@@ -10,7 +10,7 @@ import pytest
 from core.simulate import mt_files, simulate_scenario
 from server.main import main
 from server.services import live
-from tests.live_clinic import new_session
+from tests.helpers.live_clinic import new_session
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
@@ -58,6 +58,7 @@ async def test_a_folder_is_replayed_through_a_bad_network(
     assert row.recording_id in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "code"),
     [

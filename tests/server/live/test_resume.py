@@ -22,7 +22,7 @@ from server.live.intake import IntakeAnswer, TakeEnd
 from server.live.protocol import MOST_UNACKED, CloseCode, ProtocolError
 from server.live.recorder import Recorder, restore
 from server.storage import fs
-from tests.live_takes import HELLO, digest, finish_text, frame, stored
+from tests.helpers.live_takes import HELLO, digest, finish_text, frame, stored
 
 LENGTH = 12
 FRAMES = [frame(i, n=2) for i in range(LENGTH)]

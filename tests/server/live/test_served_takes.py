@@ -17,9 +17,9 @@ from websockets.typing import Subprotocol
 
 from core.formats.live_log import PROTOCOL, hello_json
 from server.live.client import stream
-from tests.live_takes import stored
-from tests.live_walk import walk, walk_hello
-from tests.service import new_session, served, wait_for
+from tests.helpers.live_takes import stored
+from tests.helpers.live_walk import walk, walk_hello
+from tests.helpers.service import new_session, served, wait_for
 
 
 def opened(client: httpx.Client, session: str) -> tuple[dict[str, Any], str]:

@@ -13,8 +13,8 @@ import pytest
 from server.live.client import StreamReport, stream
 from server.live.playback import DueBatch, pace_batches
 from tests.data import ROOT
-from tests.live_clinic import heard, visit
-from tests.live_walk import walk, walk_hello
+from tests.helpers.live_clinic import heard, visit
+from tests.helpers.live_walk import walk, walk_hello
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.live.sleepy_estimator import SLEEP_S
 from tests.server.serving import serve

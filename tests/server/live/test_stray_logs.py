@@ -18,9 +18,9 @@ from server.services.errors import Conflict
 from server.settings import Settings
 from server.storage.blob_folder import FolderBlobs
 from server.storage.db import Database
-from tests.engines import tell_commands
-from tests.live_clinic import PATIENCE_S, heard, new_session, visit
-from tests.live_takes import HELLO, frame, stored
+from tests.helpers.engines import tell_commands
+from tests.helpers.live_clinic import PATIENCE_S, heard, new_session, visit
+from tests.helpers.live_takes import HELLO, frame, stored
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 

@@ -22,8 +22,8 @@ from server.services import recordings
 from server.services.live_recordings import log_path
 from server.storage.live_tables import live_take
 from server.storage.tables import audit, job, now
-from tests.live_clinic import closed, heard, visit
-from tests.live_takes import HELLO, digest, finish_text, frame
+from tests.helpers.live_clinic import closed, heard, visit
+from tests.helpers.live_takes import HELLO, digest, finish_text, frame
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
@@ -46,6 +46,7 @@ def rows(clinic: Clinic, take: str) -> Any:
         return c.execute(select(live_take).where(live_take.c.id == take)).one()
 
 
+@pytest.mark.slow
 async def test_a_take_from_hello_to_a_recording_of_the_same_bytes(clinic: Clinic, port: int) -> None:
     async with visit(clinic, port) as v, v.tablet() as ws:
         assert ws.subprotocol == "sagittal.live.v1"

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.postgres import NoPostgresError, make_lasting_database
+from tests.helpers.postgres import NoPostgresError, make_lasting_database
 from tests.server.nodes.pair import NodePair, serving_pair
 
 

@@ -16,7 +16,7 @@ import httpx
 
 from server.settings import Settings
 from tests.data import ROOT
-from tests.service import line_with
+from tests.helpers.service import line_with
 
 LEASE_S = 1.5
 PASSWORD = "a few unrelated words"

@@ -29,9 +29,9 @@ from server.settings import Settings
 from server.storage.db import Database
 from server.storage.high_water import read_mark
 from tests.data import ROOT
-from tests.live_takes import HELLO, frame, kept_in
+from tests.helpers.live_takes import HELLO, frame, kept_in
+from tests.helpers.service import new_session
 from tests.server.nodes.pair import PASSWORD, NodePair, RunningNode, describe, find_ports, start_process
-from tests.service import new_session
 
 pytestmark = [pytest.mark.postgres, pytest.mark.anyio]
 

@@ -11,9 +11,9 @@ from core.calibration import calibrate
 from core.calibration.score import score_calibration
 from core.errors import Notice
 from server.report.calibration_checks import view_calibration_checks
+from tests.helpers.walks import simulated
 from tests.server import analysed
 from tests.server.clinic import Clinic
-from tests.walks import simulated
 
 pytestmark = pytest.mark.anyio
 
@@ -44,6 +44,7 @@ async def show(clinic: Clinic, code: str, files: dict[str, bytes] | None) -> str
     return answer.text
 
 
+@pytest.mark.slow
 async def test_a_good_calibration(clinic: Clinic, walk: dict[str, bytes]) -> None:
     html = await show(clinic, "GOOD", walk)
     assert "The calibration passes all" in html

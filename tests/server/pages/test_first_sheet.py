@@ -84,6 +84,7 @@ def plain(html: str) -> str:
     return " ".join(re.sub(r"<.*?>", " ", html.replace("\xad", "")).split())
 
 
+@pytest.mark.slow
 async def test_the_trend_follows_visits_walked_alike_from_the_third_on(clinic: Clinic) -> None:
     files = analysed.files()
     two = await add_visits(clinic, "T-2", files, [(0.5, {}), (0.6, {})])
@@ -122,6 +123,7 @@ async def test_a_change_since_a_later_visit_than_the_first_says_so(
     assert found[-1][0].startswith("Gait speed: change since 21 Oct 2026.")
 
 
+@pytest.mark.slow
 async def test_the_takes_of_a_day_are_one_visit_of_the_trend(clinic: Clinic) -> None:
     files = analysed.files()
     first = {"performed_on": "2026-09-23"}
@@ -134,6 +136,7 @@ async def test_the_takes_of_a_day_are_one_visit_of_the_trend(clinic: Clinic) -> 
     assert found[1][1:-2] == ["0.60", "0.70", "0.80"]
 
 
+@pytest.mark.slow
 async def test_a_visit_without_the_number_has_a_dash_and_the_reason(clinic: Clinic) -> None:
     files = analysed.files()
     late = await add_visits(clinic, "T-5", files, [(None, {}), (0.5, {}), (0.58, {})])

@@ -14,7 +14,7 @@ from core.recording import GivenLimits
 from core.simulate.scripts import ON_SKIN
 from core.simulate.tug import simulate_tug
 from server.report.exports import analysis_files
-from tests.kept import keep
+from tests.helpers.kept import keep
 from tests.server import analysed
 from tests.server.clinic import Clinic
 
@@ -56,6 +56,7 @@ def card_of(html: str) -> str:
     return card[: card.index("</section>")]
 
 
+@pytest.mark.slow
 async def test_the_card_has_total_segments_norm_and_no_last_visit_at_first(
     clinic: Clinic, visits: list[str]
 ) -> None:

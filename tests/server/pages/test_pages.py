@@ -46,6 +46,7 @@ def row_of(html: str, code: str) -> str:
     return next(row for row in rows if code in row)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "changed", "kind", "word"),
     [

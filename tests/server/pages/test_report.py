@@ -52,6 +52,7 @@ async def write(clinic: Clinic, session: str, text: str) -> int:
     return answer.status_code
 
 
+@pytest.mark.slow
 async def test_a_signed_report_keeps_its_bytes_while_the_page_follows(clinic: Clinic) -> None:
     _, session = await visit(clinic, "S-1")
     assert await write(clinic, session, "Walks faster.\n\nPlan: <b>longer</b> steps.") == 204
@@ -114,6 +115,7 @@ async def test_who_may_not_sign_reads_only(clinic: Clinic) -> None:
     assert "share-report" not in desk
 
 
+@pytest.mark.slow
 async def test_a_link_opens_one_report_without_account_or_code_until_it_ends(clinic: Clinic) -> None:
     patient, session = await visit(clinic, "S-3-CODE")
     async with clinic.client("clinician") as client:
@@ -178,6 +180,7 @@ def test_without_the_library_the_answer_says_what_to_install(monkeypatch: pytest
     assert refused.value.status == 501
 
 
+@pytest.mark.slow
 async def test_who_asks_for_a_pdf_is_written_down_and_told_when_its_process_dies(tmp_path: Path) -> None:
     async with open_clinic(tmp_path, child_memory_bytes=1_000_000) as small:
         patient, session = await visit(small, "S-6")

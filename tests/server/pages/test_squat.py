@@ -124,6 +124,7 @@ async def both(clinic: Clinic) -> str:
     return str(session)
 
 
+@pytest.mark.slow
 async def test_both_legs_are_side_by_side(clinic: Clinic, both: str) -> None:
     html = await page(clinic, f"/sessions/{both}")
     card = html[html.index('id="h-squats"') :]

@@ -141,6 +141,7 @@ async def test_the_patient_list_takes_as_few_statements_for_500_patients_as_for_
     assert len(full) == len(small) == len(theirs) <= MOST_OF_LIST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 async def test_no_page_takes_more_statements_than_20(
     full: tuple[Clinic, Mapping[str, str]], page: str
@@ -151,6 +152,7 @@ async def test_no_page_takes_more_statements_than_20(
     assert len(sent) <= MOST, "\n\n".join(sent)
 
 
+@pytest.mark.slow
 async def test_care_teams_cost_a_list_no_statement(
     full: tuple[Clinic, Mapping[str, str]],
 ) -> None:

@@ -76,6 +76,7 @@ numbers = st.integers() | st.floats(allow_nan=False, allow_infinity=False)
 plain = st.none() | st.booleans() | numbers | words
 
 
+@pytest.mark.slow
 @given(st.recursive(plain, lambda x: st.lists(x) | st.dictionaries(words, x)))
 @example({"a": [], "b": {}, "c": [[], [1.5, None]], "d": (1, {"e": "ü\n"}), "f": [1, True]})
 def test_json_is_that_of_python(value: object) -> None:

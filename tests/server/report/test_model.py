@@ -20,7 +20,7 @@ from server.report.panels import FEW_BAND
 from server.report.table import FEW_NOTE, ParameterRow, parameter_rows
 from server.report.tables import curves_csv, parameters_csv
 from server.report.wording import VARIABLES, difference_words, parameter_term, place_words
-from tests.bench.pairs import in_pairs, plain_python
+from tests.helpers.pairs import in_pairs, plain_python
 
 MakeBundle = Callable[..., Bundle]
 
@@ -381,6 +381,7 @@ def test_ten_minutes_are_reported_in_little_more_than_a_piece_of_plain_python(
     assert ratio < 4.0
 
 
+@pytest.mark.slow
 def test_reading_a_result_does_not_load_the_compiler() -> None:
     code = "import sys, server.report.model, server.report.tables; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -9,8 +9,8 @@ import pytest
 
 from server.settings import Settings
 from server.storage.db import Database
-from tests.databases import write_database
-from tests.engines import choose_url
+from tests.helpers.databases import write_database
+from tests.helpers.engines import choose_url
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from server.services import patients
 from server.settings import Settings
 from server.storage.db import Database
 from server.storage.high_water import raise_mark, set_mark
-from tests.databases import write_database
+from tests.helpers.databases import write_database
 
 ROWS = 6
 

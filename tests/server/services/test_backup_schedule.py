@@ -51,6 +51,7 @@ def test_a_backup_is_due_once_a_day_and_an_hour_after_a_failure(tmp_path: Path) 
     assert read_state(settings) == BackupState()
 
 
+@pytest.mark.slow
 def test_the_newest_backup_is_restored_every_week_and_the_result_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -33,9 +33,9 @@ from server.storage.person_tables import patient_identity
 from server.storage.report_tables import report_file, signed_report
 from server.storage.tables import audit as audit_table
 from server.storage.tables import login_session, now, user
-from tests.engines import on_both_engines, tell_commands
 from tests.faults.clinic import Clinic, find_room
-from tests.marks import about_the_file
+from tests.helpers.engines import on_both_engines, tell_commands
+from tests.helpers.marks import sqlite_only
 
 CUT = "is damaged or was cut"
 _put_back: list[Database] = []
@@ -178,6 +178,7 @@ def test_a_link_that_was_revoked_since_does_not_open_again(clinic: Clinic) -> No
             report_links.find_by_token(c, token)
 
 
+@pytest.mark.slow
 def test_names_come_back_from_an_encrypted_backup_and_need_their_key_from_another(
     clinic: Clinic,
     key: ClinicKey | None,
@@ -235,6 +236,7 @@ def test_names_come_back_from_an_encrypted_backup_and_need_their_key_from_anothe
             assert ("Move it to" if said is None else said) in told
 
 
+@pytest.mark.slow
 @on_both_engines
 def test_who_was_erased_since_stays_erased(clinic: Clinic) -> None:
     with clinic.db.write() as c:
@@ -378,7 +380,7 @@ def test_days_weeks_and_months_are_kept() -> None:
 
 
 @pytest.mark.slow
-@about_the_file
+@sqlite_only
 def test_commands_make_prune_try_and_restore(
     clinic: Clinic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -25,8 +25,8 @@ from server.storage.blob_opening import open_blobs
 from server.storage.blobs import StoreAway
 from server.storage.db import Database
 from server.storage.tables import recording_file
-from tests.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
 from tests.faults.clinic import Clinic, until
+from tests.helpers.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
 
 
 @pytest.fixture
@@ -63,6 +63,7 @@ def environment(clinic: Clinic, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SAGITTAL_HOME", str(clinic.folder))
 
 
+@pytest.mark.slow
 def test_what_nothing_refers_to_goes_to_the_trash_and_comes_back(clinic: Clinic, bucket: Bucket) -> None:  # noqa: F811
     stray = clinic.blobs.put(clinic.patient.id, b"of nobody")
     assert sweep.sweep(clinic.db, clinic.blobs, clinic.settings) == 0  # it is young
@@ -119,6 +120,7 @@ def test_an_erasure_while_the_store_is_away_is_finished_when_it_is_back(
     assert list(clinic.settings.erasing.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_check_finds_damage_and_says_in_one_sentence_when_it_cannot_look(
     clinic: Clinic,
     bucket: Bucket,  # noqa: F811
@@ -141,6 +143,7 @@ def test_the_check_finds_damage_and_says_in_one_sentence_when_it_cannot_look(
     assert f"Set SAGITTAL_BUCKET={bucket.url}" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_backup_has_the_bucket_and_goes_into_a_folder_and_into_an_empty_bucket(
     clinic: Clinic,
     bucket: Bucket,  # noqa: F811
@@ -203,6 +206,7 @@ def test_a_restore_into_a_bucket_that_was_cut_off_is_made_again(
     assert not home.restoring.exists()
 
 
+@pytest.mark.slow
 def test_a_move_into_the_bucket_goes_on_where_it_was_cut_off(
     bucket: Bucket,  # noqa: F811
     tmp_path: Path,

@@ -27,12 +27,12 @@ from server.storage.blob_opening import note_bucket, open_blobs, read_note
 from server.storage.blobs import StoreAway
 from server.storage.db import Database
 from server.storage.trash import Address, name_stamp
-from tests.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
 from tests.data import ROOT
-from tests.databases import write_database
 from tests.faults.clinic import Clinic, until
 from tests.faults.failing import Dying, PowerError
-from tests.service import line_with
+from tests.helpers.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
+from tests.helpers.databases import write_database
+from tests.helpers.service import line_with
 
 
 @pytest.fixture
@@ -79,6 +79,7 @@ def is_whole(home: Settings) -> bool:
         return not checks.check(db, open_blobs(home), home) and not home.restoring.exists()
 
 
+@pytest.mark.slow
 def test_a_move_waits_for_the_last_worker(
     bucket: Bucket,  # noqa: F811
     tmp_path: Path,
@@ -228,6 +229,7 @@ def test_a_restore_into_a_bucket_that_dies_twice_anywhere_is_made_again(
     assert died > 10
 
 
+@pytest.mark.slow
 def test_a_start_that_is_refused_leaves_room_for_the_restore_that_it_asks_for(
     clinic: Clinic, archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -244,6 +246,7 @@ def test_a_start_that_is_refused_leaves_room_for_the_restore_that_it_asks_for(
     assert is_whole(home)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "stranger", ["blobs/incoming/a.part", "blobs/bucket.txt", "nodes/a/live/a.log", "nodes/a/b"]
 )

@@ -17,7 +17,7 @@ from server.commands.research import research
 from server.report.columns import read_table
 from server.services import consents, patients, reviews, sessions
 from server.services.deidentified import MOST_SHIFT_DAYS, open_key
-from tests.engines import tell_commands
+from tests.helpers.engines import tell_commands
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic, open_clinic
 
@@ -71,6 +71,7 @@ def _table(files: dict[str, bytes], name: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(files[f"{name}.csv"].decode())))
 
 
+@pytest.mark.slow
 async def test_nothing_says_who_and_only_the_key_leads_back(
     clinic: Clinic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -22,7 +22,7 @@ from server.settings import Settings
 from server.storage.db import Database, Source
 from server.storage.field_cipher import FieldKeys, KeyUnusable, ValueUnreadable, add_key, make_keys, read_keys
 from server.storage.person_tables import patient_identity
-from tests.engines import choose_url, tell_commands
+from tests.helpers.engines import choose_url, tell_commands
 
 WHO = {
     "name": "Erika Zzcanary-Öztürk",
@@ -308,6 +308,7 @@ def test_what_no_key_opens_is_listed_and_only_then_removed(names: Names) -> None
     assert names.get(names.one) == PatientIdentity()
 
 
+@pytest.mark.slow
 def test_the_command_makes_changes_and_discards(
     tmp_path: Path, db: Database, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

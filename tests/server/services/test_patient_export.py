@@ -20,6 +20,7 @@ from server.storage.tables import new_id, now
 from tests.faults.clinic import Clinic
 
 
+@pytest.mark.slow
 def test_everything_of_one_patient_and_nothing_else(tmp_path: Path) -> None:
     clinic = Clinic(tmp_path, lease_s=5.0)
     visit, take = clinic.session.id, new_id()

@@ -17,7 +17,7 @@ from server.storage.blob_folder import FolderBlobs
 from server.storage.blobs import INCOMING, BlobStore, IntegrityError
 from server.storage.s3_bucket import PUT_BYTES
 from server.storage.trash import KEPT
-from tests.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
+from tests.helpers.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
 
 SPACE, OTHER = "a" * 32, "b" * 32
 CONTENT = b"seven sensors"

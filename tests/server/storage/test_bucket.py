@@ -17,8 +17,8 @@ from server.storage import blob_bucket, s3_bucket
 from server.storage.blob_bucket import BucketBlobs
 from server.storage.blob_opening import open_blobs, require_use
 from server.storage.blobs import BlobFile, BlobStore, StoreAway
-from tests.buckets import KEYS, Bucket, bucket, s3_server  # noqa: F401 - fixtures
 from tests.data import ROOT
+from tests.helpers.buckets import KEYS, Bucket, bucket, s3_server  # noqa: F401 - fixtures
 
 SPACE, NAME = "a" * 32, "b" * 64
 CALLS: dict[str, Callable[[BlobStore], object]] = {
@@ -48,6 +48,7 @@ def why_away(call: Callable[[], object]) -> StoreAway:
 
 
 # the library's own patience is three minutes
+@pytest.mark.slow
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("name", CALLS)
 def test_a_store_that_is_away_says_so_within_seconds(
@@ -74,6 +75,7 @@ def silent(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         yield
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("name", CALLS)
 @pytest.mark.usefixtures("bucket", "silent")
@@ -82,6 +84,7 @@ def test_a_store_that_never_answers_is_away(tmp_path: Path, name: str) -> None:
     assert why_away(lambda: CALLS[name](there)).code == "store_away"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CALLS if name not in {"require", "is_older"}])
 @pytest.mark.usefixtures("bucket")
 def test_a_bucket_that_is_not_there_refuses_and_no_file_is_taken_for_missing(
@@ -223,6 +226,7 @@ def test_a_command_with_another_setting_than_the_files_is_refused(
             open_blobs(other)
 
 
+@pytest.mark.slow
 def test_a_server_does_not_start_on_a_bucket_that_is_not_there(
     bucket: Bucket,  # noqa: F811
     tmp_path: Path,

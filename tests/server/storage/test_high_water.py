@@ -22,9 +22,9 @@ from server.storage.high_water import (
     set_mark,
 )
 from server.storage.migrate import copy_database, upgrade
-from tests.databases import write_database
 from tests.faults.clinic import until
 from tests.faults.model_disk import ModelDisk
+from tests.helpers.databases import write_database
 
 
 def write_rows(db: Database, number: int, action: str = "patient.opened") -> None:
@@ -128,6 +128,7 @@ def test_a_damaged_mark_is_said_and_not_overwritten(db: Database, mark: Path, co
     assert complaint(db, mark) is None
 
 
+@pytest.mark.slow
 def test_the_marks_of_two_data_folders_do_not_speak_for_each_other(tmp_path: Path) -> None:
     for name in ("one", "two"):
         upgrade(tmp_path / name / "sagittal.db")

@@ -23,7 +23,7 @@ from server.storage import migrate
 from server.storage.db import Database, Source
 from server.storage.tables import metadata
 from tests.data import ROOT
-from tests.postgres import run_sql
+from tests.helpers.postgres import run_sql
 
 HANG = """
 import pathlib, time
@@ -127,6 +127,7 @@ def scripts(tmp_path: Path) -> Path:
     return Path(shutil.copytree(ROOT / "migrations", tmp_path / "migrations"))
 
 
+@pytest.mark.slow
 def test_the_migrated_schema_is_the_one_the_code_declares(bare_source: Source) -> None:
     fresh = Database(bare_source)
     with fresh.write() as c:
@@ -143,6 +144,7 @@ def test_the_migrated_schema_is_the_one_the_code_declares(bare_source: Source) -
     command.check(migrate.configuration(bare_source))
 
 
+@pytest.mark.slow
 def test_down_and_up_again_leave_the_same_schema(bare_source: Source) -> None:
     migrate.upgrade(bare_source)
     before = schema(bare_source)
@@ -152,6 +154,7 @@ def test_down_and_up_again_leave_the_same_schema(bare_source: Source) -> None:
     assert schema(bare_source) == before
 
 
+@pytest.mark.slow
 def test_data_survive_up_and_down_and_a_backup_is_made_before(
     bare_source: Source, tmp_path: Path, scripts: Path, head: str
 ) -> None:
@@ -170,6 +173,7 @@ def test_data_survive_up_and_down_and_a_backup_is_made_before(
     assert counts(source) == (1, 2)
 
 
+@pytest.mark.slow
 def test_earlier_sessions_have_no_condition_but_the_feedback_that_was_kept(
     bare_source: Source, tmp_path: Path
 ) -> None:
@@ -192,6 +196,7 @@ def test_earlier_sessions_have_no_condition_but_the_feedback_that_was_kept(
     assert counts(source) == (1, 2)
 
 
+@pytest.mark.slow
 def test_a_failing_migration_leaves_exactly_the_old_revision(
     bare_source: Source, tmp_path: Path, scripts: Path, head: str
 ) -> None:
@@ -213,6 +218,7 @@ def test_a_failing_migration_leaves_exactly_the_old_revision(
     assert migrate.read_revision(source) == "next"
 
 
+@pytest.mark.slow
 def test_a_migration_killed_in_the_middle_leaves_exactly_the_old_revision(
     bare_source: Source, tmp_path: Path, scripts: Path, head: str
 ) -> None:
@@ -241,6 +247,7 @@ def test_a_migration_killed_in_the_middle_leaves_exactly_the_old_revision(
     assert (migrate.read_revision(source), counts(source)) == ("next", (1, 2))
 
 
+@pytest.mark.slow
 def test_an_unknown_revision_is_refused(bare_source: Source) -> None:
     migrate.upgrade(bare_source)
     run(bare_source, "UPDATE alembic_version SET version_num = 'f00d'")

@@ -29,9 +29,9 @@ from server.storage.person_tables import api_token
 from server.storage.postgres import PostgresServer
 from server.storage.refusal import is_busy
 from server.storage.tables import metadata, new_id, now, patient, user
-from tests.databases import write_database
-from tests.engines import require_postgres
-from tests.postgres import PASSWORD, run_sql
+from tests.helpers.databases import write_database
+from tests.helpers.engines import require_postgres
+from tests.helpers.postgres import PASSWORD, run_sql
 from tests.server.clinic import ORIGIN, open_clinic
 from tests.server.nodes.pair import describe, find_ports, start_process
 

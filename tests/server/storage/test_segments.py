@@ -11,7 +11,7 @@ import pytest
 from core.errors import InputError
 from core.formats.live_log import FILE_MARK, LogRecord, hello_json, record
 from server.storage import fs, segments
-from tests.live_takes import HELLO, frame, stored
+from tests.helpers.live_takes import HELLO, frame, stored
 
 FRAMES = [frame(i) for i in range(4)]
 HEAD = FILE_MARK + record("H", hello_json(HELLO))

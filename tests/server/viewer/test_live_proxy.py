@@ -73,6 +73,7 @@ def the_view(ward: Ward, src: str) -> FigureView[Any]:
     return views_of(ward)._views[src.split("/")[2]]
 
 
+@pytest.mark.slow
 async def test_all_who_may_run_live_share_one_figure_per_theme(ward: Ward, session_id: str) -> None:
     mine = await opened(ward, ward.cookie("clinician"), session_id)
     assert await opened(ward, ward.cookie("admin"), session_id) == mine

@@ -12,8 +12,8 @@ from core.body.poses import Poses
 from core.frames import FOOT, SIDES, Floats
 from server.viewer.motion import ReplayMotion, prepare_motion
 from server.viewer.steps import PIECE_M, find_prints, lay_trail
+from tests.helpers.walks import simulated
 from tests.server import walk
-from tests.walks import simulated
 
 T_S = np.arange(500) / 50.0
 FLAT = np.tile([1.0, 0.0, 0.0, 0.0], (500, 1))

@@ -116,6 +116,7 @@ async def test_at_the_limit_the_longest_unwatched_view_gives_way(motion: ReplayM
         assert refused.value.code == "too_many_views"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts open files in /proc")
 async def test_views_leave_no_threads_and_no_files_behind(motion: ReplayMotion) -> None:
     async def one(views: FigureViews) -> None:

@@ -210,6 +210,7 @@ async def large(scope: Scope, receive: Receive, send: Send) -> None:
     await answer(send, bytes(LARGE))
 
 
+@pytest.mark.slow
 async def test_who_never_reads_the_answer_does_not_keep_the_connection(knock: Knock) -> None:
     async with serving(large, unread_s=WINDOW_S) as (port, server):
         for _ in range(5):

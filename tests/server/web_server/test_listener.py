@@ -21,8 +21,8 @@ from starlette.types import Receive, Scope, Send
 
 from server.web_server.listener import RESERVED, SeldomLog, make_room
 from tests.data import ROOT
+from tests.helpers.service import line_with
 from tests.server.serving import serving
-from tests.service import line_with
 
 SOON_S = 10.0
 GUESTS = 60

@@ -50,6 +50,7 @@ async def test_one_users_wrong_guesses_do_not_lock_out_the_others_behind_a_proxy
         assert await wrong_codes(port, "203.0.113.2", 1) != [429]
 
 
+@pytest.mark.slow
 async def test_an_address_that_a_user_makes_up_is_not_believed(tmp_path: Path) -> None:
     """A proxy appends the address it sees to what the user sent."""
     async with (

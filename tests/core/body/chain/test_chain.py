@@ -130,6 +130,7 @@ def test_the_leg_is_the_chain_of_denavit_and_hartenberg() -> None:
     assert thigh[:3, 3] == pytest.approx(knee + links[1] @ chain.offsets[4], abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_a_squat_is_followed_within_half_a_degree(side: Side) -> None:
     errors = run(squats(side), leg(side))

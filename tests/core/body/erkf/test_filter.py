@@ -192,6 +192,7 @@ def test_rows_are_completed_from_below_the_diagonal() -> None:
     np.testing.assert_array_equal(below[3:6], P[3:6])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("params", [LIVE, OFFLINE], ids=["live", "offline"])
 def test_any_split_into_blocks_gives_the_same_bits(params: ErkfParams) -> None:
     take = mixed_walk()
@@ -208,6 +209,7 @@ def test_any_split_into_blocks_gives_the_same_bits(params: ErkfParams) -> None:
     assert np.array_equal(end.injected, state.injected)
 
 
+@pytest.mark.slow
 def test_the_smoother_gives_the_same_for_any_segment() -> None:
     """To rounding: a segment begins with −P λ, which within one is carried on."""
     take = mixed_walk()
@@ -288,6 +290,7 @@ NAMES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_smoothed_angles_and_strides_of_a_mixed_walk_are_within_the_limits(seed: int) -> None:
     take = mixed_walk(seed)

@@ -19,7 +19,7 @@ from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rest import index_window
 from core.rotation import about, angle_between, from_matrix, to_matrix
-from tests.walks import simulated
+from tests.helpers.walks import simulated
 
 WHOLE = PRESETS["lower_body7"]
 
@@ -62,6 +62,7 @@ def test_a_good_calibration_is_left_nearly_as_it_is() -> None:
         assert np.median(list(found.values())) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_after_turning_everybody_still_faces_ahead_at_rest() -> None:
     calibrated, orientations, found = take(3, {"thigh_l": 25.0})
     calibrated, orientations = turn_forward_axes(

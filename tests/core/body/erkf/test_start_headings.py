@@ -138,6 +138,7 @@ def test_headings_that_start_apart_come_together(
     assert np.sqrt(np.mean(smooth_error[round(TOE_OFF_S * take.rate_hz) :] ** 2)) < 1.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("params", [LIVE, OFFLINE], ids=["live", "offline"])
 @pytest.mark.parametrize(("angle", "sd"), [(30.0, 30.0), (60.0, 30.0), (60.0, 90.0), (90.0, 90.0)])
 def test_with_known_positions_they_come_together_at_the_first_step(

@@ -30,8 +30,8 @@ from core.rotation import about, multiply, rotate
 from core.simulate import simulate_scenario
 from tests.core.body.l7s.test_poses import still_feet
 from tests.core.body.test_estimate import FEET, PELVIS_FEET, estimated
-from tests.marks import slow_beyond
-from tests.walks import cut, lost, only, simulated
+from tests.helpers.marks import slow_after
+from tests.helpers.walks import cut, lost, only, simulated
 
 SEEN = {"l7s_3i": PELVIS_FEET, "l7s_2i": FEET}
 BOTH: tuple[Estimator, ...] = ("l7s_3i", "l7s_2i")
@@ -73,10 +73,11 @@ ACCUSING = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", BOTH)
 @pytest.mark.parametrize(
     ("name", "seed"),
-    slow_beyond(2, [
+    slow_after(2, [
         ("comfortable", 2), ("slow", 4), ("fast_with_turns", 3), ("hemiparetic", 3), ("drop_foot", 5),
         ("antalgic", 3), ("crouch", 4), ("parkinson", 2), ("elderly", 5),
     ]),
@@ -87,6 +88,7 @@ def test_a_right_set_up_is_not_accused(name: str, seed: int, estimator: Estimato
     assert all(f.verdict == "good" for f in made.poses.health)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["comfortable", "fast_with_turns", "hemiparetic"])
 def test_exchanged_feet_show_in_where_the_pelvis_falls(name: str) -> None:
     recording = take("l7s_3i", name)
@@ -98,6 +100,7 @@ def test_exchanged_feet_show_in_where_the_pelvis_falls(name: str) -> None:
     assert as_worn[0] < 0.0 < wrong[0]
 
 
+@pytest.mark.slow
 def test_without_a_pelvis_exchanged_feet_shift_what_turns_show_and_nothing_is_said_below_the_limit() -> None:
     recording = take("l7s_2i")
     s = recording.sensors
@@ -117,6 +120,7 @@ def test_without_turn_and_pelvis_sides_are_not_measured() -> None:
     assert "inner_foot_m" not in {f.name for f in right("l7s_3i", "comfortable").poses.health}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", BOTH)
 def test_one_sensor_given_for_both_feet_is_told(estimator: Estimator) -> None:
     recording = take(estimator)
@@ -126,6 +130,7 @@ def test_one_sensor_given_for_both_feet_is_told(estimator: Estimator) -> None:
     assert (round(value), verdict) == (50, "bad")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_foot_with_a_late_clock_is_told(estimator: Estimator) -> None:
     recording = take(estimator)
@@ -146,6 +151,7 @@ def test_a_sensor_taken_for_the_pelvis_that_sits_on_a_thigh_is_told() -> None:
     assert finding(made, "pelvis_tilt_sd_deg")[1] == "bad"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_sensor_taken_for_a_foot_that_sits_on_the_shank_is_told(estimator: Estimator) -> None:
     shank = simulated("fast_with_turns", 3)[0].sensors["shank_l"]
@@ -162,6 +168,7 @@ def test_pelvis_and_foot_exchanged_are_told() -> None:
     assert finding(made, "feet_out_of_place_pct")[1] == "bad"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", BOTH)
 def test_calibration_finds_forward_of_a_foot_sensor_put_on_backwards(estimator: Estimator) -> None:
     recording, half = take(estimator), about(2, np.pi)
@@ -189,6 +196,7 @@ def test_a_foot_that_faces_backwards_after_calibration_is_refused(estimator: Est
     assert re.search(r"faces 1[78]\d° away", error.value.message)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("off_deg", "verdict"), [(0.0, "good"), (20.0, "bad"), (-20.0, "bad")])
 @pytest.mark.parametrize("estimator", BOTH)
 def test_feet_whose_headings_disagree_are_told(
@@ -206,6 +214,7 @@ def test_feet_whose_headings_disagree_are_told(
     assert ("feet_drift_apart" in {n.code for n in poses.notices}) == (verdict != "good")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_gap_of_half_a_second_of_a_foot_is_told_and_the_rest_stays_finite(estimator: Estimator) -> None:
     made = run(lost(take(estimator), "foot_l", 20.0, 20.5), estimator)
@@ -232,6 +241,7 @@ def test_a_gap_of_the_pelvis_is_bridged_by_the_feet() -> None:
         assert np.abs(apart - apart.mean(axis=0)).max() < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_loss_that_nobody_noticed_is_told_by_what_does_not_fit(estimator: Estimator) -> None:
     recording = take(estimator)
@@ -313,6 +323,7 @@ def test_a_length_that_no_leg_has_is_refused(name: str, length: float) -> None:
     assert name in error.value.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", BOTH)
 def test_without_standing_there_is_an_error_or_a_notice(estimator: Estimator) -> None:
     walking = take(estimator, "comfortable")
@@ -324,14 +335,16 @@ def test_without_standing_there_is_an_error_or_a_notice(estimator: Estimator) ->
     assert error.value.code == "estimator_impossible"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_treadmill_is_told_because_its_signals_are_those_of_the_floor(estimator: Estimator) -> None:
     made = run(replace(take(estimator), protocol="treadmill"), estimator)
     assert "treadmill_belt" in codes(made)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", BOTH)
-@pytest.mark.parametrize("protocol", slow_beyond(1, ["squat", "activity", "tug"]))
+@pytest.mark.parametrize("protocol", slow_after(1, ["squat", "activity", "tug"]))
 def test_a_protocol_in_which_the_pelvis_sinks_is_told(estimator: Estimator, protocol: str) -> None:
     made = run(replace(take(estimator), protocol=protocol), estimator)  # type: ignore[arg-type]
     assert "pelvis_height_assumed" in codes(made)
@@ -356,7 +369,8 @@ def test_a_squat_that_no_protocol_announced_is_told(depth_m: float, verdict: Ver
     assert ("pelvis_rises" in {n.code for n in poses.notices}) == (depth_m > 0.0)
 
 
-@pytest.mark.parametrize("name", slow_beyond(1, ["slow", "fast_with_turns", "hemiparetic"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", slow_after(1, ["slow", "fast_with_turns", "hemiparetic"]))
 def test_the_rise_of_the_pelvis_is_the_true_one(name: str) -> None:
     recording, truth = simulated(name, 3)
     height = truth.p["pelvis"][:, 2]

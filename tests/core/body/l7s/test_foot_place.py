@@ -15,8 +15,8 @@ from core.body.model import BodyModel
 from core.calibration import calibrate
 from core.frames import FOOT, Floats
 from core.fusion.mahony import estimate_orientations
-from tests.accuracy.l7s_walks import steps_of
-from tests.walks import simulated
+from tests.helpers.l7s_walks import steps_of
+from tests.helpers.walks import simulated
 
 RATE = 100.0
 MODEL = LegModel.of(BodyModel.from_height(1.7))
@@ -73,6 +73,7 @@ def test_a_lost_push_off_is_left_out() -> None:
     np.testing.assert_allclose(found, [-SENSOR, -SENSOR], atol=0.002)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["comfortable", "hemiparetic"])
 def test_simulated_feet_have_their_sensors_where_they_are_found(name: str) -> None:
     recording, truth = simulated(name, 0)

@@ -30,7 +30,7 @@ from core.fusion.orientations import Orientations
 from core.rotation import about, exp, multiply, to_matrix
 from core.simulate import WalkTruth
 from core.withheld import withhold
-from tests.walks import simulated
+from tests.helpers.walks import simulated
 
 BODY = BodyModel.from_height(1.75)
 MODEL = LegModel.of(BODY)
@@ -67,6 +67,7 @@ def random_state(seed: int) -> tuple[Floats, Floats, Floats]:
     return R, rng.normal(0.0, 0.5, (3, 3)), rng.normal(0.0, 0.5, (3, 3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("leg", [0, 1])
 @pytest.mark.parametrize("reach", [0.3, 3.0])
 def test_constraint_rows_are_the_derivatives_of_what_they_hold(leg: int, reach: float) -> None:
@@ -147,6 +148,7 @@ LIMITS = {
 FLEXION = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("both_ways", [False, True])
 @pytest.mark.parametrize("worn", ["3I", "2I"])
 def test_angles_and_strides_of_a_simulated_walk_are_within_the_limits(worn: Worn, both_ways: bool) -> None:
@@ -217,6 +219,7 @@ def test_the_covariance_and_the_figure_after_ten_minutes_are_those_after_one() -
         np.testing.assert_allclose(apart[-1], apart[1], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_common_turn_of_the_world_turns_the_result() -> None:
     calibrated, orientations, steps, _ = walk()
     acceleration = free_acceleration(calibrated, orientations)

@@ -18,8 +18,8 @@ from core.errors import EstimationError
 from core.frames import Bools, Floats
 from core.fusion.mahony import estimate_orientations
 from core.rotation import about, exp, to_matrix
-from tests.accuracy.l7s_walks import steps_of
-from tests.walks import simulated
+from tests.helpers.l7s_walks import steps_of
+from tests.helpers.walks import simulated
 
 
 @cache
@@ -128,6 +128,7 @@ def test_places_that_are_no_numbers_are_refused() -> None:
         replace(of, R=np.full_like(of.R, np.nan)).solve()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("worn", ["3I", "2I"])
 def test_it_settles_and_meets_the_constraints(worn: Worn) -> None:
     found, (_, _, model, _) = whole(worn), walk(worn)

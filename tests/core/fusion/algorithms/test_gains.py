@@ -64,6 +64,7 @@ def test_an_unnamed_sensor_is_not_asked() -> None:
     assert TwoLevelGain(1.0, 2.0).row()[3:6].tolist() == [inf, inf, inf]
 
 
+@pytest.mark.slow
 def test_a_fuzzy_gain_falls_without_a_hole_as_either_sensor_deviates() -> None:
     """The thesis' own rules say nothing where one deviation is low and the other middle."""
     row = FuzzyGain(OUTPUT, acc=INPUT, mag=INPUT).row()

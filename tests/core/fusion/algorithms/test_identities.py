@@ -61,6 +61,7 @@ def test_guos_measurement_is_q_itself_at_q() -> None:
     assert np.abs(0.25 * (observing(UP, a) + one) @ (observing(m, f) + one) @ q - q).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_wus_step_is_the_gradients_step_on_the_tangent() -> None:
     q, r, a = unit(4), unit(), unit()
     J, f = np.empty((3, 4)), np.empty(3)
@@ -139,6 +140,7 @@ def test_rows_one_by_one_equal_the_textbooks_update() -> None:
     assert np.array_equal(found, found.T)
 
 
+@pytest.mark.slow
 def test_a_block_of_rows_equals_the_textbooks_update() -> None:
     n, m = 9, 3
     P, H, y, R = covariance(n), RNG.standard_normal((m, n)), RNG.standard_normal(m), covariance(m)
@@ -149,6 +151,7 @@ def test_a_block_of_rows_equals_the_textbooks_update() -> None:
     assert np.abs(dx - K @ y).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_the_bounded_covariance_is_that_of_the_thesis() -> None:
     """Eq 47 in both forms: with the stacked matrix, and by inverses."""
     n, m = 7, 3
@@ -173,6 +176,7 @@ def test_a_bound_below_the_largest_eigenvalue_is_refused() -> None:
     assert kalman.bound_worst_case(P, 1.01 * largest, *work)
 
 
+@pytest.mark.slow
 def test_triangularising_and_taking_away_keep_the_square() -> None:
     A, v = RNG.standard_normal((6, 15)), 0.3 * RNG.standard_normal(6)
     L = np.empty((6, 6))

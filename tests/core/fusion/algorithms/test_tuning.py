@@ -170,6 +170,7 @@ def test_a_tuning_stopped_anywhere_and_resumed_ends_with_the_same_bits() -> None
     assert caught.value.code == "other_problem"
 
 
+@pytest.mark.slow
 def test_the_result_says_on_what_and_whether_it_is_better() -> None:
     found = tune(split())
     assert isinstance(found, TuningResult)

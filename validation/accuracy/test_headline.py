@@ -1,0 +1,59 @@
+"""The headline of the twelve virtual people names what was commanded, and of the healthy one nothing.
+
+Every run has half of them; all are run with `--write-figures`.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from core.simulate import PATIENTS
+from server.report.bundle import load_bundle
+from server.report.exports import analysis_files
+from server.report.headline import Headline
+from server.report.model import report_model
+from tests.helpers.walks import analysed
+from validation.marks import sample
+
+SIGNATURES: dict[str, tuple[str, ...]] = {
+    "healthy": (),
+    "healthy_slow": ("Walks slower",),
+    "hemiparetic": ("left foot swings", "right leg carries longer", "left knee bends"),
+    "hemi_mild": ("left foot swings", "right leg carries longer", "left foot lands"),
+    "stiff_knee": ("left knee bends",),
+    "drop_foot": ("left toes hang", "left foot lands"),
+    "crouch": ("Both knees move little",),
+    "antalgic": ("right leg carries longer", "left step takes"),
+    "parkinson": ("Steps are short and quick",),
+    "severe_shuffle": ("Steps are quick",),
+    "step_asym": ("left step is",),
+    "elderly": ("Walks slower",),
+}
+"""Parts of sentences that must be among those shown."""
+
+SHOWN_OF_SLOW = {"speed", "support"}
+"""What a healthy person who was told to walk slowly may be told; the simulation does not lengthen stance."""
+
+
+def headline_of(name: str) -> Headline:
+    bundle = load_bundle(analysis_files(analysed(name, 0)))
+    headline = report_model(bundle, age=45, sex="male", height_m=1.75).headline
+    assert headline is not None
+    return headline
+
+
+@pytest.mark.parametrize("name", sample(sorted(PATIENTS), 2))
+def test_the_headline_names_the_signature(name: str) -> None:
+    headline = headline_of(name)
+    told = [s.text for s in headline.shown]
+    for part in SIGNATURES[name]:
+        assert any(part in text for text in told), told
+    if name == "healthy":
+        assert headline.stands_out == ()
+        assert headline.looked_at >= 10
+    if name == "healthy_slow":
+        assert {s.family for s in headline.stands_out} <= SHOWN_OF_SLOW
+
+
+def test_every_virtual_person_has_a_signature() -> None:
+    assert set(SIGNATURES) == set(PATIENTS)

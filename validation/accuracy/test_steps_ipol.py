@@ -1,0 +1,85 @@
+"""Steps of one lower-back sensor on ipol_walks, against the contacts of the feet that people checked.
+
+The walks have a turn, in which steps are easily missed; the feet before and after it are told on their own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from core.events.lumbar import detect_steps
+from core.timeline import synchronise
+from tests.helpers.event_scoring import Score, match
+from tests.helpers.ipol import WALKS, checked_events, first_s, ipol_recording
+from validation.figures import record
+
+WINDOW_S = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Steps of one walk against the checked contacts: pairs, number, told feet and how many are right."""
+
+    score: Score
+    steps: int
+    told: int
+    right: int
+
+    @property
+    def f1(self) -> float:
+        """Of the steps."""
+        hits = len(self.score.errors)
+        return 2 * hits / (2 * hits + len(self.score.extra) + self.score.missed)
+
+
+@cache
+def found(walk: str) -> Found:
+    recording = ipol_recording(walk, "pelvis")
+    off, events = first_s(recording), checked_events(walk)
+    true = sorted((float(t) - off, side) for side, times in events.contacts.items() for t in times)
+    steps = detect_steps(synchronise(recording)).steps
+    told = right = 0
+    for step in steps:
+        time, side = min(true, key=lambda x: abs(x[0] - step.time_s))
+        if step.side is not None and abs(time - step.time_s) <= WINDOW_S:
+            told += 1
+            right += step.side == side
+    return Found(match([s.time_s for s in steps], [t for t, _ in true], WINDOW_S), len(steps), told, right)
+
+
+def test_the_steps_are_those_of_the_feet() -> None:
+    assert min(found(w).f1 for w in WALKS) >= 0.85
+    assert np.mean([found(w).f1 for w in WALKS]) >= 0.93
+
+
+def test_a_foot_that_is_told_is_the_right_one() -> None:
+    told = sum(found(w).told for w in WALKS)
+    assert told >= 300
+    assert sum(found(w).right for w in WALKS) >= 0.99 * told
+
+
+def test_the_figures_are_in_the_document() -> None:
+    rows = []
+    for person in ("11", "12", "13", "14"):
+        of = [found(w) for w in WALKS if w.startswith(person)]
+        errors = 1e3 * np.concatenate([x.score.errors for x in of])
+        rows.append([
+            person,
+            str(len(of)),
+            f"{np.mean([x.f1 for x in of]):.2f}",
+            f"{min(x.f1 for x in of):.2f}",
+            f"{errors.mean():+.0f} ± {errors.std(ddof=1):.0f}",
+            f"{100 * sum(x.told for x in of) / sum(x.steps for x in of):.0f}",
+            f"{sum(x.right for x in of)}/{sum(x.told for x in of)}",
+        ])  # fmt: skip
+    record(
+        "Steps of one lower-back sensor on ipol_walks",
+        ("person", "walks", "F1", "least F1", "found − checked ms", "foot told %", "right"),
+        rows,
+        "Pairs within ±0.25 s of the checked contacts of both feet. Limits: F1 ≥ 0.93 in the mean and ≥ 0.85 "
+        "in every walk; of the told feet 99 % are right. Persons 13 and 14 hardly turn the pelvis with their "
+        "steps.",
+    )  # fmt: skip

@@ -1,0 +1,49 @@
+"""What comparing the sensors costs, against laying the orientations of the same take."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from core.agreement import check_agreement
+from core.calibration import calibrate
+from core.frames import Floats
+from core.fusion.mahony import estimate_orientations
+from core.recording import SensorSignals, UniformRecording
+from tests.helpers.pairs import in_pairs
+from tests.helpers.perturbations import delay_sensor
+from tests.helpers.walks import only, simulated
+
+MOST = {"clean": 1.6, "late": 1.8}
+"""CPU of exchange, lags, drifts and slips over that of calibration and orientation."""
+
+
+def ten_minutes() -> UniformRecording:
+    """Five minutes with seven sensors, twice."""
+    made = simulated("five_minutes", 0)[0]
+    once = only(made, *(s for s in made.sensors if s != "chest"))
+
+    def twice(x: Floats) -> Floats:
+        return np.concatenate((x, x))
+
+    def both(x: SensorSignals) -> SensorSignals:
+        again = (np.concatenate((v, v)) for v in (x.valid, x.interpolated))
+        return SensorSignals(x.device_id, twice(x.acc), twice(x.gyr), None, *again)
+
+    t_s = np.arange(2 * len(once.t_s)) / once.rate_hz
+    return replace(once, t_s=t_s, sensors={s: both(x) for s, x in once.sensors.items()})
+
+
+def test_comparing_ten_minutes_of_seven_sensors_costs_a_few_orientations() -> None:
+    take = ten_minutes()
+    takes = {"clean": take, "late": delay_sensor(take, "shank_r", 0.04)}
+    for name, recording in takes.items():
+        check_agreement(recording)
+        ours, others, ratio = in_pairs(
+            lambda recording=recording: check_agreement(recording),  # type: ignore[misc]
+            lambda: estimate_orientations(calibrate(take)),
+            times=3,
+        )
+        print(f"{name}: {ours:.2f} s, calibration and orientation {others:.2f} s, ratio {ratio:.2f}")
+        assert ratio < MOST[name]

@@ -1,0 +1,55 @@
+"""How long a newcomer waits at the second start of the demo, when the filters are compiled."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+
+import sagittal
+from server.demo.clinic import VISITS, DemoVisit, record
+from server.processes.compiling import compile_filters_once
+from tests.data import ROOT
+
+LIMIT = 1.6
+"""Time until all visits are analysed, over the time in which one process simulates and analyses them: 1.4.
+The start, of about 3 s, weighs the more the faster analyses become."""
+
+
+def run_demo() -> float:
+    """Start the demo, stop it when all visits are analysed; seconds that took, as it says itself."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "server.main", "demo"], cwd=ROOT, stdout=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"}, start_new_session=True,
+    )  # fmt: skip
+    assert process.stdout is not None
+    said = []
+    try:
+        for line in process.stdout:
+            said.append(line)
+            found = re.search(r"(\d+) of (\d+) sessions analysed \((\d+) s\)", line)
+            if found and found[1] == found[2]:
+                return float(found[3])
+        raise AssertionError("the demo ended:\n" + "".join(said))
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(30)
+        process.stdout.close()
+
+
+def analyse(visits: Sequence[DemoVisit]) -> float:
+    """Simulate and analyse visits one after the other in this process; seconds that took."""
+    began = time.perf_counter()
+    for visit in visits:
+        sagittal.analyse(record(visit).recording)
+    return time.perf_counter() - began
+
+
+def test_the_second_start_of_the_demo_shows_all_visits_soon() -> None:
+    compile_filters_once()
+    analyse(VISITS[:1])
+    assert run_demo() / analyse(VISITS) < LIMIT
