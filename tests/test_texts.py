@@ -30,9 +30,7 @@ OTHERS: Final = [language for language in LANGUAGES if language != SOURCE]
 MOST_OF_HEADLINE: Final = 95
 """Characters of a sentence that a person reads first."""
 
-HINT: Final = (
-    "python -m tests.helpers.texts brings the catalogue up to date; then give each new message its text"
-)
+HINT: Final = "python -m tests.helpers.texts updates the catalogue; then give each new message its text"
 
 
 def entries(language: str) -> dict[str, str]:

@@ -1,8 +1,8 @@
 """Run the validation: `python -m validation [PART ...]`.
 
-Parts are accuracy, bench, faults, fuzz, browser and postgresql; without one, all run. Units that passed on the
-same code are skipped, so an interrupted validation resumes (`--again` repeats them). `--write` puts the figures
-into validation/report.md and docs/accuracy.md, which a release requires.
+Parts are accuracy, bench, faults, fuzz, browser and postgresql; without one, all run. Units that passed on
+the same code are skipped, so an interrupted validation resumes (`--again` repeats them). `--write` puts the
+figures into validation/report.md and docs/accuracy.md, which a release requires.
 """
 
 from __future__ import annotations
@@ -66,8 +66,10 @@ def list_units() -> list[Unit]:
             name = str(path.relative_to(ROOT))
             units.append(Unit(part, name, (name,), alone))
     units.append(Unit("bench", "tests", ("tests", "-m", "bench"), alone=True))
-    for folder in ("core", "server", "web", "acceptance"):
-        units.append(Unit("fuzz", f"tests/{folder}", (f"tests/{folder}", "-m", "slow")))
+    units += [
+        Unit("fuzz", f"tests/{folder}", (f"tests/{folder}", "-m", "slow"))
+        for folder in ("core", "server", "web", "acceptance")
+    ]
     for path in sorted((ROOT / "tests" / "server").iterdir()):
         if path.is_dir() and any(path.glob("test_*.py")):
             name = str(path.relative_to(ROOT))

@@ -38,14 +38,14 @@ GENERATED: Final = (RUN, DIFFERENCES)
 HEAD: Final = """# Validation report
 
 Written by `python -m validation --write`; do not edit. Accuracy on real recordings (`SAGITTAL_DATA`) and on
-simulated people, speed and memory, faults. Limits are asserted by the tests; a section that the last run did not
-measure keeps its figures of an earlier one."""
+simulated people, speed and memory, faults. Limits are asserted by the tests; a section that the last run did
+not measure keeps its figures of an earlier one."""
 
 ACCURACY_HEAD: Final = """# Accuracy
 
 Key figures of the last [validation report](../validation/report.md), which has every table, its limits, the
-machine and the versions. Written by `python -m validation --write`; do not edit. `python -m validation accuracy`
-measures them again ([contributing.md](contributing.md), "Validate a release")."""
+machine and the versions. Written by `python -m validation --write`; do not edit. They are measured again by
+`python -m validation accuracy` ([contributing.md](contributing.md), "Validate a release")."""
 
 PACKAGES: Final = ("sagittal", "numpy", "scipy", "numba", "pyarrow", "fastapi", "sqlalchemy", "viser")
 
@@ -57,7 +57,8 @@ class UnitResult:
     Parameters
     ----------
     unit : its name. outcome : "passed", "failed" or "skipped". summary : pytest's closing line.
-    seconds : wall time. code : digest of the code it ran on. at : start, ISO 8601 UTC. whole : with all cases.
+    seconds : wall time. code : digest of the code it ran on. at : start, ISO 8601 UTC.
+    whole : whether all cases ran.
     figures : recorded lines, as `validation.figures` stores them.
     """
 

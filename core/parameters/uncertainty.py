@@ -28,8 +28,8 @@ GONIOMETER_DEG: Final = 3.0
 ESTIMATED_DEG: Final[Mapping[str, float]] = {"hip": 7.5, "knee": 10.5, "ankle": 5.5}
 """Joint → RMS error of a level or range that pelvis and feet do not measure: the worst of maximum, minimum,
 range, contact and mean of a stride, over neura_walk, qmt_fullbody and simulated people with and without
-disease (validation/report.md, "L7S: levels and ranges" and "L7S: parameters of whole analyses"). The knee's is
-that of people who stand with bent knees."""
+disease (validation/report.md, "L7S: levels and ranges" and "L7S: parameters of whole analyses"). The knee's
+is that of people who stand with bent knees."""
 
 FEET_ALONE_DEG: Final[Mapping[str, float]] = {"hip": 9.0, "knee": 11.0, "ankle": 7.0}
 """The same from the feet alone."""

@@ -1,4 +1,4 @@
-"""The messages of the sources, for web/texts; `python -m tests.helpers.texts` brings the catalogues up to date."""
+"""Messages of the sources, for web/texts; `python -m tests.helpers.texts` updates the catalogues."""
 
 from __future__ import annotations
 

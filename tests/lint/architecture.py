@@ -82,7 +82,7 @@ def find_unused_dependencies() -> list[str]:
 
 
 def find_fastmath() -> list[str]:
-    """Kernels of core that may reorder sums; their last bits would depend on whether they were just compiled."""
+    """Kernels of core that may reorder sums, so that last bits depend on when they were compiled."""
     return [
         str(path.relative_to(ROOT))
         for path in sorted((ROOT / "core").rglob("*.py"))

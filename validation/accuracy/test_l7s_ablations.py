@@ -1,7 +1,7 @@
 """What each of our departures from the paper's print does: L7S-3I with one of them undone at a time.
 
-Variants that the compiled filter does not know run in the form with matrices (tests/helpers/l7s_textbook.py), of
-which validation/bench/test_l7s.py shows that it gives the same as the filter.
+Variants that the compiled filter lacks run in matrix form (tests/helpers/l7s_textbook.py); that both agree
+is tested in validation/bench/test_l7s.py.
 """
 
 from __future__ import annotations

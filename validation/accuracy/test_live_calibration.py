@@ -43,7 +43,7 @@ PATIENTS = (
     "elderly",
 )
 LIMIT_DEG = 6.0
-"""Of any axis on able-bodied walks: within what soft tissue turns a sensor by (validation/accuracy, headings)."""
+"""Any axis on able-bodied walks: within the rotation of a sensor by soft tissue."""
 
 
 def take(name: str) -> UniformRecording:

@@ -1,7 +1,7 @@
 """Many recordings queued at once: each is analysed once, workers are killed, and pages come meanwhile.
 
-By hand: `pytest validation/bench/test_load.py --recordings 1000 -n 0`, or 40. Every run has simulated workers, and
-tests/faults/test_many_workers.py.
+By hand: `pytest validation/bench/test_load.py --recordings 1000 -n 0`, or 40. Simulated workers run always,
+and tests/faults/test_many_workers.py.
 """
 
 from __future__ import annotations
