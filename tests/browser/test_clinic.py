@@ -42,6 +42,7 @@ def test_signing_out_ends_the_sign_in(opened: Opener, running: RunningServer) ->
     expect(page).to_have_url(re.compile(r"/sign-in\?next="))
 
 
+@pytest.mark.journey
 def test_a_patient_is_added_found_renamed_and_deleted(opened: Opener) -> None:
     page = opened("/patients", stays=True)
     page.get_by_role("button", name="New patient").first.click()

@@ -80,6 +80,7 @@ def test_scripts_speak_german_and_write_decimal_commas(opened: Opener) -> None:
     assert said == ["1,25 s sind noch allein auf diesem Tablet.", "Stehen Sie still.", "Stopp"]
 
 
+@pytest.mark.journey
 def test_an_account_keeps_its_language_whatever_the_browser_asks(opened: Opener) -> None:
     page = opened("/account", locale="de-DE")
     page.wait_for_load_state()  # the script that sends the form is there

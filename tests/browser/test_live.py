@@ -79,6 +79,7 @@ def compiled() -> None:
     compile_live_kernels()
 
 
+@pytest.mark.journey
 def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(
     opened: Opener, flat: Browser, running: RunningServer, network: Network
 ) -> None:

@@ -27,6 +27,7 @@ def walker(running: RunningServer) -> str:
     return str(patient)
 
 
+@pytest.mark.journey
 def test_a_prescription_is_written_changed_and_ended(opened: Opener, walker: str) -> None:
     page = opened(f"/patients/{walker}", stays=True)
     page.get_by_role("link", name="Prescribe").click()

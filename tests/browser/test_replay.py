@@ -57,6 +57,7 @@ def figure(figure_page: tuple[Page, list[str]]) -> Iterator[Page]:
     assert not said, said
 
 
+@pytest.mark.journey
 def test_the_figure_has_two_legs_and_follows_the_clock(figure: Page) -> None:
     before = wait_until_still(figure)
     assert before["orange"] > 200

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
 from playwright.sync_api import expect
 
 from tests.browser.conftest import Filled, Opener
 from tests.browser.design import layout_faults, text_faults
 
 
+@pytest.mark.journey
 def test_a_report_is_signed_shared_by_a_slip_with_a_code_and_reopened(opened: Opener, filled: Filled) -> None:
     page = opened(f"/sessions/{filled.done}/print")
     page.get_by_role("link", name="Sign, share").click()

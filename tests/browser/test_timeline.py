@@ -83,6 +83,7 @@ def pick_counted(page: Page) -> Locator:
     return mark
 
 
+@pytest.mark.journey
 def test_a_dragged_foot_off_changes_the_numbers_within_a_second_and_undo_brings_them_back(
     timeline: Page, running: RunningServer, walked: str
 ) -> None:

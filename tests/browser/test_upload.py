@@ -31,6 +31,7 @@ SEGMENTS = {
 """Where each sensor was worn (README of the recording)."""
 
 
+@pytest.mark.journey
 def test_eleven_files_become_a_session_page(solid: Browser, running: RunningServer) -> None:
     files = sorted(data_folder("neura_walk", "rawimu").glob("*.txt"))
     assert len(files) == 11
@@ -271,6 +272,7 @@ def test_a_file_that_breaks_off_can_be_tried_again(
     context.close()
 
 
+@pytest.mark.journey
 def test_a_large_file_goes_on_after_a_lost_connection_and_after_a_reload(
     flat: Browser, running: RunningServer, tmp_path: Path
 ) -> None:

@@ -40,6 +40,7 @@ def test_the_table_of_a_trend_can_be_saved(opened: Opener, filled: Filled) -> No
     assert len(lines) == 1 + 2 * 2
 
 
+@pytest.mark.journey
 def test_two_visits_are_ticked_and_compared(opened: Opener, filled: Filled) -> None:
     page = opened(f"/patients/{filled.patient}", stays=True)
     button = page.get_by_role("button", name="Compare two")

@@ -63,6 +63,7 @@ def is_whole(home: Settings) -> bool:
         return not checks.check(db, FolderBlobs(home.blobs), home)
 
 
+@pytest.mark.death
 @on_both_engines
 def test_a_backup_that_dies_anywhere_leaves_no_file_that_looks_like_one(
     clinic: Clinic, engine: str, monkeypatch: pytest.MonkeyPatch

@@ -271,6 +271,7 @@ async def test_the_length_of_an_upload_is_counted_before_its_first_byte(disk: Pa
             assert (await client.put(f"{files}/small", content=b"x" * 1_000_000)).status_code == 201
 
 
+@pytest.mark.death
 @pytest.mark.parametrize(
     ("number", "code"), [(errno.ENOSPC, "disk_full"), (errno.EROFS, "disk_not_writable")]
 )

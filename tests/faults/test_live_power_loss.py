@@ -93,6 +93,7 @@ def lost(path: Path, disk: ModelDisk, promises: Promises, monkeypatch: pytest.Mo
     return bad
 
 
+@pytest.mark.death
 def test_every_acknowledged_batch_survives_a_power_cut_at_any_moment(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

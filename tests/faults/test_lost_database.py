@@ -118,6 +118,7 @@ def serve(settings: Settings) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
+@pytest.mark.death
 @pytest.mark.parametrize("database", ["missing", pytest.param("empty file", marks=sqlite_only), "emptied"])
 def test_a_start_is_refused_when_files_are_there_and_the_database_knows_no_patient(
     full: Clinic, database: str

@@ -30,6 +30,7 @@ def broken(states: list[list[dict[Path, bytes]]]) -> int:
     return sum(state.get(Path("/blobs/p/sha")) != CONTENT for moment in states for state in moment)
 
 
+@pytest.mark.death
 def test_a_committed_row_always_has_its_whole_file(monkeypatch: pytest.MonkeyPatch) -> None:
     disk = ModelDisk()
     states = publish(disk, monkeypatch, order="file first")
@@ -45,6 +46,7 @@ def test_a_name_never_shows_a_part_of_a_file(monkeypatch: pytest.MonkeyPatch) ->
     assert shown == {None, CONTENT}
 
 
+@pytest.mark.death
 def test_the_model_sees_the_mistakes_it_is_there_for(monkeypatch: pytest.MonkeyPatch) -> None:
     assert broken(publish(ModelDisk(), monkeypatch, order="row first")) > 0
 

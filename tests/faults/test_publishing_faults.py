@@ -36,6 +36,7 @@ def fail_at_every_call(
         failures += 1
 
 
+@pytest.mark.death
 @on_both_engines
 def test_an_upload_that_fails_anywhere_leaves_no_row_and_can_be_sent_again(
     clinic: Clinic, monkeypatch: pytest.MonkeyPatch

@@ -68,6 +68,7 @@ def answers(address: str) -> bool:
         return bool(answer.status == 200)
 
 
+@pytest.mark.death
 def test_a_job_survives_the_kill_of_the_server(clinic: Clinic, forker: Forker) -> None:
     view, reached, gate = clinic.hold("second")
     with forker.start(clinic.settings).running() as server:
@@ -113,6 +114,7 @@ def test_a_stopped_server_gives_its_job_back_within_ten_seconds(
     assert not alive(int(reached.read_text()))
 
 
+@pytest.mark.death
 def test_an_upload_in_parts_goes_on_after_kills_with_the_same_bytes(clinic: Clinic, forker: Forker) -> None:
     content = np.random.default_rng(19).bytes(12_000_000)
     with clinic.db.write() as c:

@@ -78,6 +78,7 @@ def test_a_child_does_not_outlive_its_worker(clinic: Clinic, workers: Workers, b
     until(lambda: not alive(child))
 
 
+@pytest.mark.death
 @on_both_engines_first
 @pytest.mark.first
 def test_a_killed_child_is_replaced_by_the_same_worker(clinic: Clinic, workers: Workers) -> None:

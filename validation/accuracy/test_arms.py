@@ -20,8 +20,8 @@ from core.rest import index_window
 from core.rotation import wrap_angle
 from core.simulate import WalkTruth, simulate_scenario
 from tests.helpers.neura import SHIPPED, Chain, chain, take
+from tests.helpers.neura_angles import scores
 from tests.helpers.walks import analysed
-from validation.accuracy.test_neura_walk import scores
 from validation.accuracy.test_setup_mistakes import analyse_right
 from validation.figures import record
 from validation.marks import whole_only

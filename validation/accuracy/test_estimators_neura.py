@@ -19,8 +19,8 @@ from core.body.still import FOOT_STILL, still_samples
 from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from tests.helpers.neura import BODY, HEIGHT_M, SHIPPED, angles_deg, healthy, stride_errors_m, take
+from tests.helpers.neura_angles import scores
 from tests.helpers.walks import neura_analysis
-from validation.accuracy.test_neura_walk import scores
 from validation.figures import record, record_in_short
 
 FLEXION = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")

@@ -17,8 +17,8 @@ from core.calibration import calibrate
 from core.frames import SIDES, Floats, Side
 from core.fusion.mahony import estimate_orientations
 from tests.helpers.neura import RATE, Chain, chain, healthy, true_strides
+from tests.helpers.neura_angles import reference
 from tests.helpers.walks import cut, neura_walk
-from validation.accuracy.test_neura_walk import reference
 from validation.figures import record
 
 CUTS_S = (11.6, 12.0, 12.5, 13.0)

@@ -48,8 +48,8 @@ from tests.helpers.neura import (
     stride_errors_m,
     take,
 )
+from tests.helpers.neura_angles import scores
 from tests.helpers.walks import neura_walk
-from validation.accuracy.test_neura_walk import scores
 from validation.figures import record
 
 Calibrated = tuple[CalibratedRecording, Orientations]

@@ -23,11 +23,11 @@ from core.fusion.orientations import Orientations
 from core.fusion.self_calibrating import SelfCalibratingFilter
 from core.rotation import conjugate, from_matrix, multiply, normalise, rotate
 from tests.data import data_folder
+from tests.helpers.neura_angles import reference as neura_reference
+from tests.helpers.neura_angles import scores
 from tests.helpers.walks import neura_walk, rms_deg, simulated
 from validation.accuracy.test_events_trunk_qmt import take as qmt_take
 from validation.accuracy.test_l7s_both_ways import QMT_NAMES
-from validation.accuracy.test_neura_walk import reference as neura_reference
-from validation.accuracy.test_neura_walk import scores
 from validation.figures import record
 from validation.marks import sample, whole_only
 

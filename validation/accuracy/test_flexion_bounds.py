@@ -17,7 +17,7 @@ from core.angles.cardan import cardan_zxy
 from core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Floats, Segment, Side
 from core.rotation import conjugate, exp, multiply
 from tests.helpers.neura import WALK, healthy
-from validation.accuracy.test_neura_walk import reference, scores
+from tests.helpers.neura_angles import reference, scores
 from validation.figures import record
 
 JOINTS = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")

@@ -32,10 +32,10 @@ from tests.data import data_folder
 from tests.helpers.l7s_walks import FLEXION, steps_of
 from tests.helpers.neura import BODY, chain, true_strides
 from tests.helpers.neura import take as neura_take
+from tests.helpers.neura_angles import STANDING, WALK, reference, scores
+from tests.helpers.real_takes import QMT
 from tests.helpers.walks import lost, simulated
 from validation.accuracy.test_events_trunk_qmt import take as qmt_take
-from validation.accuracy.test_neura_walk import STANDING, WALK, reference, scores
-from validation.accuracy.test_without_rest import QMT
 from validation.figures import record
 from validation.marks import WHOLE, sample, whole_only
 

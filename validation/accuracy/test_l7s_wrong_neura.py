@@ -31,8 +31,8 @@ from core.fusion.orientations import Orientations
 from core.recording import SensorSignals, UniformRecording
 from tests.helpers.l7s_walks import FLEXION
 from tests.helpers.neura import BODY, angles_deg
+from tests.helpers.neura_angles import scores
 from tests.helpers.walks import lost, neura_walk, only
-from validation.accuracy.test_neura_walk import scores
 from validation.figures import record
 
 WORN: Final[dict[Estimator, tuple[Segment, ...]]] = {

@@ -26,10 +26,10 @@ from core.frames import FOOT, SIDES, Floats, Side
 from tests.helpers.gaitmap import RATE
 from tests.helpers.live_walks import Run, recorded
 from tests.helpers.neura import stride_errors_m, take
+from tests.helpers.neura_angles import PLANES, Score, scores
 from tests.helpers.walks import neura_walk
 from validation.accuracy.test_gaitmap_strides import BODY, errors
 from validation.accuracy.test_gaitmap_strides import take as gaitmap_take
-from validation.accuracy.test_neura_walk import PLANES, Score, scores
 from validation.figures import record, record_in_short
 
 # right and left: standing zeroed, offset removed, r

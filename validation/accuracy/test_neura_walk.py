@@ -9,7 +9,7 @@ hip adduction must follow.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -20,37 +20,12 @@ from core.calibration import CalibrationParams, calibrate
 from core.calibration.anterior import Method
 from core.frames import FOOT, Floats
 from core.fusion.mahony import estimate_orientations
-from tests.data import data_folder
+from tests.helpers.neura_angles import PLANES, scores
 from tests.helpers.walks import neura_walk
 from validation.figures import record
 
-WALK, STANDING = slice(1110, 2080), slice(300, 1000)
-LAGS = range(-2, 7)
-PLANES = (
-    ("hip_flexion", "knee_flexion", "ankle_dorsiflexion"),
-    ("hip_adduction", "knee_adduction", "ankle_inversion"),
-    ("hip_rotation", "knee_rotation", "ankle_rotation"),
-)
 RMSE_LIMIT = {"hip_flexion": (3.2, 4.2), "knee_flexion": (3.8, 5.2), "ankle_dorsiflexion": (3.2, 3.2)}
 R_LIMIT = {"hip_flexion": 0.97, "knee_flexion": 0.97, "ankle_dorsiflexion": 0.94}
-
-
-@dataclass(frozen=True)
-class Score:
-    """Agreement of one angle in degrees: as it is, standing zeroed, offset removed, and correlation."""
-
-    raw: float
-    zeroed: float
-    offset_removed: float
-    r: float
-
-
-@cache
-def reference() -> dict[str, Floats]:
-    """The reference angles by name, degrees."""
-    table = np.genfromtxt(data_folder("neura_walk") / "reference_angles.csv", delimiter=",", names=True)
-    names = table.dtype.names or ()
-    return {n.removesuffix("_deg"): np.asarray(table[n]) for n in names if n.endswith("_deg")}
 
 
 @cache
@@ -60,33 +35,6 @@ def estimated(method: Method = "walking_direction") -> dict[str, Floats]:
     calibrated = calibrate(neura_walk(), params)
     angles = measure_angles(estimate_orientations(calibrated), calibrated.calibration.zero)
     return {n: np.degrees(x + angles.zero_offset[n]) for n, x in angles.angles.items()}
-
-
-def scores(found: dict[str, Floats]) -> tuple[int, dict[str, Score]]:
-    """The one lag for all joints, and how each angle agrees."""
-    truth = reference()
-    shared = min(
-        LAGS, key=lambda k: sum(_error(found[n], truth[n], k)[WALK].std() for n in _names(PLANES[0]))
-    )
-    out = {}
-    for name in (n for plane in PLANES for n in _names(plane)):
-        e = _error(found[name], truth[name], shared)
-        walk, standing = e[WALK], e[STANDING].mean()
-        out[name] = Score(
-            raw=float(np.sqrt(np.mean(walk**2))),
-            zeroed=float(np.sqrt(np.mean((walk - standing) ** 2))),
-            offset_removed=float(walk.std()),
-            r=float(np.corrcoef(np.roll(found[name], -shared)[WALK], truth[name][WALK])[0, 1]),
-        )
-    return shared, out
-
-
-def _names(plane: tuple[str, ...]) -> list[str]:
-    return [f"{n}_{side}" for n in plane for side in "rl"]
-
-
-def _error(x: Floats, y: Floats, lag: int) -> Floats:
-    return np.asarray((np.roll(x, -lag) - y + 180.0) % 360.0 - 180.0)
 
 
 def test_flexion_agrees_with_vicon_within_the_limits_on_both_sides() -> None:

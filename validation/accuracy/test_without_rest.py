@@ -9,81 +9,26 @@ distances, and over all takes in the mean.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import combinations
 
 import numpy as np
 import pytest
-from scipy.io import loadmat
 
 from core.frames import FOOT, Segment
 from core.pipeline import TakeAnalysis, analyse
-from core.recording import ImuStream, Recording
+from core.recording import Recording
 from core.rest import find_rest_windows, index_window
 from core.timeline import synchronise
-from tests.data import data_folder
 from tests.helpers import mobgap
-from tests.helpers.gaitmap import RATE, analysed, recording_of, signals
-from tests.helpers.ipol import WALKS, ipol_analysis, ipol_recording
-from tests.helpers.walks import neura_analysis, neura_recording
+from tests.helpers.ipol import WALKS
+from tests.helpers.real_takes import NAMES, UNCUT, analyse_take, cut_recording, read_take
 from validation.figures import record
 
 MARGIN_S = 0.3
-QMT: Mapping[str, Segment] = {
-    "foot_left": "foot_l", "foot_right": "foot_r", "lower_leg_left": "shank_l", "lower_leg_right": "shank_r",
-    "upper_leg_left": "thigh_l", "upper_leg_right": "thigh_r", "hip": "pelvis",
-}  # fmt: skip
-
 CADENCE_PCT, SWING_PCT, PITCH_DEG = 2.0, 2.0, 3.0
-
-
-def _qmt() -> Recording:
-    data = loadmat(
-        data_folder("qmt_fullbody") / "full_body_example_data.mat", squeeze_me=True, struct_as_record=False
-    )
-    streams = {}
-    for name in QMT:
-        acc, gyr = (np.array(getattr(data[name], k), np.float64) for k in ("acc", "gyr"))
-        t = np.arange(len(acc)) / 100.0
-        streams[name] = ImuStream(name, "full_body", t, acc, gyr, None, None, 100.0, "counter", name)
-    return Recording(streams, dict(QMT))
-
-
-def read_take(name: str) -> Recording:
-    if name == "neura_walk":
-        return neura_recording()
-    if name == "gaitmap_foot":
-        return recording_of(signals("imu_sample.csv"), RATE)
-    if name == "qmt_fullbody":
-        return _qmt()
-    return ipol_recording(name)
-
-
-def analyse_take(name: str) -> TakeAnalysis:
-    if name == "neura_walk":
-        return neura_analysis()
-    if name == "gaitmap_foot":
-        return analysed()
-    return analyse(_qmt()) if name == "qmt_fullbody" else ipol_analysis(name)
-
-
-def cut_recording(recording: Recording, start_s: float, end_s: float) -> Recording:
-    """Samples of [start, end) of every stream, time from zero again."""
-    streams = {}
-    for device, s in recording.streams.items():
-        k = (s.t_s >= start_s) & (s.t_s < end_s)
-        streams[device] = replace(
-            s,
-            t_s=s.t_s[k] - start_s,
-            acc=s.acc[k].copy(),
-            gyr=None if s.gyr is None else s.gyr[k].copy(),
-            mag=None,
-            quat=None,
-            digest=f"{s.digest} from {start_s}",
-        )
-    return replace(recording, streams=streams)
 
 
 def without_rest(recording: Recording) -> Recording:
@@ -137,10 +82,6 @@ def pair(name: str) -> Pair:
 
 def relative_pct(p: Pair, name: str) -> list[float]:
     return [100.0 * d / m for d, m in zip(p.differences(name), p.means(name), strict=True)]
-
-
-WHOLE = ("neura_walk", "gaitmap_foot", "qmt_fullbody")
-NAMES = (*WHOLE, *WALKS)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -243,7 +184,7 @@ def test_a_lower_back_alone_has_its_cadence_without_rest(trial: tuple[str, str])
 
 def test_write_down_the_figures() -> None:
     rows = []
-    groups: list[tuple[str, Sequence[str]]] = [(name, (name,)) for name in WHOLE]
+    groups: list[tuple[str, Sequence[str]]] = [(name, (name,)) for name in UNCUT]
     groups += [
         (f"ipol_walks, subject {s}", [w for w in WALKS if w.startswith(s)])
         for s in sorted({w.split("-")[0] for w in WALKS})

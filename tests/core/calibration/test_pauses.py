@@ -14,8 +14,8 @@ from core.frames import Segment
 from core.pipeline import analyse
 from core.recording import UniformRecording
 from core.simulate import Stand, Straight, simulate_scenario
+from tests.helpers.real_takes import NAMES, cut_recording, read_take
 from tests.helpers.walks import TOGETHER, cut, only, scripted, simulated
-from validation.accuracy.test_without_rest import NAMES, cut_recording, read_take
 
 RATE = 100.0
 EDGE_S = 1.5
