@@ -59,6 +59,7 @@ def added(monkeypatch: pytest.MonkeyPatch) -> ParameterEntry:
     return ADDED
 
 
+@pytest.mark.slow
 @pytest.mark.anyio
 async def test_a_parameter_of_the_catalogue_is_in_report_api_and_csv(
     added: ParameterEntry, tmp_path: Path

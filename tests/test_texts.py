@@ -45,6 +45,7 @@ def test_every_message_of_the_sources_has_a_text(language: str) -> None:
     assert [message for message in list_messages() if not known.get(message)] == [], HINT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", OTHERS)
 def test_no_text_is_left_of_a_message_that_is_gone(language: str) -> None:
     messages = list_messages()

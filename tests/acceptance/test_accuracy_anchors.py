@@ -124,6 +124,7 @@ def test_squat_angles() -> None:
         assert rms_deg(angles.angles[name] - truth[name][:n]) <= 4.0, name
 
 
+@pytest.mark.recorded
 def test_stride_length_from_shoe_sensors() -> None:
     """Against motion capture, straight strides of about 1.4 m."""
     feet = gaitmap_analysis().feet
@@ -139,6 +140,7 @@ def test_stride_length_from_shoe_sensors() -> None:
         assert np.std(errors) <= 0.020
 
 
+@pytest.mark.recorded
 def test_flexion_against_optical_motion_capture() -> None:
     angles = neura_analysis().angles
     assert angles is not None
@@ -148,6 +150,7 @@ def test_flexion_against_optical_motion_capture() -> None:
         assert np.mean(errors) <= limit, joint
 
 
+@pytest.mark.recorded
 def test_contacts_against_hand_checked_events() -> None:
     walk = "11-1"
     events, checked = ipol_analysis(walk).events, checked_events(walk)
@@ -161,6 +164,7 @@ def test_contacts_against_hand_checked_events() -> None:
             assert 1e3 * np.median(np.abs(score.errors)) <= 15.0, (side, kind)
 
 
+@pytest.mark.recorded
 def test_contacts_against_a_force_plate() -> None:
     orientations, motion, contact, off = force_plate.take()
     events = detect_contacts(orientations, motions={"foot_r": motion})
@@ -172,6 +176,7 @@ def test_contacts_against_a_force_plate() -> None:
         assert score.sd_ms <= 10.0, kind
 
 
+@pytest.mark.recorded
 def test_orientation_against_optical_reference() -> None:
     path = data_folder("broad", "02_undisturbed_slow_rotation_B.npz")
     trial = read_trial(path.stem, path.read_bytes())
@@ -180,6 +185,7 @@ def test_orientation_against_optical_reference() -> None:
     assert degrees(score.inclination) <= 0.7
 
 
+@pytest.mark.recorded
 def test_steps_from_the_lower_back_against_insoles() -> None:
     trial = mobgap.TRIALS[0]
     steps = detect_lower_back_steps(mobgap.recording(trial))

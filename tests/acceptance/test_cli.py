@@ -118,6 +118,7 @@ def test_simulated_walk_is_analysed_and_agrees_with_its_truth(
     assert np.median(late) < 0.035
 
 
+@pytest.mark.slow
 def test_result_files_have_the_documented_columns(analysed: tuple[Path, str]) -> None:
     out, stdout = analysed
     content = result(out)
@@ -156,6 +157,7 @@ def test_wrong_words_are_a_usage_error() -> None:
     assert sagittal("dance").returncode == 2
 
 
+@pytest.mark.recorded
 def test_neura_walk_in_every_packing_gives_the_same_numbers(tmp_path: Path) -> None:
     folder = data_folder("neura_walk", "rawimu")
     manifest = tmp_path / "manifest.json"

@@ -29,6 +29,8 @@ def test_a_set_up_address_works_once(service: Service) -> None:
     assert again.headers["content-type"] == "application/problem+json"
 
 
+@pytest.mark.recorded
+@pytest.mark.slow
 def test_neura_walk_through_rest_equals_the_command_line(service: Service, tmp_path: Path) -> None:
     folder = data_folder("neura_walk", "rawimu")
     client = service.client

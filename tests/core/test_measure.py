@@ -39,6 +39,7 @@ def test_the_pipeline_gives_what_measure_gives_on_its_tracks(analysis: TakeAnaly
     assert_same_figures(again.strides.strides, analysis.strides.strides)
 
 
+@pytest.mark.slow
 def test_stored_and_read_again_it_gives_the_same_numbers(analysis: TakeAnalysis) -> None:
     files = analysis_files(analysis)
     bundle = load_bundle(files)

@@ -208,6 +208,7 @@ def test_facts_survive_short_and_holed_signals() -> None:
     assert f.gyro_top is None
 
 
+@pytest.mark.recorded
 def test_the_real_take_has_the_figures_of_the_specification(neura: Recording) -> None:
     """Rest norm 9.83 to 9.95, magnetic shares .00 .08/.30 .37/.36
     (docs/science/quality.md, "Magnetic field")."""
@@ -226,6 +227,7 @@ def test_the_real_take_has_the_figures_of_the_specification(neura: Recording) ->
     assert errors(report) == []
 
 
+@pytest.mark.recorded
 def test_the_upload_page_learns_what_the_real_files_hold(neura: Recording) -> None:
     unmapped = Recording(neura.streams, {})
     found = describe(unmapped)
@@ -244,6 +246,7 @@ def nameless(recording: Recording) -> tuple[Recording, dict[str, Segment]]:
     return Recording(streams, {}), {ids[d]: s for d, s in recording.segments.items() if s}
 
 
+@pytest.mark.recorded
 def test_movement_sorts_nine_real_sensors_and_sets_ankles_and_copies_aside(neura: Recording) -> None:
     segments = suggest_segments(Recording(neura.streams, {}))
     assert segments == {d: NEURA.get(d) for d in neura.streams}
@@ -256,6 +259,7 @@ def test_movement_tells_segments_and_sides_of_simulated_walks(script: str) -> No
     assert suggest_segments(recording) == truth
 
 
+@pytest.mark.recorded
 def test_a_walk_without_rest_before_it_has_legs_but_no_sides(neura: Recording) -> None:
     walk = slice(1250, 2150)
     cut = {
@@ -277,6 +281,7 @@ def test_a_walk_without_rest_before_it_has_legs_but_no_sides(neura: Recording) -
     assert len(legs) == 2
 
 
+@pytest.mark.recorded
 def test_movement_says_nothing_about_people_who_stand(neura: Recording) -> None:
     still = {
         d: ImuStream(
@@ -297,17 +302,20 @@ def test_names_are_believed_before_movement() -> None:
     assert suggest_segments(Recording(streams, {}))["Pelvis"] == "pelvis"
 
 
+@pytest.mark.recorded
 def test_a_declared_mapping_is_kept_as_the_suggestion(neura: Recording) -> None:
     found = suggest(neura)
     assert {found[d].segment for d in NEURA} == set(NEURA.values())
     assert found["00B40C55"].basis == "declared"
 
 
+@pytest.mark.recorded
 def test_the_report_is_plain_json(neura: Recording) -> None:
     text = json.dumps(assess(neura, synchronise(neura)).to_json(), allow_nan=False)
     assert json.loads(text)["sensors"][0]["segment"] == "pelvis"
 
 
+@pytest.mark.recorded
 def test_the_raw_gaitmap_copy_shows_its_clipped_heel_strikes() -> None:
     """Heel strikes clip at ±16 g (docs/science/quality.md, "Range"): found in the copy whose axes were not
     rotated."""

@@ -126,6 +126,7 @@ def test_runs_and_samples_are_half_open() -> None:
     assert index_window((1.0, 2.5), RATE) == slice(100, 250)
 
 
+@pytest.mark.recorded
 def test_neura_walk_stands_before_and_after_its_walk() -> None:
     data_folder("neura_walk")
     (a, b), (c, d) = find_rest_windows(neura_walk())

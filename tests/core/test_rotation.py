@@ -89,6 +89,7 @@ def test_the_middle_is_half_way_along_the_shorter_arc(p: Floats, q: Floats) -> N
     assert abs(float(rotation.angle_between(half, q)) - whole / 2) < 1e-7
 
 
+@pytest.mark.slow
 @given(quaternions, arrays(np.float64, (6, 3), elements=st.floats(-0.2, 0.2, width=64)), quaternions)
 def test_mean_moves_with_its_members(q: Floats, spread: Floats, shift: Floats) -> None:
     members = rotation.multiply(q, rotation.exp(spread))
@@ -118,6 +119,7 @@ def test_a_wrapped_angle_is_the_same_direction(angle: float) -> None:
     assert rotation.wrap_angle(np.array([angle]))[0] == wrapped
 
 
+@pytest.mark.slow
 @given(quaternions, quaternions, vectors)
 def test_compiled_loops_turn_as_arrays_do(p: Floats, q: Floats, phi: Floats) -> None:
     matrix, product, back = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)

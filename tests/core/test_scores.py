@@ -114,6 +114,7 @@ def test_pelvic_obliquity_entered_once_counts_up_on_one_side_and_down_on_the_oth
         assert one.value == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.recorded
 def test_healthy_people_have_an_index_of_one_hundred_in_the_middle() -> None:
     """Mean 100 and sd 10 leave one out; with the person in the reference about 42/41 closer to it."""
     found = [score_curves(session({v: {s: p[s][v] for s in SIDES} for v in NINE}, 4)) for p in people()]

@@ -234,6 +234,7 @@ REAL = (lambda: [neura_walk()], feet_of_gaitmap, ipol, qmt, lower_backs, awinda_
 NAMES = ("neura", "gaitmap", "ipol", "qmt", "mobgap", "awinda", "opal")
 
 
+@pytest.mark.recorded
 @pytest.mark.parametrize("takes", REAL, ids=NAMES)
 def test_real_sensors_all_measure(takes: Callable[[], list[UniformRecording]]) -> None:
     found = takes()

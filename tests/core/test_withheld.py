@@ -126,6 +126,7 @@ def test_angles_of_a_joint_whose_estimator_is_bad_are_withheld_with_the_reason()
     assert all(p.mean is not None for p in found.parameters if p.name == "stride_time_s")
 
 
+@pytest.mark.slow
 def test_what_was_withheld_stays_so_in_files_pages_and_after_an_edit() -> None:
     found = exchanged()
     files = analysis_files(found)
@@ -189,6 +190,7 @@ def test_distances_of_a_foot_that_refuses_its_own_rests_are_withheld_of_it_alone
     assert of["total_distance_m", None].n == 1
 
 
+@pytest.mark.slow
 def test_a_figure_that_rests_on_the_bound_of_the_leg_model_is_withheld() -> None:
     found = at_the_bound(sparse())
     assert found.measured is not None

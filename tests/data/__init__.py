@@ -13,6 +13,8 @@ import pytest
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+NO_RECORDINGS = "no recordings"
+"""Beginning of the reason for which a test without its recordings is skipped."""
 ENGINE = "SAGITTAL_TEST_ENGINE"
 """Environment variable of every test process: where the databases of its clinics are (`--engine`)."""
 
@@ -32,4 +34,6 @@ def data_folder(*parts: str) -> Path:
     # a file only: a folder with some of the recordings would let a test pass that has not seen the others
     if (own := HERE.joinpath(*parts)).is_file():
         return own
-    pytest.skip(f"no recordings: {'/'.join(parts) or 'data'} not found; set SAGITTAL_DATA to the data folder")
+    pytest.skip(
+        f"{NO_RECORDINGS}: {'/'.join(parts) or 'data'} not found; set SAGITTAL_DATA to the data folder"
+    )

@@ -18,7 +18,7 @@ from server.processes.supervisor import Workers
 from server.settings import Settings
 from tests.faults.clinic import Clinic, alive, state_of, until
 from tests.faults.tiny_tasks import STAGES
-from tests.helpers.engines import on_both_engines, on_both_engines_first
+from tests.helpers.engines import on_both_engines
 
 
 def children_of(pid: int) -> list[int]:
@@ -79,7 +79,7 @@ def test_a_child_does_not_outlive_its_worker(clinic: Clinic, workers: Workers, b
 
 
 @pytest.mark.death
-@on_both_engines_first
+@on_both_engines
 @pytest.mark.first
 def test_a_killed_child_is_replaced_by_the_same_worker(clinic: Clinic, workers: Workers) -> None:
     view, reached, gate = clinic.hold("second")

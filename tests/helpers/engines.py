@@ -23,12 +23,6 @@ from tests.helpers.postgres import NoPostgresError, make_database, make_lasting_
 ENGINES: Final = ("sqlite", pytest.param("postgresql", marks=pytest.mark.postgres))
 on_both_engines: Final = pytest.mark.parametrize("engine", ENGINES, indirect=True)
 """The one on PostgreSQL runs with the mark `postgres`."""
-on_both_engines_first: Final = pytest.mark.parametrize(
-    "engine",
-    ["sqlite", pytest.param("postgresql", marks=(pytest.mark.postgres, pytest.mark.first))],
-    indirect=True,
-)
-"""Both in every run."""
 
 _in_force: list[str] = []
 _lasting: dict[Path, str] = {}

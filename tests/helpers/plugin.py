@@ -17,7 +17,7 @@ import pytest
 from server.processes.compiling import compile_filters
 from server.processes.environment import ONE_THREAD
 from server.storage.compile_cache import has_compiled_filters, share_compile_cache
-from tests.data import ENGINE, ROOT
+from tests.data import ENGINE, NO_RECORDINGS, ROOT
 
 # before anything imports numba: every process that a test starts inherits it
 share_compile_cache(Path(tempfile.gettempdir()) / "sagittal-tests")
@@ -47,6 +47,8 @@ FIRST: Final = "pytest.mark.first"
 ORDER: Final = ("core", "server", "web", "lint", "helpers", "test_", "acceptance", "faults", "browser")
 """Order of the folders: cheap tests first. Browser tests last: while Playwright drives Chromium an event loop
 runs in its thread, which other tests must not meet."""
+MARKS_WITH_RECORDINGS: Final = frozenset({"recorded", "slow", *MARKED, "bench", "postgres"})
+"""Tests with one of these marks also run where recordings are available."""
 LONGEST: Final = ("test_capture.py", "test_german.py", "test_live.py", "test_look.py", "test_replay.py")
 """Files of minutes: first in their folder, so that no process is left alone with one at the end."""
 
@@ -139,6 +141,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if (folder := _folder(item.path)) in MARKED:
             item.add_marker(folder)
     items.sort(key=lambda item: (_rank(_folder(item.path)), item.path.name not in LONGEST))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Fail a test that skips for want of recordings without the mark `recorded`: no run would include it."""
+    report = yield
+    needs_recordings = report.skipped and NO_RECORDINGS in str(report.longrepr)
+    if needs_recordings and not MARKS_WITH_RECORDINGS & {mark.name for mark in item.iter_markers()}:
+        report.outcome = "failed"
+        report.longrepr = "needs real recordings: mark it @pytest.mark.recorded"
+    return report
 
 
 def _folder(path: Path) -> str:

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.data import ROOT
 from tests.lint.architecture import outsiders
 
@@ -25,6 +27,7 @@ def linted(folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_import_contracts_hold_and_a_planted_violation_breaks_them(tmp_path: Path) -> None:
     for name in ("core", "sagittal", "server", "web"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__", "static"))

@@ -46,6 +46,7 @@ def test_a_limited_wait_and_a_shortest_time_are_none() -> None:
     assert find_limits_in_seconds(ast.parse(source)) == []
 
 
+@pytest.mark.recorded
 def test_the_recordings_in_this_folder_are_the_very_files_of_the_others() -> None:
     """So what passes without the others need not run again with them."""
     base = data_folder()

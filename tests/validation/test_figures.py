@@ -112,5 +112,6 @@ def test_the_report_states_what_changed_and_what_failed(tmp_path: Path) -> None:
     assert "## Differences from the previous report\n\nNone." in report.read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_speed_is_not_compared() -> None:
     assert list_differences({"Speed: a": "1"}, {"Speed: a": "2", "Some": "1"}) == "New section: Some."

@@ -23,6 +23,7 @@ def write_unit(tmp_path: Path, name: str, source: str, *, alone: bool = False) -
     )
 
 
+@pytest.mark.slow
 def test_a_run_resumes_and_repeats_only_failures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

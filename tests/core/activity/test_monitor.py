@@ -144,6 +144,7 @@ def test_how_the_blocks_are_cut_changes_no_bit(
     assert again.inclination_deg.tobytes() == lived.inclination_deg.tobytes()
 
 
+@pytest.mark.slow
 def test_the_spans_fill_the_time_from_end_to_end(lived: ActivityResult) -> None:
     assert lived.spans[0].start_s == 0.0
     assert lived.spans[-1].end_s == lived.duration_s

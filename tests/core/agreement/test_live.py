@@ -50,6 +50,7 @@ def test_listening_begins_where_live_calibration_finds_the_standing() -> None:
     assert find_standings(walk()) == STOOD
 
 
+@pytest.mark.slow
 def test_a_right_take_is_told_nothing_of() -> None:
     watch, told = listen(walk(), STOOD)
     assert told == []

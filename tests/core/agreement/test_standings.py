@@ -56,6 +56,7 @@ def test_a_leg_that_stands_elsewhere_has_not_slipped() -> None:
     assert check_agreement(forward).slips == check_agreement(backward).slips == ()
 
 
+@pytest.mark.recorded
 def test_without_a_standing_at_both_ends_nothing_is_told_or_vouched_for() -> None:
     take = cut(neura_walk(), 0.0, 20.0)
     found = check_agreement(slip_sensor(take, "thigh_l", np.radians(15.0), 11.5))
@@ -63,6 +64,7 @@ def test_without_a_standing_at_both_ends_nothing_is_told_or_vouched_for() -> Non
     assert found.judged_places == {}
 
 
+@pytest.mark.recorded
 def test_standing_before_and_after_vouches_for_the_walk_between() -> None:
     found = check_agreement(neura_walk())
     assert set(found.judged_places) == {s for s in neura_walk().sensors if s != "pelvis"}
@@ -95,6 +97,7 @@ def test_no_figure_rests_on_a_sensor_that_slipped_before_the_walk(segment: Segme
             assert abs(p.mean - mean) <= p.uncertainty, (p.name, p.side)
 
 
+@pytest.mark.recorded
 def test_the_standings_clear_a_sensor_that_its_joint_blames() -> None:
     """The ankle of this real walk blames the foot where the shank slipped 1.5 s after the first step."""
     for by_deg in (15.0, -15.0):

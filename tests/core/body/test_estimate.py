@@ -92,6 +92,7 @@ def test_seven_sensors_walk_through_the_room_as_the_person_did() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_floor_stays_at_zero_and_segments_hang_together() -> None:
     poses = walk().poses
     for side in SIDES:

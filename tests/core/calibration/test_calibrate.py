@@ -89,6 +89,7 @@ def test_any_subset_of_segments_works(segments: tuple[Segment, ...]) -> None:
     assert len(found.walking) >= 1
 
 
+@pytest.mark.slow
 def test_rest_only_at_the_end_works() -> None:
     """As on gaitmap_foot: the take starts in the middle of the walk."""
     recording, truth = scripted((Stand(3.0), Straight(14.4, 0.45, 0.68), *TOGETHER, Stand(5.0)))

@@ -65,6 +65,7 @@ def test_segments_are_where_they_are_but_for_a_fixed_turn(name: str) -> None:
         assert np.sqrt(np.mean(left**2)) < 2.0, s
 
 
+@pytest.mark.slow
 def test_the_foot_is_flat_where_it_is_flat_in_standing(legs: UniformRecording) -> None:
     found, whole = calibrate(legs).calibration, calibrate(simulated()[0]).calibration
     feet: tuple[Segment, ...] = ("foot_l", "foot_r")

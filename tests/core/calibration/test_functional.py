@@ -119,6 +119,7 @@ def test_swings_that_go_aside_each_time_bend_the_axis_by_as_much() -> None:
     assert 1.0 < worst < 15.0
 
 
+@pytest.mark.slow
 def test_labels_hold_and_the_angles_of_swings_come_out() -> None:
     recording, truth = take(1)
     agreed = check_agreement(recording)

@@ -37,6 +37,7 @@ def test_the_feet_are_found_at_any_cadence(step_m: float, step_s: float) -> None
             assert not result.extra
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("step_m", "step_s"), CADENCES)
 def test_a_trunk_sensor_gives_the_cadence_or_says_why_not(step_m: float, step_s: float) -> None:
     recording, truth = walk(step_m, step_s)

@@ -110,6 +110,7 @@ def test_the_foot_pitch_events_keep_their_times_with_confidence() -> None:
     assert [(e.kind, e.confidence) for e in unsure] == [("tc", 0.75)]
 
 
+@pytest.mark.slow
 def test_where_the_foot_pitch_rule_abstains_the_others_are_pointed_to() -> None:
     told = rate_confidence(detectors("severe_shuffle"))
     assert told.events == ()

@@ -101,6 +101,7 @@ def test_standing_is_no_walking() -> None:
     assert [n.code for n in found.notices] == ["no_walking"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("width", [4.0, 8.0, 16.0])
 def test_movement_without_a_rhythm_is_refused(seed: int, width: float) -> None:

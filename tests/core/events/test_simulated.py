@@ -66,6 +66,7 @@ def test_every_contact_is_found_and_none_is_invented(walked: Walked, source: str
         assert tc.sd_ms <= 15
 
 
+@pytest.mark.slow
 def test_counted_strides_have_the_true_times(walked: Walked) -> None:
     true = walked.simulation.truth.strides
     errors = []

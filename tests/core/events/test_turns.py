@@ -91,6 +91,7 @@ def test_a_turn_cut_by_an_end_of_the_take_is_not_reported(seconds: float) -> Non
     assert whole.angle_rad == pytest.approx(pi, rel=0.02)
 
 
+@pytest.mark.recorded
 def test_a_real_turn_cut_by_the_end_of_the_take_is_not_reported() -> None:
     take = neura_analysis()
     assert take.fused is not None
@@ -106,6 +107,7 @@ def test_a_take_of_a_moment_has_none(n: int) -> None:
     assert find_turns(np.full(n, 3.0), np.ones(n, np.bool_), RATE) == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "worn", [("pelvis",), ("thigh_l", "thigh_r"), ("shank_l", "shank_r"), ("foot_l", "foot_r")]
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -21,6 +22,7 @@ schedules = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(schedule=schedules)
 def test_of_any_part_of_a_step_the_share_is_shown_to_less_than_a_stride(schedule: Schedule) -> None:
     training = [p for i in range(400) if (p := find_slot(schedule, i)).block is None]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
+import pytest
 
 from core.flags import judge_flags
 from core.frames import SIDES
@@ -16,6 +17,7 @@ OFTEN = {"knee_hyperextension": 0.15}
 """Rule → share of healthy sides beyond it, where more than 5 % are: the limit is an unverified one."""
 
 
+@pytest.mark.recorded
 def test_one_healthy_side_in_twenty_at_most_passes_a_limit() -> None:
     beyond: Counter[str] = Counter()
     judged: Counter[str] = Counter()

@@ -83,6 +83,7 @@ def test_each_patient_shows_on_the_affected_left_what_it_was_made_for(name: str,
     assert {(flag, "left") for flag in expected} <= raised(name)
 
 
+@pytest.mark.slow
 def test_asymmetries_have_the_side_they_were_made_with() -> None:
     hemi = raised("hemiparetic")
     assert {
@@ -96,6 +97,7 @@ def test_asymmetries_have_the_side_they_were_made_with() -> None:
     assert not {n for n, _ in spatial} & {"stance_asymmetry", "swing_asymmetry", "temporal_asymmetry"}
 
 
+@pytest.mark.slow
 def test_without_a_goniometer_levels_are_not_judged_but_sides_are() -> None:
     names = {name for name, _ in raised("stiff_knee", goniometer=False)}
     assert "stiff_knee" in names

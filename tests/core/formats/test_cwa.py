@@ -130,6 +130,7 @@ def test_two_kinds_of_blocks_in_one_file_are_refused() -> None:
     assert error.value.code == "bad_cwa"
 
 
+@pytest.mark.recorded
 @pytest.mark.parametrize(
     ("name", "rate", "gyro"), [("ax3_sample.cwa", 200.0, False), ("ax6_sample.cwa", 100.0, True)]
 )

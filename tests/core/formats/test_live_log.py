@@ -87,6 +87,7 @@ def test_the_samples_of_a_decoded_batch_are_the_frames_own_memory() -> None:
     assert not decode_batch(frame).samples.flags.writeable
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", range(len(encode_batch(small_batch(n=2)))))
 def test_a_frame_cut_anywhere_is_refused(n: int) -> None:
     assert refused(encode_batch(small_batch(n=2))[:n]) == "batch_shape"

@@ -51,6 +51,7 @@ def test_a_finished_take_is_a_recording() -> None:
     assert np.array_equal(stream.gyr, sent[:, 0, 3:6].astype(np.float64))
 
 
+@pytest.mark.recorded
 def test_neura_walk_streamed_is_neura_walk_uploaded() -> None:
     uploaded, streamed = neura_recording(), read(send([shared(neura_recording())]).log())
     a, b = synchronise(uploaded), synchronise(streamed)

@@ -135,6 +135,7 @@ json_values = st.recursive(
 keys = st.sampled_from(["subject", "protocol", "mounting", "sensors", "sources"])
 
 
+@pytest.mark.slow
 @given(st.dictionaries(keys, json_values, max_size=4))
 def test_any_json_is_a_manifest_or_a_manifest_error(value: dict[str, object]) -> None:
     try:

@@ -59,6 +59,7 @@ def test_everything_that_was_known_comes_back() -> None:
     assert write_recording(again) == write_recording(again)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
     n=st.integers(1, 60),
@@ -197,6 +198,7 @@ def test_a_file_without_one_number_is_refused_with_a_sentence() -> None:
     assert caught.value.code == "no_signal"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["subject", "mounting", "notices", "sha256", "sensors", "protocol"])
 @pytest.mark.parametrize("ends", ["[]", "{}"])
 @pytest.mark.parametrize("depth", [50, 900, 20_000])

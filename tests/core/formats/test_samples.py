@@ -57,6 +57,7 @@ def read(path: str) -> Recording:
     return read_recording([SourceFile.of_path(data_folder(*path.split("/")))])
 
 
+@pytest.mark.recorded
 @pytest.mark.parametrize(
     ("path", "device", "n", "more", "codes"), READABLE, ids=[r[0][-40:] for r in READABLE]
 )
@@ -74,6 +75,7 @@ def test_a_vendor_file_gives_the_signals_it_holds(
     assert 9.5 < np.nanmedian(np.linalg.norm(stream.acc, axis=1)) < 10.5
 
 
+@pytest.mark.recorded
 @pytest.mark.parametrize(
     ("path", "device", "n", "more", "codes"), READABLE, ids=[r[0][-40:] for r in READABLE]
 )
@@ -129,6 +131,7 @@ SEVERAL = [
 ]
 
 
+@pytest.mark.recorded
 @pytest.mark.parametrize(("path", "rate", "n", "worn"), SEVERAL, ids=[r[0][-40:] for r in SEVERAL])
 def test_a_file_of_several_sensors_gives_them_with_rate_and_place(
     path: str, rate: float, n: int, worn: dict[str, str | None]
@@ -144,6 +147,7 @@ def test_a_file_of_several_sensors_gives_them_with_rate_and_place(
         assert 8.5 < np.nanmedian(np.linalg.norm(stream.acc, axis=1)) < 10.5
 
 
+@pytest.mark.recorded
 @pytest.mark.parametrize(("path", "code"), REFUSED, ids=[r[0][-40:] for r in REFUSED])
 def test_what_cannot_be_read_is_refused_with_its_name(path: str, code: str) -> None:
     with pytest.raises(FormatError) as e:
@@ -152,6 +156,7 @@ def test_what_cannot_be_read_is_refused_with_its_name(path: str, code: str) -> N
     assert path.rsplit("/", 1)[-1] in e.value.message
 
 
+@pytest.mark.recorded
 def test_no_sample_file_crashes_the_reader() -> None:
     """Alone and without a manifest every file is either read or refused by one of our errors."""
     files = [p for p in data_folder().rglob("*") if p.is_file() and p.stat().st_size < 1_500_000]
@@ -168,6 +173,7 @@ def test_no_sample_file_crashes_the_reader() -> None:
     assert read_ones >= 30
 
 
+@pytest.mark.recorded
 def test_separators_and_orientation_forms_of_one_recording_agree() -> None:
     """The 2022 export exists with four separators and as quaternion + Euler + matrix: same numbers in all."""
     everything = read(MT + "MT2022_ACC_GYRO_ROT_ALL_TAB_NAN_00B42D4B.txt").streams["00B42D4B"]
@@ -181,6 +187,7 @@ def test_separators_and_orientation_forms_of_one_recording_agree() -> None:
         np.testing.assert_allclose(rotation.rotate(other.quat, other.acc)[:, :2], 0.0, atol=0.2)
 
 
+@pytest.mark.recorded
 def test_vendor_euler_angles_turn_gravity_up() -> None:
     stream = read(MT + "MT2022_ACC_GYRO_ROT_EULER_TAB_00B42D4F.txt").streams["00B42D4F"]
     assert stream.quat is not None
@@ -189,6 +196,7 @@ def test_vendor_euler_angles_turn_gravity_up() -> None:
     assert up[2] > 9.7
 
 
+@pytest.mark.recorded
 def test_an_opensense_folder_brings_its_own_mapping() -> None:
     folder = data_folder("opensense_xsens_apdm", "walk_8imu_noGyr")
     recording = read_recording([SourceFile.of_path(p) for p in sorted(folder.iterdir())])
@@ -200,6 +208,7 @@ def test_an_opensense_folder_brings_its_own_mapping() -> None:
     assert {float(s.t_s[0]) for s in recording.streams.values()} == {0.0}
 
 
+@pytest.mark.recorded
 def test_the_neura_upload_shows_eleven_files_nine_sensors() -> None:
     folder = data_folder("neura_walk", "rawimu")
     recording = read_recording([SourceFile.of_path(p) for p in sorted(folder.iterdir())])
@@ -236,6 +245,7 @@ def test_the_manifest_of_the_issue_reads_gaitmap() -> None:
     np.testing.assert_allclose(np.degrees(left.gyr[0, 0]), -0.11240170597252427)
 
 
+@pytest.mark.recorded
 def test_both_gaitmap_copies_hold_the_same_norms() -> None:
     a, b = gaitmap("imu_sample.csv"), gaitmap("imu_sample_not_rotated.csv")
     for foot in ("foot_l", "foot_r"):
@@ -246,6 +256,7 @@ def test_both_gaitmap_copies_hold_the_same_norms() -> None:
         )
 
 
+@pytest.mark.recorded
 @pytest.mark.parametrize("trial", ["11-1", "12-3", "13-2", "14-1"])
 def test_tables_with_lost_packets_keep_their_time(trial: str) -> None:
     folder = data_folder("ipol_walks")

@@ -117,6 +117,7 @@ REAL: list[tuple[tuple[str, ...], dict[str, Any], tuple[str, ...]]] = [
 ]
 
 
+@pytest.mark.recorded
 @pytest.mark.parametrize(("path", "expected", "sensors"), REAL, ids=[r[0][-1] for r in REAL])
 def test_tables_of_laboratories_are_understood(
     path: tuple[str, ...], expected: dict[str, Any], sensors: tuple[str, ...]

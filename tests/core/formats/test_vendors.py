@@ -194,6 +194,7 @@ def test_bids_tables_are_read_by_the_files_beside_them() -> None:
         assert refused.value.code == code
 
 
+@pytest.mark.recorded
 def test_a_real_bids_recording_of_positions_says_so() -> None:
     folder = data_folder("formats", "bids_motion")
     parts = {p.name: p.read_bytes() for p in folder.iterdir()}

@@ -190,6 +190,7 @@ def test_useless_files_are_refused_with_a_code(text: str, code: str) -> None:
     assert len(e.value.message) > 20
 
 
+@pytest.mark.slow
 def test_any_cut_of_a_file_is_read_or_refused_but_never_crashes() -> None:
     data = mt_text(ACC[:40], GYR[:40]).encode()
     for cut in range(0, len(data), 7):

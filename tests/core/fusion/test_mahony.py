@@ -112,6 +112,7 @@ def test_relative_heading_drift_is_taken_out_over_a_long_walk() -> None:
     assert any(x.code == "heading_rereferenced" for x in held.notices)
 
 
+@pytest.mark.slow
 def test_drift_correction_leaves_a_short_walk_alone() -> None:
     take = calibrated("slow")
     params = replace(NO_DRIFT, drift=DriftParams(reference_s=300.0))

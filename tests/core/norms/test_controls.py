@@ -116,6 +116,7 @@ def test_controls_are_chosen_by_age_sex_and_speed() -> None:
     assert control_group(quick, sex="female").reason == "few_controls"
 
 
+@pytest.mark.recorded
 def test_controls_score_raw_from_standing_because_they_stand_alike() -> None:
     """The 42 adults as controls: their own spread, and a person of theirs scored against it."""
     controls = [session(f"c{i}", curves=p) for i, p in enumerate(people())]
@@ -140,6 +141,7 @@ def test_controls_score_raw_from_standing_because_they_stand_alike() -> None:
     assert kept["left"]["knee_flexion"] == pytest.approx(person["left"]["knee_flexion"])
 
 
+@pytest.mark.recorded
 def test_the_band_of_controls_is_the_spread_of_single_sides() -> None:
     group = control_group([session(f"c{i}", curves=p) for i, p in enumerate(people())])
     knee = group.bands["knee_flexion"]

@@ -29,6 +29,7 @@ BY_SPEED = (
 )  # fmt: skip
 
 
+@pytest.mark.recorded
 @pytest.mark.parametrize("name", [*TABLES, *(f"speed/{name}" for name in BY_SPEED)])
 def test_every_table_is_shipped_as_prepared_and_its_origin_written_down(name: str) -> None:
     own = name.removeprefix("speed/")
@@ -144,6 +145,7 @@ def test_expected_step_length_and_cadence_at_a_speed() -> None:
     assert predict_at_speed(0.3, 30) == {}
 
 
+@pytest.mark.recorded
 def test_a_single_side_spreads_more_than_the_mean_of_both() -> None:
     """The table's sd is of the mean of both sides; ours of one side, recomputed from the strides."""
     values = angle_values(None).values

@@ -21,6 +21,7 @@ from core.norms.tables import read_rows
 from tests.helpers.wbds import people
 
 
+@pytest.mark.recorded
 def test_the_healthy_side_score_is_the_published_one_leave_one_out() -> None:
     """docs/norms.md, "Scores": side GPS 4.95 ± 1.46° raw, 2.35 ± 0.51° shape alone; overall 5.23 ± 1.33°."""
     spreads = leave_one_out(people())
@@ -33,6 +34,7 @@ def test_the_healthy_side_score_is_the_published_one_leave_one_out() -> None:
     assert (shape.mean_deg, shape.sd_deg) == pytest.approx((2.35, 0.51), abs=0.005)
 
 
+@pytest.mark.recorded
 def test_every_shipped_spread_is_recomputed_from_the_strides() -> None:
     """The sagittal table is ours, the other was prepared; one computation gives both to their last digit."""
     spreads, shipped = leave_one_out(people()), adult_reference().spreads

@@ -395,6 +395,7 @@ def test_the_standing_width_leans_the_legs() -> None:
     assert not np.allclose(a.R_segment_sensor, b.R_segment_sensor, atol=1e-3)
 
 
+@pytest.mark.recorded
 def test_neura_walk_is_calibrated_before_it_ends() -> None:
     done = run(neura_walk(), 10)
     found = done.found[0]

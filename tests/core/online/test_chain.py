@@ -125,6 +125,7 @@ def test_batches_of_any_size_give_the_same_bits(name: str, sizes: int | tuple[in
     same(streamed(name)[1], told(live(worn(name), sizes)[1]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SETS)
 def test_the_worn_sensors_decide_what_is_shown(name: str) -> None:
     frames, _ = streamed(name)
@@ -286,6 +287,7 @@ def test_it_has_them_of_other_gaits_too(person: str) -> None:
     assert compared(run.strides, measure_gait(tracks(run))) > 500
 
 
+@pytest.mark.recorded
 def test_the_stopping_stride_of_each_foot_is_told_again_as_not_counted() -> None:
     """neura_walk stops and stands: what is known a moment too late is taken back."""
     run = recorded(neura_walk())

@@ -193,6 +193,7 @@ FIGURES_AND_OTHERS = (
 )  # fmt: skip
 
 
+@pytest.mark.recorded
 def test_our_figures_are_those_of_the_reference_table() -> None:
     """On the 84 reference strides our windows give the published means, and the spread of a single side."""
     from core.norms import angle_values

@@ -38,6 +38,7 @@ def test_the_protocol_decides_the_recipe() -> None:
     assert all(p.uncertainty for p in a.parameters if p.name.endswith("_s"))
 
 
+@pytest.mark.slow
 def test_files_and_report_give_it_back() -> None:
     a = analysis()
     assert a.functional is not None

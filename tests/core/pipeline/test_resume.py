@@ -63,6 +63,7 @@ def test_resumed_at_any_stage_is_the_whole(stage: str) -> None:
     assert same(resume(whole(*worn), stage), whole(*worn))
 
 
+@pytest.mark.slow
 def test_an_analysis_that_nobody_resumes_lets_go_of_earlier_orientations_and_finds_the_same() -> None:
     worn: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
     found, kept = analyse(take(*worn), resumable=False), whole(*worn)
@@ -84,6 +85,7 @@ def test_seven_sensors_resumed_where_their_mountings_are_found_are_the_whole() -
     assert same(resume(whole(), "mounting"), whole())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stage", [s.name for s in TRUNK_ONLY])
 def test_a_trunk_sensor_resumed_at_any_stage_is_the_whole(stage: str) -> None:
     assert same(resume(whole("pelvis"), stage), whole("pelvis"))

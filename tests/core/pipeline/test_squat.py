@@ -135,6 +135,7 @@ def test_both_legs_of_a_take_are_measured_and_compared(name: str) -> None:
     assert [float(r["start_s"]) for r in rows] == sorted(float(r["start_s"]) for r in rows)
 
 
+@pytest.mark.slow
 def test_a_lifted_foot_has_no_ankle_and_its_knee_is_followed() -> None:
     a, truth = analysis("squats_both_legs"), made("squats_both_legs").truth
     assert a.angles is not None
@@ -145,6 +146,7 @@ def test_a_lifted_foot_has_no_ankle_and_its_knee_is_followed() -> None:
     assert np.degrees(np.abs(off[lifted])).max() < 4.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["squats_agreed", "squats_both_legs", "squats_together"])
 def test_the_figure_stands_on_its_feet(name: str) -> None:
     a, truth = analysis(name), made(name).truth

@@ -46,6 +46,7 @@ def test_a_single_pelvis_sensor_gives_cadence_steps_bouts_and_turns() -> None:
     assert a.calibration is None
 
 
+@pytest.mark.recorded
 def test_a_recording_of_a_lower_back_alone_needs_no_calibration() -> None:
     """mobgap_lowback: no manifest, no declared mounting, 12 s of a person."""
     a = analyse(recording(TRIALS[0]))
@@ -55,6 +56,7 @@ def test_a_recording_of_a_lower_back_alone_needs_no_calibration() -> None:
     assert len(a.measured.bouts) == 1
 
 
+@pytest.mark.slow
 def test_its_files_read_back_to_the_same_numbers() -> None:
     a = analysis("pelvis")
     files = analysis_files(a)

@@ -74,6 +74,7 @@ def test_a_file_with_left_handed_axes_is_told_from_one_with_a_turned_gyroscope()
     assert set(gyroscope.corrections.values()) == {SensorCorrection(gyr_axes=against)}
 
 
+@pytest.mark.slow
 def test_units_are_proposed_sensor_by_sensor() -> None:
     g, deg = change_axes(take(), "shank_l", acc=1.0 / GRAVITY), change_all(1.0, np.degrees(1.0))
     found = require(g)

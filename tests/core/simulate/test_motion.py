@@ -36,6 +36,7 @@ def test_joints_close(name: str, request: pytest.FixtureRequest) -> None:
     assert joint_gap(request.getfixturevalue(name).truth) <= 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["comfortable", "mixed"])
 def test_a_flat_foot_does_not_move_at_all_and_is_on_its_footprint(
     name: str, request: pytest.FixtureRequest
@@ -77,6 +78,7 @@ def _norm() -> dict[str, Floats]:
     return {name: np.array(values) for name, values in curves.items()}
 
 
+@pytest.mark.recorded
 @pytest.mark.parametrize("side", SIDES)
 def test_curves_are_those_of_healthy_adults(steady_motion: Motion, side: Side) -> None:
     end = SUFFIX[side]

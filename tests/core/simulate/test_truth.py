@@ -22,6 +22,7 @@ def test_truth_and_analysis_mean_the_same_angles(mixed: Simulation) -> None:
         assert analysed.zero_offset[name] == pytest.approx(truth.zero_offset[name], abs=1e-9), name
 
 
+@pytest.mark.slow
 def test_the_zero_is_quiet_standing(comfortable: Simulation) -> None:
     truth = comfortable.truth
     inside = (truth.t_s >= truth.zero[0]) & (truth.t_s < truth.zero[1])

@@ -59,6 +59,7 @@ def test_the_24_parameters_of_the_paper() -> None:
     assert np.degrees(table().errors[:6]).max() < 1.0
 
 
+@pytest.mark.slow
 def test_nothing_is_five_percent_off_zero() -> None:
     zero = {
         "Zr3S",

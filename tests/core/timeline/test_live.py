@@ -102,6 +102,7 @@ def neura() -> LiveTake:
     return send([shared(neura_recording())])
 
 
+@pytest.mark.recorded
 def test_the_axis_of_neura_walk_is_that_of_its_file_bit_for_bit() -> None:
     take = neura()
     block, notices, axis = laid(take)
@@ -110,6 +111,7 @@ def test_the_axis_of_neura_walk_is_that_of_its_file_bit_for_bit() -> None:
     assert notices == ()
 
 
+@pytest.mark.recorded
 def test_the_signals_of_neura_walk_are_those_of_the_vendors_export() -> None:
     block, _, axis = laid(neura())
     exported = synchronise(neura_recording())
@@ -118,6 +120,7 @@ def test_the_signals_of_neura_walk_are_those_of_the_vendors_export() -> None:
         assert np.array_equal(block.gyr[:, i], exported.sensors[segment].gyr.astype(np.float32))
 
 
+@pytest.mark.recorded
 @pytest.mark.parametrize("n", [1, 3, 10, 100, 1000])
 def test_however_the_samples_are_cut_into_batches_the_bits_are_the_same(n: int) -> None:
     whole, _, _ = laid(neura())
@@ -137,6 +140,7 @@ def test_streams_of_unequal_rates_meet_on_the_faster_one(n: int) -> None:
     assert block.valid.all()
 
 
+@pytest.mark.slow
 def test_lost_packets_are_filled_up_to_a_tenth_of_a_second_and_lost_beyond() -> None:
     clean = device(0, 100.0, FEET)
     samples = clean.samples.copy()

@@ -211,6 +211,7 @@ def test_slow_and_fast_sensors_keep_their_rate(rate: float) -> None:
     assert synchronise(take({"pelvis": stream("a", acc, gyr, rate_hz=rate)})).rate_hz == rate
 
 
+@pytest.mark.recorded
 def test_real_sensors_with_unequal_ends_meet_on_the_counter() -> None:
     folder = data_folder("opensense_xsens_apdm", "walk_8imu_noGyr")
     recording = read_recording([SourceFile.of_path(p) for p in sorted(folder.iterdir())])

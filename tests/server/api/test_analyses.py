@@ -73,6 +73,7 @@ async def test_progress_is_pushed_until_the_job_is_done(visit: Visit) -> None:
     assert visit.analysis[-1]["stage"] is not None
 
 
+@pytest.mark.slow
 async def test_what_was_found_is_in_the_recording(visit: Visit) -> None:
     async with visit.clinic.client("assistant") as client:
         found = (await client.get(f"{visit.path}/recording")).json()
@@ -276,6 +277,7 @@ async def test_filters_run_on_the_take_as_one_job_and_against_a_reference(visit:
             assert text in page.text
 
 
+@pytest.mark.slow
 async def test_a_reference_that_cannot_be_used_fails_the_job_with_a_reason(visit: Visit) -> None:
     async with visit.clinic.client("clinician", timeout=300) as client:
         await client.put(f"{visit.path}/references/bad.sto", content=b"DataType=double\nendheader\ntime\n0\n")

@@ -298,6 +298,7 @@ def test_no_route_without_a_row_is_excused_for_nothing(clinic: Clinic) -> None:
     assert set(WITHOUT_A_ROW) <= set(of_patients(clinic))
 
 
+@pytest.mark.slow
 async def test_watching_is_one_row_of_each_sign_in_and_quarter_of_an_hour(tmp_path: Path) -> None:
     time_s = 0.0
     async with opened(tmp_path) as v:

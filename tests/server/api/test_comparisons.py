@@ -75,6 +75,7 @@ async def test_the_report_of_a_visit_says_what_changed_since_the_one_before(clin
     assert f"/sessions/{second}/compare/{first}" in page
 
 
+@pytest.mark.slow
 async def test_an_assessment_is_compared_with_an_assessment_and_a_training_with_the_visit_before(
     clinic: Clinic,
 ) -> None:

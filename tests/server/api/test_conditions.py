@@ -63,6 +63,7 @@ async def test_a_fast_walk_is_not_what_a_comfortable_one_is_compared_with(clinic
     assert "real change since" not in page
 
 
+@pytest.mark.slow
 async def test_belts_of_another_speed_are_not_compared(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
     made = []
@@ -273,6 +274,7 @@ async def test_the_take_that_counts_says_whether_there_was_feedback(clinic: Clin
         assert sessions.get(c, session).feedback is True
 
 
+@pytest.mark.slow
 async def test_paper_has_the_sentences_that_its_numbers_refer_to_the_changes_and_the_score(
     clinic: Clinic,
 ) -> None:

@@ -101,6 +101,7 @@ async def test_strides_with_and_without_feedback_are_told_apart(clinic: Clinic) 
         assert "fb-plot" in text
 
 
+@pytest.mark.slow
 async def test_an_edited_stride_leaves_the_sums_and_is_said(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
     session, cues = await _train(clinic, patient, await _prescribe(clinic, patient), 0)
@@ -119,6 +120,7 @@ async def test_an_edited_stride_leaves_the_sums_and_is_said(clinic: Clinic) -> N
     assert "1 cue, left out, has a stride that does not count in the analysis." in after["notes"]
 
 
+@pytest.mark.slow
 async def test_the_next_visit_is_held_against_the_end_of_the_last_training(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
     prescription = await _prescribe(clinic, patient)

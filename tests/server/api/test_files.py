@@ -72,6 +72,7 @@ async def test_a_file_comes_back_byte_for_byte_under_its_own_name(clinic: Clinic
         assert removed.json()["files"] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["../x", "a/../../x", "..", "a/./b", "", "a//b", "a\x00b", "..\\x", "x" * 600, " ", "a/\u2003"]
 )

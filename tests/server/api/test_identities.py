@@ -103,6 +103,7 @@ async def test_no_token_reads_a_name(ward: tuple[Clinic, str, str]) -> None:
         assert (await client.patch(f"{API}/patients/{pid}/identity", json=WHO)).status_code == 403
 
 
+@pytest.mark.slow
 async def test_the_name_stands_on_paper_only_where_it_was_ticked(ward: tuple[Clinic, str, str]) -> None:
     clinic, pid, sid = ward
     here = f"/sessions/{sid}/print"

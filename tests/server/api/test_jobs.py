@@ -6,11 +6,11 @@ import httpx
 import pytest
 
 from server.jobs.queue import Claim
-from tests.helpers.engines import on_both_engines_first
+from tests.helpers.engines import on_both_engines
 from tests.server.clinic import Clinic
 from tests.server.serving import serve
 
-pytestmark = [pytest.mark.anyio, on_both_engines_first]
+pytestmark = [pytest.mark.anyio, on_both_engines]
 
 API = "/api/v1"
 
@@ -41,6 +41,7 @@ async def test_a_session_without_files_has_nothing_to_inspect_or_analyse(clinic:
             assert (await client.get(f"{API}/sessions/{session}/{path}")).status_code == 404
 
 
+@pytest.mark.slow
 async def test_every_change_is_pushed_and_the_stream_ends_with_the_job(clinic: Clinic) -> None:
     job = await queued_job(clinic, "pushed")
     seen: list[tuple[str, str | None]] = []

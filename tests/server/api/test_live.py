@@ -76,6 +76,7 @@ async def test_a_code_joins_one_tablet_once(clinic: Clinic) -> None:
     assert take["code"] not in str(row)
 
 
+@pytest.mark.slow
 async def test_an_expired_code_and_one_that_was_replaced_are_refused(clinic: Clinic) -> None:
     session = new_session(clinic)
     async with clinic.client("clinician") as http:

@@ -18,6 +18,7 @@ pytestmark = pytest.mark.anyio
 CANARY = "Kanari-Vogel"
 
 
+@pytest.mark.slow
 async def test_figures_of_requests_jobs_parts_disk_and_backups(clinic: Clinic) -> None:
     at = dt.datetime(2026, 3, 14, tzinfo=dt.UTC)
     good = Outcome(at, True, "x.tar", "", 5000)

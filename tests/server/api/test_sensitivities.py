@@ -117,6 +117,7 @@ async def test_it_is_cancelled_like_other_jobs(clinic: Clinic, made: SquatSimula
         assert (await client.get(f"{API}/sensitivities/{job['id']}")).status_code == 404
 
 
+@pytest.mark.slow
 async def test_what_cannot_be_analysed_is_refused(clinic: Clinic, made: SquatSimulation) -> None:
     session = await visit(clinic, made, "walks", protocol="walk")
     other = await visit(clinic, made, "squats")

@@ -92,6 +92,7 @@ async def test_an_analysis_goes_first(clinic: Clinic) -> None:
     assert [queue.claim("tester", kinds).job_id for _ in range(2)] == [analysis, tuning]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "status", "code"),
     [

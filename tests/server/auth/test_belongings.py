@@ -213,11 +213,12 @@ async def test_what_belongs_to_one_visit_is_not_reached_through_another(ward: Wa
     assert ward.rows() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("role", Role)
 async def test_nobody_touches_what_opens_the_account_of_another(ward: Ward, role: Role) -> None:
     """Tokens and second factors: only an administrator may take a factor away, and nobody a token."""
-    before = ward.rows()
     async with ward.clinic.client(role) as client:
+        before = ward.rows()
         listed = await client.get("/api/v1/account/tokens")
         assert ward.one["token_id"] not in listed.text
         revoked = await client.delete(f"/api/v1/account/tokens/{ward.one['token_id']}")

@@ -96,6 +96,7 @@ async def test_trying_a_patient_of_another_team_is_a_row_and_no_way_into_it(clin
     await switch(clinic, on=False)
 
 
+@pytest.mark.slow
 async def test_switching_care_teams_off_and_on_puts_nobody_back_or_in(clinic: Clinic) -> None:
     """A team that was set stays; whoever came in an emergency is in no team for that."""
     of_one, of_nobody, new = [await add(clinic, code) for code in ("Elm", "Fir", "Hazel")]

@@ -99,6 +99,7 @@ async def test_a_key_takes_the_place_of_the_code(
     assert {"user.security_key_added", "user.security_key_removed", "sign_in.failed"} <= set(actions)
 
 
+@pytest.mark.slow
 async def test_what_an_intruder_answers_is_refused(
     clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
 ) -> None:

@@ -74,6 +74,7 @@ def test_it_tells_a_pseudonym_a_day_and_that_nobody_signed() -> None:
             assert (r["status"], r["effectiveDateTime"]) == ("preliminary", "2026-03-02")
 
 
+@pytest.mark.slow
 def test_the_signed_report_is_attached_and_makes_its_own_numbers_final() -> None:
     page, paper = "<p>Unterschrieben: Gänge</p>".encode(), b"%PDF-1.7"
     documents = (("application/pdf", paper), ("text/html", page))

@@ -145,6 +145,7 @@ def test_nothing_that_a_person_typed_becomes_a_formula() -> None:
     assert any(c.value == "=HYPERLINK(1)" for c in cells)
 
 
+@pytest.mark.slow
 def test_the_workbook_holds_the_numbers_of_the_analysis() -> None:
     content = open_walk()
     data = write_export("xlsx", content)

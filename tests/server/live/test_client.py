@@ -50,6 +50,7 @@ async def test_a_stream_is_recorded_as_it_was_sent(clinic: Clinic, port: int) ->
     assert recorded(clinic, v) == frames
 
 
+@pytest.mark.slow
 async def test_a_connection_that_keeps_breaking_loses_nothing(clinic: Clinic, port: int) -> None:
     frames = [frame(i) for i in range(150)]
     async with visit(clinic, port) as v:

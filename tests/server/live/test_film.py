@@ -103,6 +103,7 @@ async def test_without_consent_or_token_nothing_is_kept(clinic: Clinic, port: in
         assert not films.film_path(clinic.settings.live, v.take).exists()
 
 
+@pytest.mark.slow
 async def test_what_was_acknowledged_is_there_after_a_restart_and_a_torn_piece_is_asked_for_again(
     tmp_path: Path,
 ) -> None:

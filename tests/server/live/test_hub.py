@@ -246,6 +246,7 @@ async def test_a_browser_that_does_not_read_delays_nobody(estimating: tuple[Clin
         assert (await heard(lazy, "state", state="finished"))["recording"] == report.recording
 
 
+@pytest.mark.slow
 async def test_a_stopped_estimator_delays_no_acknowledgement(estimating: tuple[Clinic, int]) -> None:
     clinic, port = estimating
     pool = hub_of(clinic).pool
@@ -365,6 +366,7 @@ async def test_a_crash_while_the_take_becomes_a_recording_is_repaired_at_the_nex
     assert not log.exists()
 
 
+@pytest.mark.slow
 def test_a_take_that_throws_is_told_and_leaves_the_others_alone(tmp_path: Path) -> None:
     good, bad = tmp_path / "good.log", tmp_path / "bad.log"
     whole = FILE_MARK + record("H", hello_json(walk_hello("a" * 32)))

@@ -73,6 +73,7 @@ async def test_connections_that_come_and_go_leave_no_descriptor_and_no_task(
         assert (await v.state())["tablet"] == "lost"
 
 
+@pytest.mark.slow
 async def test_a_tablet_that_reads_nothing_gets_acknowledgements_that_replace_each_other(
     clinic: Clinic, port: int
 ) -> None:

@@ -53,6 +53,7 @@ def test_a_walk_comes_back_sample_by_sample(per_batch: int) -> None:
         assert again.segments[device] == walk.segments[device]
 
 
+@pytest.mark.recorded
 def test_a_real_walk_gives_the_same_signals_on_the_axis_as_its_file() -> None:
     walk = neura_recording()
     batches = cut(walk, 10)

@@ -223,6 +223,7 @@ def test_no_text_breaks_the_rules(text: str) -> None:
     assert answer.close is None or answer.say
 
 
+@pytest.mark.slow
 @given(
     st.sampled_from(["hello", "batch", "finish", "battery"]),
     st.dictionaries(

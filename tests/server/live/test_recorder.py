@@ -191,6 +191,7 @@ def test_many_takes_share_one_thread(tmp_path: Path) -> None:
     asyncio.run(run())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(errno.ENOSPC, "storage_full"), (errno.EIO, "storage_failed")])
 @pytest.mark.parametrize("call", range(1, 9))
 def test_a_disk_that_refuses_is_said_and_acknowledges_nothing_that_is_not_there(

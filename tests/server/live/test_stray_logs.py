@@ -109,6 +109,7 @@ async def test_a_log_that_the_database_does_not_know_is_kept_listed_and_adopted(
         assert "knows every live recording" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 async def test_what_cannot_be_adopted_is_refused_with_a_sentence_and_left(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -39,6 +39,7 @@ def cut_card(html: str, name: str) -> str:
     return rest[: rest.index("</section>")]
 
 
+@pytest.mark.slow
 async def test_the_session_shows_its_days_in_place_of_a_walk(clinic: Clinic, visits: dict[str, str]) -> None:
     html = await page(clinic, f"/sessions/{visits['week']}")
     days = cut_card(html, "h-days")

@@ -109,6 +109,7 @@ async def test_the_trend_follows_visits_walked_alike_from_the_third_on(clinic: C
     assert await read_trend(clinic, fed) is None
 
 
+@pytest.mark.slow
 async def test_a_change_since_a_later_visit_than_the_first_says_so(
     clinic: Clinic, monkeypatch: pytest.MonkeyPatch
 ) -> None:

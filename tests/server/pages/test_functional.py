@@ -73,6 +73,7 @@ async def test_the_card_has_total_segments_norm_and_no_last_visit_at_first(
     assert "by the sensor: pelvis" in card
 
 
+@pytest.mark.slow
 async def test_values_that_have_no_side_have_no_columns_of_sides(clinic: Clinic, visits: list[str]) -> None:
     html = await page(clinic, f"/sessions/{visits[0]}")
     table = html[html.index('<table class="tbl tight params ten click">') :]

@@ -98,6 +98,7 @@ async def test_a_result_that_cannot_be_read_does_not_take_the_list_of_patients_a
     assert "Cannot be read" in row_of(await page(clinic, "/patients"), "Q-LOST")
 
 
+@pytest.mark.slow
 async def test_damaged_poses_take_the_figure_away_and_no_number(clinic: Clinic) -> None:
     patient, session = await visit(clinic, "Q-POSES")
     with clinic.db.read() as c:

@@ -54,6 +54,7 @@ def rows_of(html: str) -> list[str]:
     return [re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", row)).strip() for row in rows]
 
 
+@pytest.mark.slow
 async def test_takes_of_a_day_walked_alike_are_one_visit_with_their_mean(clinic: Clinic) -> None:
     patient, _, _, _, fast = await walked(
         clinic,

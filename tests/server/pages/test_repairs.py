@@ -64,6 +64,7 @@ async def test_the_proposal_is_shown_and_holds_the_set_up_alone(clinic: Clinic) 
     assert find_hidden(await read(clinic, f"/sessions/{session}", "viewer"), "manifest") is None
 
 
+@pytest.mark.slow
 async def test_confirming_it_asks_for_an_analysis_and_the_earlier_set_up_can_be_asked_for_again(
     clinic: Clinic,
 ) -> None:

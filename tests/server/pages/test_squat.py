@@ -143,6 +143,7 @@ async def test_both_legs_are_side_by_side(clinic: Clinic, both: str) -> None:
     assert "no stride" not in paper
 
 
+@pytest.mark.slow
 async def test_the_sensitivity_is_a_tab_of_squats(clinic: Clinic, both: str) -> None:
     html = await page(clinic, f"/sessions/{both}")
     assert f'href="/sessions/{both}/sensitivity"' in html

@@ -21,6 +21,7 @@ pytestmark = pytest.mark.anyio
 NOW = dt.datetime(2026, 3, 14, 8, tzinfo=dt.UTC)
 
 
+@pytest.mark.slow
 async def test_backups_restore_test_parts_and_the_end_of_the_audit_log(tmp_path: Path) -> None:
     async with (
         open_clinic(tmp_path / "home", backup_dir=str(tmp_path / "disk")) as clinic,

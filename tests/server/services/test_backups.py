@@ -287,6 +287,7 @@ def test_a_file_that_is_swept_meanwhile_is_taken_from_the_trash_and_a_lost_one_i
     assert len(defects(again)) == 1
 
 
+@pytest.mark.slow
 @on_both_engines
 def test_what_is_damaged_or_cut_is_refused_and_nothing_is_put_in_place(
     clinic: Clinic, key: ClinicKey | None, tmp_path: Path

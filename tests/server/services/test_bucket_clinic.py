@@ -86,6 +86,7 @@ def test_what_nothing_refers_to_goes_to_the_trash_and_comes_back(clinic: Clinic,
     assert findings(clinic) == []
 
 
+@pytest.mark.slow
 def test_a_database_that_went_back_takes_no_file(clinic: Clinic, bucket: Bucket) -> None:  # noqa: F811
     with clinic.db.write() as c:
         c.execute(delete(recording_file))
@@ -178,6 +179,7 @@ def test_the_weekly_test_restores_what_was_in_the_bucket(clinic: Clinic, tmp_pat
     assert (state.test.ok, state.test.said) == (True, "1 patients, 1 visits, 1 files.")
 
 
+@pytest.mark.slow
 def test_a_restore_into_a_bucket_that_was_cut_off_is_made_again(
     clinic: Clinic,
     bucket: Bucket,  # noqa: F811

@@ -177,6 +177,7 @@ def half_fill(archive: Path, home: Settings, monkeypatch: pytest.MonkeyPatch) ->
             restore(archive, home, None)
 
 
+@pytest.mark.slow
 def test_a_restore_into_a_bucket_may_fail_again_and_again(
     clinic: Clinic, archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -289,6 +290,7 @@ def test_an_erasure_asks_the_bucket_while_others_may_write(
     assert bucket.objects() == set()
 
 
+@pytest.mark.slow
 def test_an_erasure_whose_database_goes_away_is_finished_later(
     clinic: Clinic,
     bucket: Bucket,  # noqa: F811

@@ -118,6 +118,7 @@ async def test_nothing_says_who_and_only_the_key_leads_back(
     assert _write(clinic, tmp_path / "none.zip", foreign, who=subject) == 1
 
 
+@pytest.mark.slow
 async def test_who_has_not_agreed_is_in_it_only_when_that_is_said(
     clinic: Clinic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

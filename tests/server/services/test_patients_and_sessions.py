@@ -203,6 +203,7 @@ def test_files_are_added_replaced_and_removed(clinic: Clinic) -> None:
         recordings.remove_file(c, clinic.who, session_id, "left 🦶.csv")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     ["", "/", "../a", "a/../b", "a\x00b", "a\nb", "x" * 501, "a\u202etxt.exe", "caf\ufffd.csv", "\u200ea"],

@@ -47,6 +47,7 @@ def rows(clinic: Clinic) -> list[str]:
         return list(c.execute(select(tables.edit.c.kind).order_by(tables.edit.c.seq)).scalars())
 
 
+@pytest.mark.slow
 async def test_undo_is_a_row_and_nothing_is_ever_rewritten(clinic: Clinic) -> None:
     session = session_of(clinic)
     make(clinic, session, MOVE)

@@ -57,6 +57,7 @@ def code_of(call: Callable[[], object]) -> str:
     return caught.value.code
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [b"", CONTENT, os.urandom(PUT_BYTES + 12_345)], ids=["0", "13", "8M"])
 def test_what_was_put_is_read_back_in_every_way(store: Store, content: bytes) -> None:
     blob = store.blobs.put(SPACE, content)

@@ -91,6 +91,7 @@ def test_an_older_database_is_known_also_after_it_has_grown_past_the_mark(
         assert "another database" in str(complaint(db, mark)) or "ends at row" in str(complaint(db, mark))
 
 
+@pytest.mark.slow
 def test_an_emptied_database_and_a_cut_end_are_known(db: Database, mark: Path, tmp_path: Path) -> None:
     write_rows(db, 4)
     raise_mark(db, mark)

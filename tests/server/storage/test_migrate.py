@@ -42,6 +42,7 @@ def downgrade():
 """
 
 
+@pytest.mark.slow
 def test_nobody_else_may_read_the_database_in_a_folder_that_was_there(tmp_path: Path) -> None:
     tmp_path.chmod(0o755)
     path = tmp_path / "sagittal.db"
@@ -263,6 +264,7 @@ def test_a_file_that_is_no_database_is_named(tmp_path: Path) -> None:
         migrate.upgrade(path)
 
 
+@pytest.mark.slow
 def test_a_server_whose_port_is_in_use_migrates_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -88,6 +88,7 @@ def ports_before() -> set[int]:
     return listening_ports()
 
 
+@pytest.mark.slow
 async def test_no_port_of_this_machine_gives_a_view_away(
     ports_before: set[int], ward: Ward, views_open: list[str]
 ) -> None:

@@ -46,6 +46,7 @@ async def ask(ws: ClientConnection, message: object) -> dict[str, object]:
     return answer
 
 
+@pytest.mark.slow
 async def test_replay_poses_the_figure_at_the_time_of_the_page(ward: Ward) -> None:
     headers = ward.cookie()
     async with replaying(ward, headers) as (ws, opened):

@@ -223,6 +223,7 @@ def test_the_smoother_gives_the_same_for_any_segment() -> None:
             np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-10, err_msg=f"{segment} {name}")
 
 
+@pytest.mark.slow
 def test_the_smoother_says_when_the_filter_is_through_and_not_before_it_broke() -> None:
     take, said = mixed_walk(), []
     inputs = take.inputs.part(400, 700)

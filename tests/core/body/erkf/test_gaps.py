@@ -54,6 +54,7 @@ def bridged_walk(segment: Segment, lost_s: float) -> tuple[float, float]:
     return float(np.sqrt(np.mean(off[lost, i] ** 2))), float(np.sqrt((off[after:] ** 2).mean(axis=0)).max())
 
 
+@pytest.mark.slow
 def test_a_short_loss_is_held_and_what_was_measured_stays() -> None:
     take, valid = mixed_walk(), gap("thigh_r", 2.0)
     acc, gyr = filled(valid)

@@ -75,6 +75,7 @@ def test_after_turning_everybody_still_faces_ahead_at_rest() -> None:
         assert degrees(float(apart[0])) < 1.0
 
 
+@pytest.mark.slow
 def test_nobody_walking_means_nothing_is_found() -> None:
     recording, _ = simulated("fast_with_turns", 3)
     calibrated = calibration.calibrate(recording)

@@ -113,6 +113,7 @@ def test_without_a_pelvis_exchanged_feet_shift_what_turns_show_and_nothing_is_sa
     assert -0.2 < finding(right("l7s_2i"), "inner_foot_m")[0] < -0.05
 
 
+@pytest.mark.slow
 def test_without_turn_and_pelvis_sides_are_not_measured() -> None:
     value, verdict = finding(right("l7s_2i", "comfortable"), "inner_foot_m")
     assert np.isnan(value)
@@ -230,6 +231,7 @@ def test_a_gap_of_half_a_second_of_a_foot_is_told_and_the_rest_stays_finite(esti
     assert again < 2150
 
 
+@pytest.mark.slow
 def test_a_gap_of_the_pelvis_is_bridged_by_the_feet() -> None:
     whole = right("l7s_3i")
     made = run(lost(take("l7s_3i"), "pelvis", 20.0, 20.5), "l7s_3i")
@@ -350,6 +352,7 @@ def test_a_protocol_in_which_the_pelvis_sinks_is_told(estimator: Estimator, prot
     assert "pelvis_height_assumed" in codes(made)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("depth_m", "verdict"), [(0.0, "good"), (0.3, "bad")])
 def test_a_squat_that_no_protocol_announced_is_told(depth_m: float, verdict: Verdict) -> None:
     recording = take("l7s_3i")

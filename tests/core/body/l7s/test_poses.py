@@ -172,6 +172,7 @@ def test_angles_and_strides_of_a_simulated_walk_are_within_the_limits(worn: Worn
     assert max(found.diagnostics["hinge_m"].values()) < 1e-4  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("worn", ["3I", "2I"])
 def test_the_share_of_straight_knees_does_not_depend_on_the_number_of_projections(worn: Worn) -> None:
     shares, excess = [], []
@@ -276,6 +277,7 @@ def test_a_foot_that_never_rests_is_told() -> None:
     assert "foot_never_still" in {n.code for n in found.notices}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "verdict"), [(0.19, "good"), (0.4, "warn"), (0.6, "bad")])
 def test_a_knee_that_mostly_rests_on_its_bound_is_no_measurement(share: float, verdict: str) -> None:
     made = poses_of("3I")

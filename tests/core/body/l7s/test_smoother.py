@@ -156,6 +156,7 @@ def test_places_are_nearer_the_truth_than_the_filters() -> None:
     assert after.std() < 0.75 * before.std()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("worn", ["3I", "2I"])
 def test_the_same_walk_backwards_in_the_world_and_moved_is_the_same(worn: Worn) -> None:
     inputs, track, model, _ = walk(worn)

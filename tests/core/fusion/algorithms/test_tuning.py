@@ -53,6 +53,7 @@ def tune(split: TrialSplit, stop_after: int | None = None, checkpoint: bytes | N
         return kept[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ALGORITHMS, ids=lambda a: a.name)
 @pytest.mark.parametrize("scheme", ["fixed", "two_levels", "three_levels"])
 def test_every_point_of_the_box_is_a_set_of_gains_that_its_class_takes(
