@@ -402,13 +402,9 @@ FIXED_WAITS: Final = frozenset(
         "tests/faults/test_backup_deaths.py::kill",
         "tests/server/live/sleepy_estimator.py::step",
         "tests/server/live/test_client.py::broken",
-        "tests/server/live/test_hub.py::test_a_crash_while_the_take_becomes_a_recording_is_repaired_at_the_next_start",
-        "tests/server/live/test_many_connections.py::test_connections_that_come_and_go_leave_no_descriptor_and_no_task",
-        "tests/server/live/test_tablet.py::test_commands_reach_the_tablet",
         "tests/server/processes/test_compiling.py::compile_slowly",
         "tests/server/viewer/test_live_watch.py::test_silence_makes_the_figure_grey_and_the_next_picture_gives_the_colours_back",
         "tests/server/viewer/test_proxy.py::test_a_page_may_load_the_client_while_its_view_is_being_opened",
-        "tests/server/viewer/test_views.py::test_views_leave_no_threads_and_no_files_behind",
         "tests/server/web_server/test_connection.py::test_a_body_that_we_are_slow_to_read_is_not_the_senders_fault",
         "tests/server/web_server/test_connection.py::test_streams_and_websockets_may_last",
     }

@@ -63,7 +63,9 @@ async def test_connections_that_come_and_go_leave_no_descriptor_and_no_task(
     async with visit(clinic, port) as v:
         for how in GOES:  # what is loaded or opened at the first time
             await come_and_go(v, how)
-        await asyncio.sleep(0.3)
+        async with asyncio.timeout(20):
+            while (await v.state())["tablet"] != "lost":
+                await asyncio.sleep(0.05)
         files, tasks = descriptors(), len(asyncio.all_tasks())
         for number in range(TIMES):
             await come_and_go(v, GOES[number % len(GOES)])

@@ -232,7 +232,9 @@ async def test_commands_reach_the_tablet(clinic: Clinic, port: int) -> None:
             await heard(ws, "welcome")
             await v.command("start")
             assert await heard(ws, "command") == {"type": "command", "command": "start"}
-        await asyncio.sleep(0.05)
+        async with asyncio.timeout(20):
+            while (await v.state())["tablet"] != "lost":
+                await asyncio.sleep(0.01)
         lost = await v.http.post(f"{v.api}/commands", json={"command": "stop"})
         assert (lost.status_code, lost.json()["code"]) == (409, "tablet_lost")
 
