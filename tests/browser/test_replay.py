@@ -18,7 +18,7 @@ from core.frames import SIDES
 from server.viewer.client import client_version
 from server.viewer.colours import TINTS
 from tests.browser import filling
-from tests.browser.conftest import DESK, PACED, REST, Filled, Opener, RunningServer, is_ours
+from tests.browser.conftest import DESK, PACED, REST, Filled, Opener, RunningServer
 from tests.browser.picture import wait_for_picture, wait_until_still
 from tests.data import data_folder
 from tests.server.viewer.seeing import pixels_of, shot
@@ -28,33 +28,30 @@ from tests.walks import NEURA
 @pytest.fixture(scope="module")
 def figure_page(
     solid: Browser, running: RunningServer, cookies: list[dict[str, str]], filled: Filled
-) -> Iterator[tuple[Page, list[str]]]:
-    """A session opened once, for software takes seconds until its figure stands; and its script errors."""
+) -> Iterator[Page]:
+    """A session opened once, for software takes seconds until its figure stands."""
     context = solid.new_context(base_url=running.url, viewport=DESK)
     context.add_cookies(cookies)  # type: ignore[arg-type]
     context.add_init_script(PACED)
-    page, said = context.new_page(), list[str]()
+    page = context.new_page()
     page.emulate_media(color_scheme="light")
-    page.on("pageerror", lambda e: said.append(str(e)) if is_ours(str(e)) else None)
     page.goto(f"/sessions/{filled.done}")
     _wait_until_drawn(page)
-    yield page, said
+    yield page
     context.close()
 
 
 @pytest.fixture
-def figure(figure_page: tuple[Page, list[str]]) -> Iterator[Page]:
+def figure(figure_page: Page) -> Iterator[Page]:
     """The same for one test, which leaves it as it was opened."""
-    page, said = figure_page
-    yield page
-    switched = page.locator("[data-switch][aria-pressed=false]")
+    yield figure_page
+    switched = figure_page.locator("[data-switch][aria-pressed=false]")
     while switched.count():
         switched.first.click()
-    page.get_by_label("Look from").select_option("near")
-    if page.locator("html[data-theme=dark]").count():
-        page.locator(".rail [data-theme-toggle]").click()
-    _seek(page, 0)
-    assert not said, said
+    figure_page.get_by_label("Look from").select_option("near")
+    if figure_page.locator("html[data-theme=dark]").count():
+        figure_page.locator(".rail [data-theme-toggle]").click()
+    _seek(figure_page, 0)
 
 
 def test_the_figure_has_two_legs_and_follows_the_clock(figure: Page) -> None:
