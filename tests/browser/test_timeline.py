@@ -10,6 +10,7 @@ from uuid import uuid4
 import pytest
 from playwright.sync_api import APIResponse, Browser, Locator, Page, Route, expect
 
+from server.report.svg import find_round_ticks
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
 from tests.browser.design import layout_faults, text_faults
@@ -313,6 +314,26 @@ def test_the_value_beside_a_lane_is_the_signals_own(
     found = re.search(r"L (-?[\d.]+)", text)
     assert found is not None
     assert min(near) - 0.6 <= float(found[1]) <= max(near) + 0.6
+
+
+def test_signals_have_round_ticks_by_the_rule_of_the_report(timeline: Page) -> None:
+    timeline.locator("[data-lane='0'] .tl-ticks span").first.wait_for()
+    for n in range(3):
+        lane = timeline.locator(f"[data-lane='{n}']")
+        expect(lane.locator(".tl-ticks span").nth(1)).to_be_visible()
+        texts = [t.replace("−", "-") for t in lane.locator(".tl-ticks span").all_inner_texts()]
+        ticks = [float(re.findall(r"^-?[\d.]+", t)[0]) for t in texts]
+        step = ticks[1] - ticks[0]
+        assert f"{step:e}"[:2] in ("1.", "2.", "5."), texts
+        assert all(abs(t / step - round(t / step)) < 1e-6 for t in ticks), texts
+    ranges = [(44.1, 61.4), (0.0, 0.6), (-0.3, 0.3), (995.0, 1005.0), (-180.0, 180.0), (0.0012, 0.0017)]
+    for low, high in ranges:
+        theirs = timeline.evaluate(
+            "async ([low, high]) => (await import('/static/js/common/ticks.js')).findRoundTicks(low, high)",
+            [low, high],
+        )
+        ticks, digits = find_round_ticks(low, high)
+        assert (theirs["ticks"], theirs["digits"]) == (pytest.approx(ticks), digits)
 
 
 def test_a_raw_signal_shows_its_three_axes(timeline: Page) -> None:
