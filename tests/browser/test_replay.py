@@ -209,6 +209,29 @@ def test_a_picture_of_the_figure_can_be_saved(figure: Page) -> None:
     found = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
     for side in SIDES:
         assert pixels_of(found, TINTS[False][side]).sum() > 200, side
+    assert _is_large(found, figure)
+
+
+def _is_large(picture: np.ndarray, page: Page) -> bool:
+    """Whether a picture has the pixels of print, and the shape of the frame, which has its size again."""
+    box = page.locator("gait-view iframe").bounding_box()
+    stage = page.locator("gait-view").bounding_box()
+    height, width = picture.shape[:2]
+    assert box is not None
+    assert stage is not None
+    assert (box["width"], box["height"]) == (stage["width"], stage["height"])
+    assert width / height == pytest.approx(box["width"] / box["height"], rel=0.01)
+    return width >= 1600
+
+
+def test_a_picture_saved_on_a_phone_is_as_large(opened: Opener, solid: Browser, filled: Filled) -> None:
+    page = opened(f"/sessions/{filled.done}", browser=solid, width=390, height=844)
+    _wait_until_drawn(page)
+    with page.expect_download(timeout=60_000) as waiting:
+        page.get_by_role("button", name="Save picture").click()
+    found = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
+    assert _is_large(found, page)
+    assert pixels_of(found, TINTS[False]["left"]).sum() > 2000
 
 
 EMPTY_AT_FIRST = """async () => {
