@@ -221,7 +221,7 @@ def _is_large(picture: np.ndarray, page: Page) -> bool:
     assert stage is not None
     assert (box["width"], box["height"]) == (stage["width"], stage["height"])
     assert width / height == pytest.approx(box["width"] / box["height"], rel=0.01)
-    return width >= 1600
+    return bool(width >= 1600)
 
 
 def test_a_picture_saved_on_a_phone_is_as_large(opened: Opener, solid: Browser, filled: Filled) -> None:
