@@ -73,11 +73,15 @@ class ReviewedStride:
 
 @dataclass(frozen=True)
 class Review:
-    """Events, strides and parameters of an analysis as they count now; `version` grows with every change."""
+    """Events, strides and parameters of an analysis as they count now.
+
+    `version` grows with every change; `redoable` is the number of undone edits that can be made again.
+    """
 
     analysis_id: str
     editable: bool
     version: int
+    redoable: int
     edits: list[EditAnswer]
     events: list[Event]
     strides: list[ReviewedStride]

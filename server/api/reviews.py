@@ -1,4 +1,4 @@
-"""Review of a session's analysis: events and strides as they count, edits, undo, the signals behind them."""
+"""Review of a session's analysis: events and strides as they count, edits, undo, redo, their signals."""
 
 from __future__ import annotations
 
@@ -63,6 +63,12 @@ def make_edit(
 def undo_edit(session_id: Id, db: Db, reviewed: Reviewed, who: Reviewer, seen: Seen = None) -> Response:
     """Undo the last edit that is not undone yet."""
     return _review(reviewed, *reviews.undo(db, who, session_id, seen=seen))
+
+
+@router.post("/edits/redo", response_model=None, responses=_REVIEW | refusals(409))
+def redo_edit(session_id: Id, db: Db, reviewed: Reviewed, who: Reviewer, seen: Seen = None) -> Response:
+    """Make the edit again that was undone last; a new edit ends what can be redone."""
+    return _review(reviewed, *reviews.redo(db, reviewed, who, session_id, seen=seen))
 
 
 @router.get("/events.csv", response_class=Response, responses=_CSV)
@@ -142,6 +148,7 @@ def _review(
         "analysis_id": found.id,
         "editable": reviewed.open(found).tracks is not None,
         "version": edits.version,
+        "redoable": len(edits.undone),
         "edits": [{"seq": m.seq, "by": m.by, "at": m.at.isoformat(), **m.edit.to_json()} for m in edits.made],
         "events": [
             {

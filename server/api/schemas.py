@@ -12,7 +12,7 @@ from core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
 from core.frames import Protocol
 from server.jobs.queue import JobView
 from server.report.behind import StrideValue
-from server.services import report_links
+from server.services import report_links, signed_reports
 from server.services.care_teams import REASON, EmergencyAccess, TeamMember
 from server.services.identities import MOST
 from server.services.notes import MOST_CHARACTERS
@@ -173,7 +173,9 @@ class PatientChange(PatientNew):
 class Assessment(Request):
     """The therapist's text on a report; empty or null = none."""
 
-    content: Note
+    content: Annotated[
+        Note, Field(description=f"at most {signed_reports.ASSESSMENT_CHARACTERS} characters, trimmed")
+    ]
 
 
 class Reopening(Request):

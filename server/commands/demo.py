@@ -59,7 +59,8 @@ def demo(port: int | None) -> int:
             start("server.demo.clinic")
             _report(settings.database_source)
             start("server.demo.live", address)
-            say("One of the patients is walking live now: the first in the list of patients.")
+            if _wait_for_live(settings.database_source, helpers[-1]):
+                say("One of the patients is walking live now: the first in the list of patients.")
 
         try:
             return run(settings, announce)
@@ -67,6 +68,20 @@ def demo(port: int | None) -> int:
             for process in helpers:
                 process.terminate()
                 process.wait()
+
+
+def _wait_for_live(database: Source, helper: subprocess.Popen[bytes]) -> bool:
+    """Wait until the walk of a helper streams; False when the helper ended before."""
+    from server.services import live
+
+    pause = threading.Event()
+    with closing(Database(database)) as db:
+        while helper.poll() is None:
+            with db.read() as c:
+                if any(take.state == "streaming" for take in live.list_running(c)):
+                    return True
+            pause.wait(0.2)
+    return False
 
 
 def _report(database: Source) -> None:

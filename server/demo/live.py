@@ -82,4 +82,5 @@ async def _until(stopped: asyncio.Event, batches: Sequence[DueBatch], speed: flo
 
 
 if __name__ == "__main__":
-    asyncio.run(stream_walk(sys.argv[1], open_take(load_settings()), plan_training().recording))
+    walk = plan_training().recording  # takes a while; the take opens when it can be streamed at once
+    asyncio.run(stream_walk(sys.argv[1], open_take(load_settings()), walk))

@@ -107,6 +107,7 @@ DEEDS: Final[Mapping[str, str]] = {
     "stride.left_out": "left a stride out",
     "stride.counted": "let a stride count",
     "edit.undone": "undid the last change by hand",
+    "edit.redone": "redid the last undone change by hand",
     "filters.requested": "asked for a comparison of filters",
     "filter_runs.opened": "listed the comparisons of filters",
     "filter_run.opened": "opened a comparison of filters",

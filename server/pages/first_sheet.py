@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import ceil
 from typing import Any, Final
 
-MOST_CHARACTERS: Final = 420
-"""Of the therapist's text beside the profile; a longer one has the width of the sheet."""
+from server.services.signed_reports import ASSESSMENT_CHARACTERS
 
 MOST_PARAGRAPHS: Final = 3
 MOST_BARS: Final = 6
@@ -41,7 +40,7 @@ def has_room_for_profile(report: Mapping[str, Any], assessment: str, note: str) 
     if report["trend"] is not None and (report["trend"].missing or report["trend"].later):
         noted += 1
     return (
-        len(assessment) <= MOST_CHARACTERS
+        len(assessment) <= ASSESSMENT_CHARACTERS  # of earlier versions are longer ones, over the whole width
         and assessment.strip().count("\n") < 2 * MOST_PARAGRAPHS
         and max(columns) + noted <= (MOST_LINES_COMPARED if report["since"] else MOST_LINES)
     )

@@ -25,7 +25,7 @@ from server.pages.prescription import make_card
 from server.pages.programme import view_programme
 from server.pages.shell import record_opening, render_page
 from server.pages.trends import draw_figures
-from server.pages.visit_state import judge_visit
+from server.pages.visit_state import describe_live, judge_visit
 from server.report.change_words import change_words
 from server.report.takes_chart import find_scale, takes_svg
 from server.report.trends import VisitKind
@@ -167,7 +167,7 @@ def list_visits(
     done : what is analysed, oldest first; empty for who may not see results. planned : session → the visit
         of a programme that it was.
     """
-    streaming = {take.session_id for take in live.list_streaming(c)}
+    takes_now = {take.session_id: describe_live(take) for take in live.list_running(c)}
     running = find_active_jobs(c, [patient_id], lambda j: j.session_id)
     found = {a.session.id: a for a in done}
     kinds = {key: v.kind for key, v in planned.items()}
@@ -186,8 +186,8 @@ def list_visits(
         takes = [
             {
                 **vars(m),
-                "href": f"/sessions/{m.id}{_find_page(m, live=m.id in streaming)}",
-                "live": m.id in streaming,
+                "href": f"/sessions/{m.id}{_find_page(m, live=m.id in takes_now)}",
+                "live": takes_now.get(m.id),
                 "analysed": m.id in found,
                 "job": running.get(m.id),
                 "status": judge_visit(reviewed, m, found[m.id].found if m.id in found else None, edits),

@@ -18,7 +18,7 @@ from server.auth.roles import Action
 from server.context import Db, Reviewed
 from server.pages.job_views import find_active_jobs, follow_few
 from server.pages.shell import record_listing, render_page
-from server.pages.visit_state import judge_visit
+from server.pages.visit_state import describe_live, judge_visit
 from server.pages.words import describe_person
 from server.report.change_words import change_words
 from server.services import analyses, care_teams, edit_log, live, patients, programmes, sessions, visits
@@ -73,7 +73,7 @@ def list_patients(
 ) -> list[dict[str, Any]]:
     """Rows of the patients list, each with the state of its latest visit; with `results`, of its data."""
     rows = []
-    streaming = {take.patient_id: take.session_id for take in live.list_streaming(c)}
+    takes = {take.patient_id: describe_live(take) for take in live.list_running(c)}
     newest = sessions.newest_of(c, [p.id for p in found])
     running = find_active_jobs(c, [p.id for p in found], lambda j: j.patient_id)
     today = now().date()
@@ -103,6 +103,6 @@ def list_patients(
             "check": last["kind"] in {"warn", "bad"},
         }
         row["kinds"] = [kind for kind, holds in kinds.items() if holds]
-        rows.append(view_patient(p) | row | {"live": streaming.get(p.id)})
+        rows.append(view_patient(p) | row | {"live": takes.get(p.id)})
     follow_few([row["job"] for row in rows])
     return rows

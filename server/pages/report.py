@@ -49,7 +49,11 @@ def show_desk(request: Request, db: Db, sid: Id, who: Reader) -> Response:
         context["links"] = report_links.of_session(c, sid)
         context["emergency"] = find_emergency(c, who, context["patient"].id)
     context["numbers"] = {r.id: r.number for r in context["versions"]}
-    context |= {"usual_days": report_links.USUAL_DAYS, "most_days": report_links.MOST_DAYS}
+    context |= {
+        "usual_days": report_links.USUAL_DAYS,
+        "most_days": report_links.MOST_DAYS,
+        "most_characters": signed_reports.ASSESSMENT_CHARACTERS,
+    }
     record_opening(request, who, "session", sid)
     return render_page(request, db, who, "report.html", "patients", **context)
 

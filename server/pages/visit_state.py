@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from server.services import analyses, edit_log, sessions
+from server.services import analyses, edit_log, live, sessions
 from server.services.reviewed import UNREADABLE, ReviewedAnalyses
 
 STATES: Final[Mapping[str, tuple[str, str]]] = {
@@ -16,6 +16,20 @@ STATES: Final[Mapping[str, tuple[str, str]]] = {
     "failed": ("bad", "Not analysable"),
 }
 """State of a session → shape and word."""
+
+
+LIVE_STATES: Final[Mapping[str, tuple[str, str]]] = {
+    "pairing": ("none", "Waiting for the tablet"),
+    "open": ("none", "Waiting for the tablet"),
+    "streaming": ("run", "Live now"),
+}
+"""State of a running live take → shape and word."""
+
+
+def describe_live(take: live.LiveTakeRecord) -> dict[str, str]:
+    """Session, shape and word of a running live take."""
+    kind, text = LIVE_STATES[take.state]
+    return {"session": take.session_id, "kind": kind, "text": text}
 
 
 def describe_state(state: str) -> dict[str, str]:

@@ -13,7 +13,7 @@ from core.parameters.catalogue import CATALOGUE
 from core.parameters.rows import Column
 from server.report.columns import reduce_to_plain
 from server.report.level import define_parameter
-from server.report.svg import KEY, make_label, make_time_labels
+from server.report.svg import KEY, find_round_ticks, make_label, make_time_labels
 from server.report.table import ParameterRow
 from server.report.wording import explain_exclusion, format_number
 
@@ -21,7 +21,6 @@ HEIGHT: Final = 220
 TOP, BOTTOM = 12, 24
 """Chart and its margins, px."""
 
-TICKS: Final = 5
 CSS: Final[dict[Side, tuple[str, float]]] = {"left": ("dl", 5.2), "right": ("dr", 4.6)}
 
 
@@ -111,9 +110,8 @@ def _chart(row: ParameterRow, values: Sequence[StrideValue], duration_s: float) 
     if row.norm_mean is not None and row.norm_sd is not None:
         top, foot = y(row.norm_mean + row.norm_sd), y(row.norm_mean - row.norm_sd)
         parts.append(f'<rect class="band" x="0" width="100%" y="{top:.1f}" height="{foot - top:.1f}"/>')
-    digits = max(CATALOGUE[row.name].digits, 1) if row.name in CATALOGUE else 2
-    for k in range(TICKS):
-        at = low + pad + (high - low - 2 * pad) * k / (TICKS - 1)
+    ticks, digits = find_round_ticks(low, high)
+    for at in ticks:
         parts.append(f'<line class="g" x1="0" x2="100%" y1="{y(at):.1f}" y2="{y(at):.1f}"/>')
         parts.append(make_label("0", y(at), format_number(at, digits), "", "end", dx=-7, dy=4))
     parts.append(make_time_labels(duration_s, HEIGHT, -6))

@@ -20,6 +20,8 @@ KEY: Final[dict[Side, str]] = {"left": "l", "right": "r"}
 
 TICKS: Final = 5
 """Round values on a value axis at most."""
+ROUNDING: Final = 1e-9
+"""Of a step: an end of the axis that is a multiple of it gets its tick."""
 
 BAR_MARKS: Final = (("right", "dr", 4.6), ("left", "dl", 5.2), ("both", "ptf", 5.0))
 """Marks of a bar from back to front: a ring, a disc, a disc in ink; CSS class and radius in px."""
@@ -40,12 +42,15 @@ def make_label(x: str, y: float, text: str, css: str, anchor: str, dx: int = 0, 
 
 
 def find_round_ticks(low: float, high: float) -> tuple[list[float], int]:
-    """Return round values inside an axis, at most about TICKS, and the decimals they need."""
+    """Return the multiples of 1, 2 or 5 · 10ⁿ on an axis, at most about TICKS, and the decimals they need.
+
+    `web/static/js/common/ticks.js` is the same for what browsers draw.
+    """
     raw = (high - low) / TICKS
     power = 10.0 ** math.floor(math.log10(raw))
     step = next(f * power for f in (1, 2, 5, 10) if f * power >= raw)
-    ticks = [step * i for i in range(math.ceil(low / step), math.floor(high / step) + 1)]
-    return ticks, max(0, -math.floor(math.log10(step) + 1e-9))
+    first, last = math.ceil(low / step - ROUNDING), math.floor(high / step + ROUNDING)
+    return [step * i for i in range(first, last + 1)], max(0, -math.floor(math.log10(step) + ROUNDING))
 
 
 def make_time_labels(duration_s: float, y: float, dy: int) -> str:

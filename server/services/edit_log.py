@@ -1,4 +1,8 @@
-"""The edits of an analysis: rows that are only added to; undoing one adds a row too."""
+"""The edits of an analysis: rows that are only added to; undoing one adds a row too.
+
+Making the edit again that was undone last is a redo: what was undone before it can still be redone. Any other
+edit ends that.
+"""
 
 from __future__ import annotations
 
@@ -35,11 +39,13 @@ class EditHistory:
     ----------
     version : number of the last row, undone ones included; 0 = nothing was ever changed.
     changed_at : of that row, None = nothing was ever changed.
+    undone : edits that can be redone, the next one last.
     """
 
     version: int = 0
     made: tuple[MadeEdit, ...] = ()
     changed_at: dt.datetime | None = None
+    undone: tuple[Edit, ...] = ()
 
     @property
     def edits(self) -> tuple[Edit, ...]:
@@ -72,14 +78,22 @@ _OF_ALL: Final = (
 def edits_of_all(c: Connection, analysis_ids: Collection[str]) -> dict[str, EditHistory]:
     """The live edits of many analyses by analysis, in one statement."""
     made: dict[str, list[MadeEdit]] = {found: [] for found in analysis_ids}
+    undone: dict[str, list[Edit]] = {found: [] for found in made}
     version = dict.fromkeys(made, 0)
     changed_at: dict[str, dt.datetime] = {}
     for row in c.execute(_OF_ALL, {"analysis_ids": list(made)}) if made else ():
         version[row.analysis_id], changed_at[row.analysis_id] = row.seq, row.at
+        live, stack = made[row.analysis_id], undone[row.analysis_id]
         if row.kind == UNDO:
-            made[row.analysis_id].pop()
+            stack.append(live.pop().edit)
+            continue
+        edit = read_edit(row.content)
+        if stack and stack[-1] == edit:
+            stack.pop()
         else:
-            made[row.analysis_id].append(MadeEdit(row.seq, read_edit(row.content), row.display_name, row.at))
+            stack.clear()
+        live.append(MadeEdit(row.seq, edit, row.display_name, row.at))
     return {
-        found: EditHistory(version[found], tuple(live), changed_at.get(found)) for found, live in made.items()
+        found: EditHistory(version[found], tuple(live), changed_at.get(found), tuple(undone[found]))
+        for found, live in made.items()
     }

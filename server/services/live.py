@@ -320,9 +320,14 @@ def require_open(c: Connection, session_id: str) -> LiveTakeRecord:
     return this
 
 
-def list_streaming(c: Connection) -> list[LiveTakeRecord]:
-    """All takes into which samples come now."""
-    rows = c.execute(_QUERY.where(live_take.c.state == "streaming").order_by(live_take.c.created_at))
+def list_running(c: Connection) -> list[LiveTakeRecord]:
+    """All takes that receive samples or may at any moment, those that receive them last.
+
+    One whose code expired before a tablet paired is not among them.
+    """
+    waiting = (live_take.c.state == "pairing") & (live_take.c.code_expires_at > now())
+    query = _QUERY.where(live_take.c.state.in_(("open", "streaming")) | waiting)
+    rows = c.execute(query.order_by(live_take.c.state == "streaming", live_take.c.created_at))
     return [LiveTakeRecord(**row._asdict()) for row in rows]
 
 

@@ -29,6 +29,8 @@ ACTIONS: Final = {
     UNDO: "edit.undone",
 }
 """Kind of a row → its action in the audit trail."""
+REDONE: Final = "edit.redone"
+"""Action of an undone edit that is made again."""
 
 
 def make(
@@ -51,14 +53,7 @@ def make(
     NotFound: no analysis. Conflict: edited_meanwhile, no_tracks. ParameterError of core.events.edits.
     """
     found, before = _state(db, session_id, seen)
-    # measured before the lock is taken: what cannot be is refused, and nobody waits for it
-    result = reviewed.measure_anew(found, (*before.edits, edit))
-    with db.write() as c:
-        _refuse_older(c, found, before)
-        _append(c, actor, session_id, found, edit.kind, edit.to_json())
-        after = edits_of(c, found.id)
-    reviewed.keep_result(found, after, result)
-    return found, after
+    return found, _make(db, reviewed, actor, session_id, found, before, edit, ACTIONS[edit.kind])
 
 
 def undo(
@@ -70,8 +65,43 @@ def undo(
         raise Conflict("nothing_to_undo", "Nothing has been changed in this analysis.")
     with db.write() as c:
         _refuse_older(c, found, before)
-        _append(c, actor, session_id, found, UNDO, {})
+        _append(c, actor, session_id, found, UNDO, {}, ACTIONS[UNDO])
         return found, edits_of(c, found.id)
+
+
+def redo(
+    db: Database,
+    reviewed: ReviewedAnalyses,
+    actor: audit.Actor | None,
+    session_id: str,
+    *,
+    seen: int | None = None,
+) -> tuple[analyses.AnalysisRecord, EditHistory]:
+    """Make the last undone edit again; raises NotFound, Conflict nothing_to_redo, edited_meanwhile."""
+    found, before = _state(db, session_id, seen)
+    if not before.undone:
+        raise Conflict("nothing_to_redo", "There is no undone change in this analysis.")
+    return found, _make(db, reviewed, actor, session_id, found, before, before.undone[-1], REDONE)
+
+
+def _make(
+    db: Database,
+    reviewed: ReviewedAnalyses,
+    actor: audit.Actor | None,
+    session_id: str,
+    found: analyses.AnalysisRecord,
+    before: EditHistory,
+    edit: Edit,
+    action: str,
+) -> EditHistory:
+    # measured before the lock is taken: what cannot be is refused, and nobody waits for it
+    result = reviewed.measure_anew(found, (*before.edits, edit))
+    with db.write() as c:
+        _refuse_older(c, found, before)
+        _append(c, actor, session_id, found, edit.kind, edit.to_json(), action)
+        after = edits_of(c, found.id)
+    reviewed.keep_result(found, after, result)
+    return after
 
 
 def _state(db: Database, session_id: str, seen: int | None) -> tuple[analyses.AnalysisRecord, EditHistory]:
@@ -102,6 +132,7 @@ def _append(
     found: analyses.AnalysisRecord,
     kind: str,
     content: dict[str, Any],
+    action: str,
 ) -> None:
     values = {
         "analysis_id": found.id,
@@ -113,4 +144,4 @@ def _append(
     c.execute(insert(rows).values(values))
     # the reason is free text and stays out of a trail that outlives an erasure
     said = {k: v for k, v in content.items() if k != "reason"}
-    audit.record(c, actor, ACTIONS[kind], "session", session_id, {"analysis_id": found.id, **said})
+    audit.record(c, actor, action, "session", session_id, {"analysis_id": found.id, **said})

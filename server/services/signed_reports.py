@@ -23,6 +23,9 @@ from server.storage.report_tables import assessment, report_file, signed_report
 from server.storage.tables import now, session
 
 MOST_CHARACTERS: Final = 10_000
+"""Of the reason to reopen a report."""
+ASSESSMENT_CHARACTERS: Final = 420
+"""Of the therapist's text, as many as fit on the first sheet beside the profile."""
 
 DOCUMENT: Final = "report.html"
 PSEUDONYMISED: Final = "shared.html"
@@ -103,12 +106,16 @@ def read_assessment(c: Connection, session_id: str) -> str:
 
 
 def write_assessment(c: Connection, actor: audit.Actor | None, session_id: str, content: str) -> None:
-    """Write the therapist's text; raises NotFound, Conflict report_signed, ServiceError bad_value."""
+    """Write the therapist's text; raises NotFound, Conflict report_signed, ServiceError text_too_long."""
     sessions.get(c, session_id)
     require_open(c, session_id)
     text = content.strip()
-    if len(text) > MOST_CHARACTERS:
-        raise ServiceError("bad_value", f"An assessment has at most {MOST_CHARACTERS:,} characters.")
+    if len(text) > ASSESSMENT_CHARACTERS:
+        raise ServiceError(
+            "text_too_long",
+            f"The assessment has {len(text)} characters; at most {ASSESSMENT_CHARACTERS} fit. "
+            "Nothing was changed.",
+        )
     c.execute(delete(assessment).where(assessment.c.session_id == session_id))
     if text:
         c.execute(insert(assessment).values(session_id=session_id, content=text, changed_at=now()))

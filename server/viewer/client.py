@@ -47,7 +47,22 @@ _BEGIN = """<script>{
   };
 }</script>"""
 """Before viser's scripts. The page is the same for all views; its client asks for the pipe at its address and
-is dark at once if the hash says so. Of what is drawn in copies (batches.py) the figure is first."""
+is dark at once if the hash says so. Of what is drawn in copies (batches.py) the figure is first.
+"""
+
+_QUIET = """<script>{
+  const load = window.fetch;
+  window.fetch = (what, ...more) =>
+    String(what).startsWith("data:application/wasm") ? new Promise(() => {}) : load(what, ...more);
+  const warn = console.warn;
+  console.warn = (...all) => String(all[0]).startsWith("THREE.Clock:") || warn(...all);
+}</script>"""
+"""Before viser's scripts: what they need not do here, and would log errors or warnings for.
+
+The client loads a WebAssembly module that sorts Gaussian splats, whose bindings (Emscripten's embind) call
+`Function` on strings. We show no splats: the module is never loaded, so the policy of the page need not allow
+`unsafe-eval`, and nothing is refused. The deprecation of `THREE.Clock` concerns viser's developers only.
+"""
 
 _PACKED = re.compile(r'<script data-p="([^"]*)" data-ss="(\d+)" data-cs="(\d+)">')
 _BOOT = re.compile(
@@ -68,11 +83,20 @@ _packing = threading.Lock()
 def client_page() -> str:
     """Viser's client page from its wheel, without the control panel, which has no switch of its own."""
     page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
-    head, found, body = page.partition("</head>")
-    start, opened, scripts = head.partition("<head>")
-    if not (found and opened):
+    return _add_to_head(page, _BEGIN + _QUIET, _HIDE_PANEL)
+
+
+def silence(page: str) -> str:
+    """A page of viser's client that logs no errors or warnings about features Sagittal does not use."""
+    return _add_to_head(page, _QUIET, "")
+
+
+def _add_to_head(page: str, first: str, last: str) -> str:
+    start, opened, rest = page.partition("<head>")
+    head, closed, body = rest.partition("</head>")
+    if not (opened and closed):
         raise RuntimeError("viser's client page has no head; this version of viser is not supported.")
-    return f"{start}{opened}{_BEGIN}{scripts}{_HIDE_PANEL}{found}{body}"
+    return f"{start}{opened}{first}{head}{last}{closed}{body}"
 
 
 @functools.cache

@@ -30,6 +30,7 @@ def write_walk(content: ExportContent) -> bytes:
 def record_walk(poses: Poses) -> bytes:
     """Draw a walk moment by moment, followed from the right, with footprints and trails."""
     # a worker that draws nothing does without viser
+    from server.viewer.client import silence
     from server.viewer.motion import prepare_motion
     from server.viewer.replay_figure import ReplayFigure
     from server.viewer.scene_server import start_scene_server, stop_scene_server
@@ -45,7 +46,7 @@ def record_walk(poses: Poses) -> bytes:
         page: str = recorded.as_html()
     finally:
         stop_scene_server(server)
-    return page.replace(*TITLE, 1).encode()
+    return silence(page.replace(*TITLE, 1)).encode()
 
 
 DRAWN["walk"] = write_walk

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,6 +39,7 @@ from server.storage.field_cipher import make_keys
 from server.storage.migrate import upgrade
 from server.storage.tables import device_check, job
 from tests.browser import filling
+from tests.browser.console import Console
 from tests.data import ROOT
 from tests.helpers.kept import keep_served
 
@@ -199,19 +200,42 @@ def playwright_() -> Iterator[Playwright]:
 
 
 @pytest.fixture(scope="session")
-def flat(playwright_: Playwright) -> Iterator[Browser]:
-    """Chromium without 3D."""
-    browser = playwright_.chromium.launch(executable_path=CHROMIUM, args=FLAT)
-    yield browser
-    browser.close()
+def console() -> Console:
+    """What the consoles of all pages of all tests say."""
+    return Console()
+
+
+@pytest.fixture(autouse=True)
+def quiet_console(console: Console) -> Iterator[None]:
+    """A test fails when a page logs an unexpected error or warning, or throws what nobody catches."""
+    yield
+    messages = console.take()
+    assert not messages, messages
+
+
+Launcher = Callable[[Sequence[str]], Browser]
 
 
 @pytest.fixture(scope="session")
-def solid(playwright_: Playwright) -> Iterator[Browser]:
+def launch(playwright_: Playwright, console: Console) -> Launcher:
+    """Starts Chromium with these flags, its consoles watched."""
+    return lambda flags: console.watch(
+        playwright_.chromium.launch(executable_path=CHROMIUM, args=list(flags))
+    )
+
+
+@pytest.fixture(scope="session")
+def flat(launch: Launcher) -> Iterator[Browser]:
+    """Chromium without 3D."""
+    with launch(FLAT) as browser:
+        yield browser
+
+
+@pytest.fixture(scope="session")
+def solid(launch: Launcher) -> Iterator[Browser]:
     """Chromium with software WebGL."""
-    browser = playwright_.chromium.launch(executable_path=CHROMIUM, args=SOLID)
-    yield browser
-    browser.close()
+    with launch(SOLID) as browser:
+        yield browser
 
 
 @pytest.fixture
@@ -307,18 +331,12 @@ def at_rest(running: RunningServer) -> None:
 
 
 @pytest.fixture
-def opened(flat: Browser, kept: KeptContexts, at_rest: None) -> Iterator[Opener]:
-    """Opens pages; a script error or a refused style fails the test at its end.
+def opened(flat: Browser, kept: KeptContexts, at_rest: None) -> Opener:
+    """Opens pages.
 
     A page that `stays` is the one that is always in the context: a new one costs a quarter of a second of
     processor time. It is for tests that leave no listener, route or script on it, and do not close it.
     """
-    said: list[str] = []
-    heard: list[tuple[Page, str, Callable[..., None]]] = []
-
-    def hear(page: Page, event: str, listener: Callable[..., None]) -> None:
-        page.on(event, listener)  # type: ignore[call-overload]
-        heard.append((page, event, listener))
 
     def open_(
         path: str,
@@ -337,29 +355,12 @@ def opened(flat: Browser, kept: KeptContexts, at_rest: None) -> Iterator[Opener]
         page.set_viewport_size({"width": width, "height": height})
         page.emulate_media(color_scheme=scheme, reduced_motion="null", media="null")  # type: ignore[arg-type]
         page.mouse.move(0, 0)
-        hear(page, "pageerror", lambda e: said.append(f"{path}: {e}") if is_ours(str(e)) else None)
-        hear(
-            page, "console", lambda m: said.append(f"{path}: {m.text}") if _matters(m.type, m.text) else None
-        )
         page.goto(path)
         # what plays the figure begins once the page has been seen, which may be after it is loaded
         page.wait_for_function("() => !document.querySelector('time-bar:not(:defined)')")
         return page
 
-    yield open_
-    for page, event, listener in heard:
-        page.remove_listener(event, listener)
-    assert not said, said
-
-
-def _matters(kind: str, text: str) -> bool:
-    # a 4xx that a test provokes is printed by the browser as an error; the page itself says it in words
-    return kind == "error" and "Failed to load resource" not in text and is_ours(text)
-
-
-def is_ours(text: str) -> bool:
-    # viser's client tries `new Function` once; its own document's policy refuses that, and it goes on without
-    return "unsafe-eval" not in text
+    return open_
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ from typing import Any
 
 import httpx
 import pytest
-from playwright.sync_api import Browser, Page, Playwright, expect
+from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.capturing import Clinic, choose, clinic, network, pair, place, start, tablet, walk_files
-from tests.browser.conftest import CHROMIUM, FLAT, Opener, RunningServer
+from tests.browser.conftest import FLAT, Launcher, Opener, RunningServer
 from tests.browser.design import layout_faults, text_faults
 from tests.browser.network import Network
 from tests.browser.test_upload import SEGMENTS
@@ -26,12 +26,10 @@ CAMERA = "document.querySelector('capture-page').camera"
 
 
 @pytest.fixture(scope="module")
-def filming(playwright_: Playwright) -> Iterator[Browser]:
+def filming(launch: Launcher) -> Iterator[Browser]:
     """Chromium with a camera that is not real, and a person who allows it."""
-    args = [*FLAT, *FAKE, "--use-fake-ui-for-media-stream"]
-    browser = playwright_.chromium.launch(executable_path=CHROMIUM, args=args)
-    yield browser
-    browser.close()
+    with launch([*FLAT, *FAKE, "--use-fake-ui-for-media-stream"]) as browser:
+        yield browser
 
 
 def agree(page: Page) -> None:
@@ -133,11 +131,9 @@ def test_a_page_loaded_again_keeps_what_was_filmed_and_says_nothing_of_it_is_los
 
 
 def test_a_refused_camera_is_said_and_disturbs_nothing(
-    playwright_: Playwright, running: RunningServer, clinic: Clinic
+    launch: Launcher, running: RunningServer, clinic: Clinic
 ) -> None:
-    browser = playwright_.chromium.launch(
-        executable_path=CHROMIUM, args=[*FLAT, *FAKE, "--deny-permission-prompts"]
-    )
+    browser = launch([*FLAT, *FAKE, "--deny-permission-prompts"])
     with tablet(browser, running) as page:
         pair(page, clinic.code)
         page.get_by_label(re.compile("the person agreed to be filmed")).click()

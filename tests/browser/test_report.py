@@ -14,8 +14,8 @@ def test_a_report_is_signed_shared_by_a_slip_with_a_code_and_reopened(opened: Op
     page = opened(f"/sessions/{filled.done}/print")
     page.get_by_role("link", name="Sign, share").click()
     page.get_by_label("Assessment of the therapist").last.fill("Longer steps.\n\nPlan: go on.")
-    with page.expect_navigation():
-        page.get_by_role("button", name="Save the text").click()
+    page.get_by_role("button", name="Save the text").click()
+    expect(page.get_by_role("status").filter(has_text="Saved")).to_be_visible()
     page.get_by_role("button", name="Sign", exact=True).click()
     with page.expect_navigation():
         page.get_by_role("button", name="Sign and lock").click()
@@ -51,3 +51,44 @@ def test_a_report_is_signed_shared_by_a_slip_with_a_code_and_reopened(opened: Op
     with page.expect_navigation():
         page.get_by_role("dialog").get_by_role("button", name="Reopen").click()
     expect(page.get_by_role("button", name="Save the text")).to_be_visible()
+
+
+@pytest.mark.parametrize("width", [1280, 360])
+def test_an_assessment_that_does_not_fit_is_neither_cut_nor_saved(
+    opened: Opener, filled: Filled, width: int
+) -> None:
+    page = opened(f"/sessions/{filled.earlier}/report", width=width)
+    text = page.locator("#f-content")
+    room, save = page.locator("[data-left]").first, page.get_by_role("button", name="Save the text")
+    saved = page.locator("[data-saved]")
+    sent: list[str] = []
+    page.on("request", lambda r: sent.append(r.url) if r.method == "PUT" else None)
+    text.fill("Kurz.")
+    expect(room).to_have_text("415 characters left")
+    text.fill("")
+    text.focus()
+    page.keyboard.insert_text("Longer steps. " * 31)  # as a paste
+    long = text.input_value()
+    assert len(long) == 434
+    expect(room).to_have_text("14 characters too long")
+    assert not layout_faults(page) | text_faults(page)
+    save.click()
+    expect(text).to_have_js_property("validationMessage", "The text is too long: at most 420 characters fit.")
+    expect(text).to_be_focused()
+    assert (text.input_value(), sent) == (long, [])
+    # a page of before an update asks the server, which refuses, too
+    text.evaluate("(t) => { t.setCustomValidity(''); t.form.noValidate = true; }")
+    save.click()
+    expect(page.get_by_role("alert")).to_contain_text("The assessment has 433 characters; at most 420 fit.")
+    expect(text).to_have_value(long)
+    expect(saved).to_have_text("")
+    text.fill(long[:420])
+    expect(room).to_have_text("0 characters left")
+    save.click()
+    expect(saved).to_have_text("Saved")
+    expect(page.get_by_role("alert").first).to_be_hidden()
+    page.reload()  # without a question
+    expect(text).to_have_value(long[:420].rstrip())
+    text.press("End")
+    text.press_sequentially("!")
+    expect(saved).to_have_text("")

@@ -10,6 +10,7 @@ from uuid import uuid4
 import pytest
 from playwright.sync_api import APIResponse, Browser, Locator, Page, Route, expect
 
+from server.report.svg import find_round_ticks
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
 from tests.browser.design import layout_faults, text_faults
@@ -213,6 +214,85 @@ def test_keys_alone_delete_an_event_and_bring_it_back(
     dialog.get_by_role("button", name="Cancel").click()
 
 
+def test_undone_changes_are_redone_by_keys_and_button_until_there_is_a_new_one(
+    timeline: Page, running: RunningServer, walked: str
+) -> None:
+    def edits() -> list[tuple[str, float]]:
+        return [(e["kind"], e["to_s"]) for e in review(running, walked)["edits"]]
+
+    redo = timeline.locator("[data-redo]")
+    handle(timeline, "ic").focus()
+    for presses in (3, 2):
+        for _ in range(presses):
+            timeline.keyboard.press("ArrowRight")
+        timeline.keyboard.press("Enter")
+        expect(timeline.locator("[data-edit-count]")).to_have_text("1" if presses == 3 else "2")
+    both, after = edits(), numbers(timeline)
+    expect(redo).to_be_disabled()
+    timeline.keyboard.press("Control+Shift+Z")  # nothing was undone
+    expect(timeline.locator("[data-said]")).to_contain_text("left contact moved")
+    assert edits() == both
+    for again in ("Control+Shift+Z", "Control+Shift+z", "Control+y", "Meta+Shift+Z", "button"):
+        timeline.keyboard.press("Control+z")
+        done(timeline, "undone")
+        expect(redo).to_be_enabled()
+        assert edits() == both[:1]
+        if again == "button":
+            redo.click()
+        else:
+            timeline.keyboard.press(again)
+        done(timeline, "redone")
+        assert edits() == both
+        assert numbers(timeline) == after
+    for _ in range(2):
+        timeline.locator("[data-undo]").click()
+        expect(timeline.locator("take-timeline")).to_have_attribute("aria-busy", "false")
+    expect(timeline.locator("[data-undo]")).to_be_disabled()
+    redo.click()
+    done(timeline, "redone")
+    drag(timeline, handle(timeline, "tc", side="right"), 12)
+    done(timeline, "right foot-off moved")
+    expect(redo).to_be_disabled()
+    assert [kind for kind, _ in edits()] == ["move_event"] * 2
+
+
+def test_key_presses_that_were_undone_as_one_are_redone_as_one(
+    timeline: Page, running: RunningServer, walked: str
+) -> None:
+    event = handle(timeline, "ic")
+    event.focus()
+    was = float(event.get_attribute("aria-valuenow") or 0)
+    for _ in range(3):
+        timeline.keyboard.press("ArrowRight")
+    timeline.keyboard.press("Control+z")
+    expect(timeline.locator(".ev.held")).to_have_count(0)
+    assert review(running, walked)["edits"] == []
+    expect(timeline.locator("[data-redo]")).to_be_enabled()
+    timeline.keyboard.press("Control+Shift+Z")
+    done(timeline, "left contact moved")
+    (edit,) = review(running, walked)["edits"]
+    assert edit["to_s"] == pytest.approx(was + 0.03, abs=0.002)
+
+
+def test_a_redo_is_refused_when_somebody_else_changed_something(
+    timeline: Page, running: RunningServer, walked: str
+) -> None:
+    drag(timeline, handle(timeline, "tc"), 12)
+    done(timeline, "left foot-off moved")
+    timeline.keyboard.press("Control+z")
+    done(timeline, "undone")
+    stride = next(s for s in review(running, walked)["strides"] if s["excluded_by"] is None)
+    moment = (stride["start_s"] + stride["end_s"]) / 2
+    body = {"kind": "exclude_stride", "side": stride["side"], "time_s": moment, "reason": "by a colleague"}
+    with running.client() as client:
+        client.post(f"/api/v1/sessions/{walked}/edits", json=body).raise_for_status()
+    timeline.keyboard.press("Control+Shift+Z")
+    expect(timeline.locator("[data-problem]")).to_contain_text("Somebody else has changed")
+    expect(timeline.locator("[data-edits]")).to_contain_text("by a colleague")
+    expect(timeline.locator("[data-redo]")).to_be_disabled()
+    assert len(review(running, walked)["edits"]) == 1
+
+
 def test_an_event_is_added_where_the_cursor_is(timeline: Page, running: RunningServer, walked: str) -> None:
     event = handle(timeline, "tc")
     event.focus()
@@ -314,6 +394,26 @@ def test_the_value_beside_a_lane_is_the_signals_own(
     found = re.search(r"L (-?[\d.]+)", text)
     assert found is not None
     assert min(near) - 0.6 <= float(found[1]) <= max(near) + 0.6
+
+
+def test_signals_have_round_ticks_by_the_rule_of_the_report(timeline: Page) -> None:
+    timeline.locator("[data-lane='0'] .tl-ticks span").first.wait_for()
+    for n in range(3):
+        lane = timeline.locator(f"[data-lane='{n}']")
+        expect(lane.locator(".tl-ticks span").nth(1)).to_be_visible()
+        texts = [t.replace("−", "-") for t in lane.locator(".tl-ticks span").all_inner_texts()]
+        ticks = [float(re.findall(r"^-?[\d.]+", t)[0]) for t in texts]
+        step = ticks[1] - ticks[0]
+        assert f"{step:e}"[:2] in ("1.", "2.", "5."), texts
+        assert all(abs(t / step - round(t / step)) < 1e-6 for t in ticks), texts
+    ranges = [(44.1, 61.4), (0.0, 0.6), (-0.3, 0.3), (995.0, 1005.0), (-180.0, 180.0), (0.0012, 0.0017)]
+    for low, high in ranges:
+        theirs = timeline.evaluate(
+            "async ([low, high]) => (await import('/static/js/common/ticks.js')).findRoundTicks(low, high)",
+            [low, high],
+        )
+        ticks, digits = find_round_ticks(low, high)
+        assert (theirs["ticks"], theirs["digits"]) == (pytest.approx(ticks), digits)
 
 
 def test_a_raw_signal_shows_its_three_axes(timeline: Page) -> None:

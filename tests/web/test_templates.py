@@ -40,6 +40,14 @@ def test_a_template_can_be_read(path: Path) -> None:
         assert len(BLOCK.findall(line)) <= 2, f"line {number} has several elements: {line.strip()}"
 
 
+@pytest.mark.parametrize("path", TEMPLATES, ids=lambda p: p.name)
+def test_a_text_of_many_lines_has_a_limit_that_cuts_nothing(path: Path) -> None:
+    """With `maxlength` a browser drops the end of what is pasted; `data-limit` counts, and keeps it."""
+    for area in re.findall(r"<textarea\b.*?>", path.read_text(), re.DOTALL):
+        assert "data-limit=" in area, area
+        assert "maxlength=" not in area, area
+
+
 def test_every_part_is_used() -> None:
     text = "\n".join(path.read_text() for path in TEMPLATES)
     unused = [p.name for p in TEMPLATES if p.name.startswith("_") and f'"{p.name}"' not in text]

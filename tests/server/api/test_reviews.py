@@ -89,6 +89,29 @@ async def test_undo_gives_back_exactly_what_was_there(clinic: Clinic, path: str)
     assert (none["edits"], refused.status_code, refused.json()["code"]) == ([], 409, "nothing_to_undo")
 
 
+async def test_redo_makes_again_what_was_undone_until_there_is_a_new_edit(clinic: Clinic, path: str) -> None:
+    async with clinic.client("clinician") as client:
+
+        async def redo() -> httpx.Response:
+            return await client.post(f"{path}/edits/redo")
+
+        assert (await redo()).json()["code"] == "nothing_to_redo"
+        one = (await client.post(f"{path}/edits", json=move())).json()
+        both = (await client.post(f"{path}/edits", json=LEAVE_OUT)).json()
+        for left in (1, 2):
+            assert (await client.delete(f"{path}/edits")).json()["redoable"] == left
+        again = [(await redo()).json() for _ in range(2)]
+        assert [r["redoable"] for r in again] == [1, 0]
+        for name in ("events", "strides", "parameters"):
+            assert [r[name] for r in again] == [one[name], both[name]]
+        assert (await redo()).status_code == 409
+        await client.delete(f"{path}/edits")
+        new = await client.post(f"{path}/edits", json={**LEAVE_OUT, "reason": "turned"})
+        assert (new.status_code, new.json()["redoable"]) == (201, 0)
+        refused = await redo()
+    assert (refused.status_code, refused.json()["code"]) == (409, "nothing_to_redo")
+
+
 async def test_an_undone_state_and_another_edit_are_not_confused(clinic: Clinic, path: str) -> None:
     async with clinic.client("clinician") as client:
         one = (await client.post(f"{path}/edits", json=move(0.04))).json()
@@ -170,9 +193,11 @@ async def test_who_decided_on_an_older_state_is_told(clinic: Clinic, path: str) 
         first = await client.post(f"{path}/edits", params={"seen": 0}, json=move())
         late = await client.post(f"{path}/edits", params={"seen": 0}, json=LEAVE_OUT)
         undo = await client.delete(f"{path}/edits", params={"seen": 0})
+        redo = await client.post(f"{path}/edits/redo", params={"seen": 0})
         now = await client.post(f"{path}/edits", params={"seen": first.json()["version"]}, json=LEAVE_OUT)
     assert (late.status_code, late.json()["code"]) == (409, "edited_meanwhile")
-    assert (undo.status_code, undo.json()["code"]) == (409, "edited_meanwhile")
+    for refused in (undo, redo):
+        assert (refused.status_code, refused.json()["code"]) == (409, "edited_meanwhile")
     assert now.status_code == 201
 
 
@@ -182,15 +207,17 @@ async def test_only_clinicians_change_and_only_readers_see(clinic: Clinic, path:
             assert (await client.get(f"{path}/edits")).status_code == read
             assert (await client.get(f"{path}/signals")).status_code == read
             assert (await client.post(f"{path}/edits", json=move())).status_code == write
+            assert (await client.post(f"{path}/edits/redo")).status_code == (403 if write == 403 else 409)
 
 
 async def test_every_change_is_audited_without_the_reason(clinic: Clinic, path: str) -> None:
     async with clinic.client("admin") as client:
         await client.post(f"{path}/edits", json=LEAVE_OUT)
         await client.delete(f"{path}/edits")
-        rows = (await client.get(f"{API}/audit", params={"limit": 2})).json()
-    assert [r["action"] for r in rows] == ["edit.undone", "stride.left_out"]
-    assert rows[1]["detail"]["side"] == "left"
+        await client.post(f"{path}/edits/redo")
+        rows = (await client.get(f"{API}/audit", params={"limit": 3})).json()
+    assert [r["action"] for r in rows] == ["edit.redone", "edit.undone", "stride.left_out"]
+    assert rows[2]["detail"]["side"] == rows[0]["detail"]["side"] == "left"
     assert "stumbled" not in str(rows)
 
 

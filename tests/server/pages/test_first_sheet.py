@@ -14,9 +14,10 @@ import pypdfium2
 import pytest
 
 from server.pages import session as session_page
-from server.pages.first_sheet import MOST_CHARACTERS, has_room_for_profile
+from server.pages.first_sheet import has_room_for_profile
 from server.report.headline import Headline, HeadlineSentence
 from server.services import comparisons
+from server.services.signed_reports import ASSESSMENT_CHARACTERS
 from tests.server import analysed
 from tests.server.clinic import Clinic
 
@@ -28,8 +29,8 @@ def test_the_profile_stands_on_the_first_sheet_where_it_has_room() -> None:
     long = HeadlineSentence("gait_speed_mps", None, "speed", "norm", 2.0, "x" * 60, "y", "", "the norm")
     report: dict[str, Any] = {"score": {}, "bars": [{}] * 4, "since": None, "trend": None}
     report["headline"] = Headline("Good", (long,) * 5)
-    assert has_room_for_profile(report, "x" * MOST_CHARACTERS, "Short note")
-    assert not has_room_for_profile(report, "x" * (MOST_CHARACTERS + 1), "")
+    assert has_room_for_profile(report, "x" * ASSESSMENT_CHARACTERS, "Short note")
+    assert not has_room_for_profile(report, "x" * (ASSESSMENT_CHARACTERS + 1), "")
     assert not has_room_for_profile(report, "a\n\nb\n\nc\n\nd", "")
     assert not has_room_for_profile(report, "", "x" * 400)
     assert not has_room_for_profile(report | {"score": None}, "", "")
@@ -174,7 +175,7 @@ async def test_all_that_the_doctor_reads_stands_on_one_sheet_in_german(
     session = await add_visits(
         clinic, "T-7", analysed.files(), [(None, {}), *[(0.6 + 0.02 * i, {}) for i in range(9)]]
     )
-    text = "\n\n".join(["lang genug " * 12] * 3)[:MOST_CHARACTERS]
+    text = "\n\n".join(["lang genug " * 12] * 3)[:ASSESSMENT_CHARACTERS]
     async with clinic.client("clinician", {"accept-language": "de"}) as client:
         await client.put(f"/api/v1/sessions/{session}/assessment", json={"content": text})
         await client.get(f"/sessions/{session}/print")

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 import re
 from collections.abc import Sequence
 from typing import Any
 
 import pytest
+from sqlalchemy import update
 
 from server.auth import accounts
 from server.auth.identity import Identity
 from server.auth.roles import Role
-from server.services import notes, patients
+from server.services import live, notes, patients
+from server.storage.live_tables import live_take
+from server.storage.tables import now
 from tests.server import analysed
 from tests.server.clinic import Clinic
 
@@ -174,3 +178,37 @@ async def test_who_may_not_plan_or_map_is_not_led_there(clinic: Clinic) -> None:
     async with clinic.client("clinician") as client:
         assert "Plan a programme" in (await client.get(f"/patients/{patient}")).text
         assert "Change mapping" in (await client.get(f"/sessions/{session}/data")).text
+
+
+async def test_lists_show_a_live_take_from_its_code_to_its_end(clinic: Clinic) -> None:
+    async with clinic.client("clinician") as client:
+        patient = (await client.post(f"{API}/patients", json={"code": "V-LIVE"})).json()["id"]
+        body = {"title": "Training", "performed_on": "2026-11-28"}
+        session = (await client.post(f"{API}/patients/{patient}/sessions", json=body)).json()["id"]
+
+    async def states() -> list[str]:
+        (in_list,) = [r for r in rows_of(await text_of(clinic, "/patients")) if r.startswith("V-LIVE")]
+        (of_visit,) = rows_of(await text_of(clinic, f"/patients/{patient}"))
+        words = ("No recording yet", "Waiting for the tablet", "Live now")
+        return [w for row in (in_list, of_visit) for w in words if row.endswith(w)]
+
+    assert await states() == ["No recording yet"] * 2
+    with clinic.db.write() as c:
+        take, code = live.open_take(c, None, session)
+    assert await states() == ["Waiting for the tablet"] * 2
+    assert "Waiting for the tablet" in await text_of(clinic, f"/sessions/{session}")
+    with clinic.db.write() as c:
+        c.execute(update(live_take).values(code_expires_at=now() - dt.timedelta(seconds=1)))
+    assert await states() == ["No recording yet"] * 2
+    with clinic.db.write() as c:
+        c.execute(update(live_take).values(code_expires_at=now() + dt.timedelta(minutes=1)))
+        live.pair(c, code)
+    assert await states() == ["Waiting for the tablet"] * 2
+    with clinic.db.write() as c:
+        live.note_start(c, take.id, "replay")
+    assert await states() == ["Live now"] * 2
+    assert f'href="/sessions/{session}/live"' in await text_of(clinic, "/patients", "clinician")
+    assert f'href="/sessions/{session}/live"' not in await text_of(clinic, "/patients", "viewer")
+    with clinic.db.write() as c:
+        live.end(c, None, take.id, "closed", count=0)
+    assert await states() == ["No recording yet"] * 2

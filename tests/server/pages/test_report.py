@@ -20,6 +20,7 @@ import sqlalchemy as sa
 
 from server.report.pdf import PdfMissing, render_pdf
 from server.services import report_links
+from server.services.signed_reports import ASSESSMENT_CHARACTERS
 from server.storage.report_tables import report_link
 from server.storage.tables import audit, now
 from tests.server import analysed
@@ -96,6 +97,22 @@ async def test_a_signed_report_keeps_its_bytes_while_the_page_follows(clinic: Cl
     assert "Version 2" in desk
     assert "Typing error" in desk
     assert await page(clinic, f"/signed-reports/{report}") == before
+
+
+async def test_an_assessment_longer_than_its_room_is_refused_and_the_earlier_one_stays(
+    clinic: Clinic,
+) -> None:
+    _, session = await visit(clinic, "S-LONG")
+    fits = "x" * ASSESSMENT_CHARACTERS
+    assert await write(clinic, session, f" {fits}\n") == 204
+    async with clinic.client("clinician") as client:
+        path = f"/api/v1/sessions/{session}/assessment"
+        refused = await client.put(path, json={"content": f"{fits}yz"})
+        form = (await client.get(f"/sessions/{session}/report")).text
+    assert (refused.status_code, refused.json()["code"]) == (422, "text_too_long")
+    assert "has 422 characters; at most 420 fit" in refused.json()["detail"]
+    assert f">{fits}</textarea>" in form
+    assert 'data-limit="420"' in form
 
 
 async def test_who_may_not_sign_reads_only(clinic: Clinic) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import pytest
 
 from core.parameters.catalogue import CATALOGUE
@@ -37,6 +40,23 @@ def test_a_number_is_the_mean_of_the_strides_it_opens_to(make_bundle: MakeBundle
     assert 'role="group"' in number.svg
     assert 'role="img"' not in number.svg
     assert number.svg.count('href="timeline#t=') == len(number.strides)
+
+
+@pytest.mark.parametrize("values", [(59.9, 45.6), (0.512, 0.498), (101.3, 101.3), (-3.2, 11.7)])
+def test_the_axis_of_the_strides_has_round_ticks(
+    make_bundle: MakeBundle, values: tuple[float, float]
+) -> None:
+    bundle = make_bundle()
+    rows = {r.name: r for _, group in report_model(bundle).groups for r in group}
+    row = replace(rows["stride_time_s"], norm_mean=None, norm_sd=None)
+    column = tuple(values[i % 2] for i in range(len(bundle.strides.strides)))
+    svg = open_row(row, bundle.strides, column, 12.0).svg
+    labels = [x.replace("−", "-") for x in re.findall(r'text-anchor="end">([^<]+)<', svg)]
+    ticks = [float(x) for x in labels]
+    step = ticks[1] - ticks[0]
+    assert f"{step:e}"[:2] in ("1.", "2.", "5."), labels
+    assert all(abs(t / step - round(t / step)) < 1e-6 for t in ticks), labels
+    assert ticks == pytest.approx([ticks[0] + i * step for i in range(len(ticks))])
 
 
 def test_a_figure_of_the_take_has_no_strides(make_bundle: MakeBundle) -> None:

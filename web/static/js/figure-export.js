@@ -3,7 +3,8 @@ import { speak } from "./common/words.js";
 const TYPES = ["video/webm;codecs=vp9", "video/webm", "video/mp4"];
 const FRAMES = 30; // a second
 const LONGEST_MS = 120_000;
-const PATIENCE_MS = 10_000;
+const PATIENCE_MS = 30_000; // software draws a large picture in seconds
+const WIDTH = 1600; // px that a saved picture of the figure has at least
 
 function save(blob, name) {
   const link = document.createElement("a");
@@ -19,10 +20,20 @@ function isEmpty({ data }) {
   return points.every((point) => point === points[0]);
 }
 
+// viser draws as many pixels as its frame has room for, fewer where drawing is slow. The frame gets the room that a
+// picture needs and is scaled back, so that nothing moves on the page.
+function enlarge(frame, canvas, [width, height]) {
+  const wanted = Math.ceil(((WIDTH + 1) * canvas.clientWidth) / canvas.width);
+  if (wanted <= frame.clientWidth) return;
+  const size = { width: `${wanted}px`, height: `${Math.round((wanted * height) / width)}px` };
+  Object.assign(frame.style, { position: "absolute", inset: "0 auto auto 0", transformOrigin: "0 0", transform: `scale(${width / wanted})`, ...size });
+}
+
 // What is on a WebGL canvas is gone after it was shown, so a frame is taken from its stream: the first that has
 // something on it, for a stream may begin with the empty canvas. viser draws only when something changed: `redraw`
-// shows the same moment again.
-export async function savePicture(canvas, redraw, name) {
+// shows the same moment again. In a frame it is drawn larger for as long as the picture takes.
+export async function savePicture(canvas, redraw, name, frame = null) {
+  const size = frame && [frame.clientWidth, frame.clientHeight];
   const stream = canvas.captureStream();
   const video = document.createElement("video");
   video.muted = true;
@@ -33,9 +44,11 @@ export async function savePicture(canvas, redraw, name) {
       setTimeout(() => fail(new Error(speak`No picture came from the 3D view.`)), PATIENCE_MS);
       const take = () => {
         [picture.width, picture.height] = [video.videoWidth, video.videoHeight];
-        const context = picture.getContext("2d");
+        const context = picture.getContext("2d", { willReadFrequently: true });
         context.drawImage(video, 0, 0);
-        if (!isEmpty(context.getImageData(0, 0, picture.width, picture.height))) return done();
+        if (frame) enlarge(frame, canvas, size); // again where drawing slowed down meanwhile
+        const isLarge = !frame || picture.width >= WIDTH;
+        if (isLarge && !isEmpty(context.getImageData(0, 0, picture.width, picture.height))) return done();
         video.requestVideoFrameCallback(take);
         redraw();
       };
@@ -47,6 +60,7 @@ export async function savePicture(canvas, redraw, name) {
     save(await new Promise((done) => picture.toBlob(done, "image/png")), name);
   } finally {
     for (const track of stream.getTracks()) track.stop();
+    if (frame) frame.style.cssText = "";
   }
 }
 

@@ -62,18 +62,33 @@ async function send(form, then = form.dataset.then) {
   const buttons = form.querySelectorAll("button");
   buttons.forEach((b) => (b.disabled = true));
   form.setAttribute("aria-busy", "true");
+  const sent = method === "DELETE" ? undefined : values(form);
   try {
-    const data = await request(method, path, method === "DELETE" ? undefined : values(form));
+    const data = await request(method, path, sent);
     if (then?.startsWith("#")) return showOnce(form, then, data);
+    if (then === "saved") return showSaved(form, sent);
     letGo();
     if (then === "reload" || !then) location.reload();
     else location.assign(fill(then, data));
   } catch (problem) {
-    buttons.forEach((b) => (b.disabled = false));
-    form.removeAttribute("aria-busy");
+    release(form);
     if (!note) throw problem;
     showProblem(note, problem);
   }
+}
+
+function release(form) {
+  form.querySelectorAll("button").forEach((b) => (b.disabled = false));
+  form.removeAttribute("aria-busy");
+}
+
+// The form stays. What was typed while it was sent is not saved yet.
+function showSaved(form, sent) {
+  release(form);
+  form.querySelector(".form-error").hidden = true;
+  if (JSON.stringify(values(form)) !== JSON.stringify(sent)) return;
+  touched.delete(form);
+  form.querySelector("[data-saved]").textContent = speak`Saved`;
 }
 
 // What the server tells only once stands in a dialog until it is closed; then the page is read anew.
@@ -147,6 +162,38 @@ if (location.hash === NOW && document.querySelector("[data-print]")) {
   history.replaceState(null, "", location.pathname);
   window.print();
 }
+
+// A text with a limit says how much room is left. What is too long is neither cut nor sent.
+const ALWAYS_SHOWN = 1000; // of a longer limit the room is shown when it gets scarce
+const SCARCE = 0.1;
+
+function showRoom(area) {
+  const limit = Number(area.dataset.limit);
+  const left = limit - [...area.value].length;
+  const room = area.nextElementSibling?.matches("[data-left]") ? area.nextElementSibling : addRoom(area);
+  room.hidden = limit > ALWAYS_SHOWN && left > SCARCE * limit;
+  room.classList.toggle("bad", left < 0);
+  if (left < 0) room.textContent = left === -1 ? speak`1 character too long` : speak`${-left} characters too long`;
+  else room.textContent = left === 1 ? speak`1 character left` : speak`${left} characters left`;
+  area.setCustomValidity(left < 0 ? speak`The text is too long: at most ${limit} characters fit.` : "");
+  area.ariaInvalid = left < 0 ? "true" : null;
+}
+
+function addRoom(area) {
+  const room = document.createElement("span");
+  Object.assign(room, { className: "help num", id: `left-${area.id}` });
+  room.dataset.left = "";
+  area.after(room);
+  area.setAttribute("aria-describedby", [area.getAttribute("aria-describedby"), room.id].filter(Boolean).join(" "));
+  return room;
+}
+
+for (const area of document.querySelectorAll("textarea[data-limit]")) showRoom(area);
+document.addEventListener("input", ({ target }) => {
+  if (target.matches("textarea[data-limit]")) showRoom(target);
+  const saved = target.form?.querySelector("[data-saved]");
+  if (saved) saved.textContent = "";
+});
 
 // Work that was typed and not sent: the browser asks before the page goes. Every form for the API, and what a page
 // marks with data-unsaved; no form with a password, and no dialog that was closed.

@@ -177,9 +177,17 @@ class GaitView extends HTMLElement {
   }
 
   async savePicture() {
-    if (!this.canvas()) return;
-    const { savePicture } = await import("./figure-export.js");
-    await savePicture(this.canvas(), () => this.tell({ t: clock.t }), `figure-${clock.t.toFixed(2)}s.png`);
+    const canvas = this.canvas();
+    if (!canvas || this.saving) return;
+    this.saving = true;
+    try {
+      const { savePicture } = await import("./figure-export.js");
+      await savePicture(canvas, () => this.tell({ t: clock.t }), `figure-${clock.t.toFixed(2)}s.png`, this.frame);
+    } catch (problem) {
+      this.say(problem.message);
+    } finally {
+      this.saving = false;
+    }
   }
 
   // From the press on, while the walk plays, until the next press.

@@ -92,6 +92,7 @@ class TakeTimeline extends HTMLElement {
     for (const b of this.querySelectorAll("[data-go]")) b.addEventListener("click", () => this.win.pan(Number(b.dataset.go) * this.win.span * 0.6));
     this.find("whole").addEventListener("click", () => this.win.whole());
     this.find("undo")?.addEventListener("click", () => this.undo());
+    this.find("redo")?.addEventListener("click", () => this.redo());
     this.find("add")?.addEventListener("click", () => this.askEvent());
     grid.addEventListener("wheel", (e) => wheel(e, this.win), { passive: false });
     new ResizeObserver(() => this.moved()).observe(grid);
@@ -118,9 +119,10 @@ class TakeTimeline extends HTMLElement {
 
   key(e) {
     const typing = e.target.closest("input,select,textarea,dialog,[contenteditable]");
-    if ((e.ctrlKey || e.metaKey) && e.key === "z" && !typing && this.editable) {
+    const act = typing || !this.editable ? null : historyAct(e);
+    if (act) {
       e.preventDefault();
-      return this.undo();
+      return this[act]();
     }
     if (e.ctrlKey || e.metaKey || e.altKey || typing) return;
     const acts = {
@@ -178,8 +180,8 @@ class TakeTimeline extends HTMLElement {
       const own = review.strides.filter((s) => s.side === side);
       this.querySelector(`[data-counts=${side}]`).textContent = speak`${own.filter((s) => s.used).length} of ${own.length}`;
     }
-    const undo = this.find("undo");
-    if (undo) undo.disabled = !review.edits.length;
+    this.dropped = null;
+    this.showHistory();
     this.find("edits").replaceChildren(...editRows(review));
     this.find("edit-count").textContent = review.edits.length ? String(review.edits.length) : "";
     this.picked = null;
@@ -261,11 +263,31 @@ class TakeTimeline extends HTMLElement {
     this.change({ kind: "delete_event", side: event.side, event: event.kind, time_s: event.time_s }, speak`${event.side} ${WORD[event.kind]} deleted.`);
   }
 
-  // What is held is not changed yet: it goes back where it was.
+  // Key presses that are not a change yet are undone, and redone, as one: the event goes back where it was.
   undo() {
-    const moving = this.feet.find(({ handles }) => handles.held)?.handles;
-    if (moving) moving.drop(moving.held);
-    else if (this.review.edits.length) this.done(() => this.review.undo(), speak`The last change is undone.`);
+    const moving = this.holding();
+    if (moving) {
+      this.dropped = { event: moving.held, to: moving.at };
+      moving.drop(moving.held);
+      this.showHistory();
+    } else if (this.review.edits.length) this.done(() => this.review.undo(), speak`The last change is undone.`);
+  }
+
+  // While an event is held a new change has begun.
+  redo() {
+    if (this.holding()) return;
+    if (this.dropped) this.move(this.dropped.event, this.dropped.to);
+    else if (this.review.redoable) this.done(() => this.review.redo(), speak`The change is redone.`);
+  }
+
+  holding() {
+    return this.feet.find(({ handles }) => handles.held)?.handles;
+  }
+
+  showHistory() {
+    if (!this.editable) return;
+    this.find("undo").disabled = !this.review.edits.length;
+    this.find("redo").disabled = !this.dropped && !this.review.redoable;
   }
 
   change(edit, said) {
@@ -313,6 +335,13 @@ function remembered() {
   } catch {
     return false;
   }
+}
+
+// Ctrl+Z; Ctrl+Shift+Z or Ctrl+Y; on a Mac with Cmd, where Cmd+Y is the browser's own.
+function historyAct({ key, ctrlKey, metaKey, shiftKey, altKey }) {
+  if (!(ctrlKey || metaKey) || altKey) return null;
+  if (key.toLowerCase() === "z") return shiftKey ? "redo" : "undo";
+  return key.toLowerCase() === "y" && ctrlKey && !shiftKey ? "redo" : null;
 }
 
 const middle = (stride) => (stride.start_s + stride.end_s) / 2;

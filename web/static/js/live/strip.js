@@ -2,6 +2,7 @@
 // without a target left = disc, right = ring. A petrol tick below marks a stride with feedback.
 import { Plot, label, trace } from "./plot.js";
 import { number } from "./words.js";
+import { findRoundTicks } from "../common/ticks.js";
 import { speak } from "../common/words.js";
 
 export const SHOWN = 20;
@@ -56,13 +57,12 @@ class TargetStrip extends Plot {
     if (!range) return;
     const Y = (v) => EDGE.top + ((range[1] - v) / (range[1] - range[0])) * h;
     this.target(g, Y, w, colour);
-    const step = nice((range[1] - range[0]) / 5);
+    const { ticks, digits } = findRoundTicks(range[0], range[1]);
     g.lineWidth = 1;
-    for (let v = Math.ceil(range[0] / step) * step; v <= range[1]; v += step) {
+    for (const v of ticks) {
       g.strokeStyle = colour.grid;
       if (!this.zone || v < this.zone[0] || v > this.zone[1]) trace(g, [[EDGE.left, Y(v)], [EDGE.left + w, Y(v)]]);
-      const digits = Math.max(this.digits, step < 0.1 ? 2 : step < 1 ? 1 : 0);
-      label(g, number(v, Math.min(digits, 3)), EDGE.left - 7, Y(v) + 4, { colour: colour.axis, align: "right" });
+      label(g, number(v, digits), EDGE.left - 7, Y(v) + 4, { colour: colour.axis, align: "right" });
     }
     const first = SHOWN - this.rows.length;
     const tick = EDGE.top + h + 10;
@@ -92,11 +92,6 @@ class TargetStrip extends Plot {
     const [low, high] = zones[SHOWN - 1];
     label(g, speak`target`, EDGE.left + w + 8, Y((low + high) / 2) + 4, { colour: colour.ink, bold: true });
   }
-}
-
-function nice(step) {
-  const power = 10 ** Math.floor(Math.log10(step));
-  return power * [1, 2, 5, 10].find((n) => n * power >= step - 1e-12);
 }
 
 export function mark(g, kind, x, y, colour, r = MARK) {

@@ -1,10 +1,12 @@
 // One signal over time. The whole take is loaded once, thinned; a closer look loads its own window with margins.
 import { request } from "../common/api.js";
-import { SIDE_KEY, SIDE_LETTER, localise } from "../common/words.js";
+import { SIDE_KEY, SIDE_LETTER } from "../common/words.js";
 import { h, s } from "../common/elements.js";
+import { findRoundTicks } from "../common/ticks.js";
 import { seconds } from "./words.js";
 
 const MS = 1000;
+const TICKS = 3; // at most about so many on a lane
 const COARSE_POINTS = 2000;
 const WAIT_MS = 90;
 const DENSE_S = 0.08;
@@ -22,10 +24,9 @@ export class SignalLane {
     this.group = s("g");
     this.svg = s("svg", { class: "chart tl-lines", preserveAspectRatio: "none", "aria-hidden": "true" }, this.group);
     this.words = h("span", { class: "tl-up xs" });
-    this.high = h("span", { class: "tl-high xs num" });
-    this.low = h("span", { class: "tl-low xs num" });
-    this.zero = h("i", { class: "tl-zero" });
-    host.append(this.zero, this.svg, this.words, this.high, this.low);
+    this.lines = h("div", { class: "tl-ticks" });
+    this.marks = h("div", { class: "tl-ticks" });
+    host.append(this.lines, this.svg, this.words, this.marks);
     win.addEventListener("move", () => this.move());
   }
 
@@ -60,15 +61,16 @@ export class SignalLane {
     if (least > most) [least, most] = [0, 1];
     const room = Math.max((most - least) * 0.08, 1e-6);
     [this.bottom, this.top] = [least - room, most + room];
-    const digits = most - least < 5 ? 2 : 0;
-    const text = (v) => `${localise(v.toFixed(digits)).replace(/^-(?=[0.,]*$)/, "").replace("-", "−")}${this.unit}`;
-    this.digits = digits;
-    this.high.textContent = text(most);
-    this.low.textContent = text(least);
+    this.digits = most - least < 5 ? 2 : 0;
     this.words.textContent = `${this.lane.up} ↑`;
-    const zero = this.y(0) / 10;
-    this.zero.hidden = zero < 0 || zero > 100;
-    this.zero.style.top = `${zero}%`;
+    const { ticks, digits } = findRoundTicks(this.bottom, this.top, TICKS);
+    this.lines.replaceChildren(...ticks.map((v) => this.place(h("i", { class: v === 0 ? "zero" : "" }), v)));
+    this.marks.replaceChildren(...ticks.map((v) => this.place(h("span", { class: "xs num" }, `${seconds(v, digits)}${this.unit}`), v)));
+  }
+
+  place(mark, v) {
+    mark.style.setProperty("--at", `${this.y(v) / 10}%`);
+    return mark;
   }
 
   get unit() {

@@ -8,6 +8,7 @@ export class Review extends EventTarget {
     this.events = [];
     this.strides = [];
     this.edits = [];
+    this.redoable = 0;
     this.version = 0;
     this.busy = false;
   }
@@ -25,12 +26,16 @@ export class Review extends EventTarget {
     await this.ask("DELETE");
   }
 
-  async ask(method, body) {
+  async redo() {
+    await this.ask("POST", undefined, "/redo");
+  }
+
+  async ask(method, body, act = "") {
     if (this.busy) return;
     this.busy = true;
     this.dispatchEvent(new Event("busy"));
     try {
-      this.take(await request(method, `${this.path}?seen=${this.version}`, body));
+      this.take(await request(method, `${this.path}${act}?seen=${this.version}`, body));
     } catch (problem) {
       if (problem.code === "edited_meanwhile" || problem.code === "no_such_event") await this.load();
       throw problem;
@@ -41,7 +46,7 @@ export class Review extends EventTarget {
   }
 
   take(answer) {
-    Object.assign(this, { events: answer.events, strides: answer.strides, edits: answer.edits, version: answer.version });
+    Object.assign(this, { events: answer.events, strides: answer.strides, edits: answer.edits, redoable: answer.redoable, version: answer.version });
     for (const stride of this.strides) stride.used = stride.excluded_by === null;
     this.dispatchEvent(new Event("change"));
   }
