@@ -13,7 +13,6 @@ from math import hypot
 from typing import Final, Literal
 
 from core.change import Change, ChangedFact, SortedChanges, name_fact
-from core.errors import Notice
 from core.events.result import COMPARED, Strides
 from core.flags import Flag
 from core.frames import SIDES, Side
@@ -100,7 +99,7 @@ class Headline:
 
     Parameters
     ----------
-    badge : how many strides count and what to do first, in one sentence.
+    badge : how many strides count, in one sentence; empty for poor data.
     stands_out, changed : all sentences, largest first. looked_at : figures that could have spoken.
     changes : every change since the visit before, by its verdict.
     """
@@ -174,26 +173,22 @@ def _tells(sentence: HeadlineSentence, fact: ChangedFact) -> bool:
     )
 
 
-def say_badge(kind: str, strides: Strides, notices: Sequence[Notice]) -> str:
-    """How many strides count and what to know of them, in one sentence.
+def say_badge(kind: str, strides: Strides) -> str:
+    """How many strides count, in one sentence; empty for data that are not good enough to count them.
 
     Parameters
     ----------
     kind : ok, warn or bad, of the data as a whole.
     """
+    if kind == "bad":
+        return ""
     left, right = (len(strides.select_used(side)) for side in SIDES)
     count = left + right
     counted = f"{count} stride{'' if count == 1 else 's'} used, {left} left and {right} right"
-    if kind == "bad":
-        stopped = next((n.message for n in notices if n.severity == "error"), None)
-        return stopped or "Numbers are withheld or in doubt; the notices below say why."
     if min(left, right) < COMPARED and strides.strides:
         return f"{counted}: fewer than {COMPARED} of a side are compared with nobody."
     if not strides.strides:
         return "Steps are told by the trunk; sides are not compared."
-    told = sum(n.severity == "warning" for n in notices)
-    if kind == "warn" and told:
-        return f"{counted}; {'one notice says' if told == 1 else f'{told} notices say'} what to check below."
     return f"{counted}."
 
 

@@ -385,7 +385,7 @@ def _headline(
     flags: Sequence[Flag],
 ) -> Headline:
     """Poor data say nothing of the person: then the badge alone speaks."""
-    badge = say_badge(quality.kind, bundle.strides, bundle.warnings)
+    badge = say_badge(quality.kind, bundle.strides)
     if quality.kind == "bad":
         return Headline(badge)
     standouts, looked_at = find_standouts(rows, norms, flags)
