@@ -95,7 +95,7 @@ PHRASES: Final[Mapping[str, Phrases]] = {
         "support",
         2.0,
         apart=0.05,
-        smaller="The {side} leg carries shorter: *{d} points* less stance than the {other}",
+        smaller="The {side} stance phase is *{d} points shorter* than the {other}",
         larger="The {side} leg carries longer: *{d} points* more stance than the {other}",
         names_larger=True,
         both_low="Both feet carry *shortly*: {l} % and {r} % of the stride, usual {a} to {b}",

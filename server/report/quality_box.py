@@ -27,7 +27,7 @@ CALIBRATION_METHODS: Final[Mapping[str, str]] = {
 }
 """Method of a calibration → words."""
 
-NO_WHOLE_DAY: Final = f"No day was worn for {WORN_H:g} hours or longer, so there are no values per day."
+NO_WHOLE_DAY: Final = f"No day has {WORN_H:g} hours of wear time, so no values per day are reported."
 IN_DOUBT: Final = "Numbers are withheld or in doubt."
 
 
