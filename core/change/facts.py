@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 from core.change.verdict import Change
 from core.frames import Side
-from core.parameters.catalogue import CATALOGUE
+from core.parameters.catalogue import CATALOGUE, require_entries
 from core.parameters.flats import OTHER
 
 Fact = tuple[str, Side | None]
@@ -26,6 +26,8 @@ SAME_AS: Final[Mapping[str, tuple[str, Literal["own", "other", "take"]]]] = {
 
 The rest of a stride is swing, a foot stands alone while the other swings, and two steps are a stride.
 """
+
+require_entries((*SAME_AS, *(to for to, _ in SAME_AS.values())), "core.change.facts")
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from core.change.limits import (
     find_relevant_change,
 )
 from core.frames import Side
+from core.norms.place import place_value
 from core.norms.values import NormValue
 from core.parameters.kinematic import is_level
 from core.parameters.result import Parameter
@@ -54,7 +55,8 @@ class Change:
         "not_measured_alike" (one is estimated, the other measured: no difference either), "too_few_strides"
         in one of them, "no_mdc" (no source has a limit for it), "conditions_differ" (not walked alike,
         core/condition.py).
-    towards_norm : nearer to the middle of the norm than before; None without a comparable norm.
+    towards_norm : fewer standard deviations from the mean of the norm than before, each visit against the
+        norm at its own speed; None where one of them has no comparable norm.
     note : "from_standing": a change of how the person stands is part of it.
     """
 
@@ -79,20 +81,26 @@ def parameter_changes(
     before: Sequence[Parameter],
     after: Sequence[Parameter],
     affected: Side | None = None,
-    norms: Mapping[str, NormValue] | None = None,
+    norms: tuple[Mapping[str, NormValue], Mapping[str, NormValue]] | None = None,
     own: Mapping[str, Repeatability] | None = None,
 ) -> tuple[Change, ...]:
     """Compare the parameters of two sessions, in the order of the later one.
 
     Parameters
     ----------
-    affected : side, None = none or both. norms : reference by name.
+    affected : side, None = none or both.
+    norms : references by name, each session's at its own speed; without them changes have no direction.
     own : measurement error of this clinic by name; it goes before any published limit.
     """
     earlier = {(p.name, p.side): p for p in before}
+    of_before, of_after = norms or ({}, {})
     return tuple(
         _parameter(
-            earlier.get((p.name, p.side)), p, affected, (norms or {}).get(p.name), (own or {}).get(p.name)
+            earlier.get((p.name, p.side)),
+            p,
+            affected,
+            (of_before.get(p.name), of_after.get(p.name)),
+            (own or {}).get(p.name),
         )
         for p in after
     )
@@ -149,7 +157,7 @@ def _parameter(
     old: Parameter | None,
     new: Parameter,
     affected: Side | None,
-    norm: NormValue | None,
+    norms: tuple[NormValue | None, NormValue | None],
     own: Repeatability | None,
 ) -> Change:
     change = _plain(new.name, new.side, new.unit, None if old is None else old.mean, new.mean)
@@ -166,8 +174,9 @@ def _parameter(
     open_by_strides = _strides(old, new)
     if mdc is not None and open_by_strides > mdc.value:
         mdc = ChangeLimit(open_by_strides, "these sessions", STRIDES)
-    if norm is not None and norm.comparable and old.mean != new.mean:
-        change = replace(change, towards_norm=abs(new.mean - norm.mean) < abs(old.mean - norm.mean))
+    was, now = (place_value(p.mean, norm).z for p, norm in zip((old, new), norms, strict=True))
+    if was is not None and now is not None and abs(was) != abs(now):
+        change = replace(change, towards_norm=abs(now) < abs(was))
     if is_level(new.name):
         change = replace(change, note="from_standing")
     return _judged(change, mdc, find_relevant_change(new.name, limb))

@@ -12,9 +12,8 @@ import numpy as np
 from core.events.result import COMPARED
 from core.flags.rules import CURVES, RULES, SWING_TO_STANCE, Beyond, Kind, Rule
 from core.frames import SIDES, Side
-from core.norms.lookup import Norms
-from core.norms.speed import walking_speed
-from core.norms.tables import WBDS, wbds_group
+from core.norms.lookup import Norms, look_up_norms
+from core.norms.tables import wbds_group
 from core.parameters.anatomical_zero import anatomical_curves
 from core.parameters.catalogue import CurveFigure
 from core.parameters.catalogue.errors import LEVELS
@@ -39,13 +38,13 @@ class Flag:
     value, unit : measured, mean over `n` counted strides. limit, beyond : exceeded when above or below it.
     exceeded : None where it cannot be said, then `reason`: "angle_zero_standing" (the level needs
         goniometer angles), "joint_missing", "no_strides", "gap", "no_controls" (no own control group has
-        the measure), "no_norm_for_age", "side_missing", "too_few_strides", "sides_alike" (beyond the limit,
+        the measure), "no_norm_for_age", "no_speed_matched_norm" (the limit is of healthy adults, of whom none
+        walked at this speed), "side_missing", "too_few_strides", "sides_alike" (beyond the limit,
         but the strides do not say that the sides differ), or the parameter's own.
     marked : beyond the second, stronger limit too.
     zero : what an angle is measured from, None where its zero does not matter.
     source : of the limit. verified : False = to be shown as "unverified cut-off".
-    note : "no_speed_matched_norm": the people of the limit walk faster than this person;
-        "sides_stand_differently": the difference of two angles from standing contains that of the posture.
+    note : "sides_stand_differently": the difference of two angles from standing contains that of the posture.
     spread : sd of healthy people behind the limit, None where it is no such.
     certain : the value is beyond its limit by more than its strides and its measurement leave open (95 %);
         False where that is not known.
@@ -113,21 +112,21 @@ def judge_flags(
     """
     found = _values(curves, parameters, standing_deg or {})
     speed = next((p.mean for p in parameters if p.name == "gait_speed_mps"), None)
-    slow = speed is not None and walking_speed(speed, height_m).is_slow
+    adults = look_up_norms(None, None, speed, height_m)
     child = wbds_group(age) is None
     result: list[Flag] = []
     for rule in RULES:
-        limited = _with_limit(rule, controls)
+        limited = _with_limit(_at_speed(rule, adults), controls)
         if rule.kind == "ratio":
             result.append(_ratio(limited, found))
             continue
         for side in SIDES:
             flag = _difference(limited, side, found) if rule.kind == "difference" else None
             flag = flag or _level(limited, side, found)
-            if WBDS in limited.source and child:
-                flag = replace(flag, limit=None, exceeded=None, reason=flag.reason or "no_norm_for_age")
-            elif WBDS in limited.source and slow and flag.note is None:
-                flag = replace(flag, note="no_speed_matched_norm")
+            if limited.adults == "limit" and (child or adults.reason is not None):
+                missing = "no_norm_for_age" if child else adults.reason
+                reason = missing if flag.value is not None else flag.reason
+                flag = replace(flag, limit=None, exceeded=None, marked=False, certain=False, reason=reason)
             result.append(flag)
     return tuple(result)
 
@@ -181,6 +180,23 @@ def _own(figure: CurveFigure) -> float:
     if known is None:
         return 0.0
     return known.own * (sqrt(2.0) if figure.statistic == "range" else 1.0)
+
+
+def _at_speed(rule: Rule, adults: Norms) -> Rule:
+    """The rule with the limits of healthy adults at the speed of these norms.
+
+    Where no adult walked at it, a limit of theirs is kept for `judge_flags` to withdraw, and a second one is
+    dropped. What healthy sides differ by does not depend on the speed.
+    """
+    if rule.adults is None or rule.kind == "difference":
+        return rule
+    if adults.reason is not None:
+        return replace(rule, marked=None) if rule.adults == "marked" else rule
+    norm = adults.values[rule.measure]
+    beyond = norm.mean + (2.0 if rule.beyond == "above" else -2.0) * norm.sd
+    if rule.adults == "marked":
+        return replace(rule, marked=beyond)
+    return replace(rule, limit=beyond, spread=norm.sd, source=f"mean + 2 SD, {norm.source}")
 
 
 def _with_limit(rule: Rule, controls: Norms | None) -> Rule:

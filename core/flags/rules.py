@@ -12,7 +12,7 @@ from typing import Final, Literal
 
 from core.norms.tables import WBDS, read_rows
 from core.norms.values import single_side_sd
-from core.parameters.catalogue import CurveFigure, list_curve_figures
+from core.parameters.catalogue import LIMIT_FIGURES, CurveFigure, list_curve_figures, require_entries
 
 Kind = Literal["value", "difference", "ratio"]
 Beyond = Literal["above", "below"]
@@ -24,12 +24,14 @@ class Rule:
 
     Parameters
     ----------
-    measure : parameter, figure of `CURVES` or `SWING_TO_STANCE`.
+    measure : name in the catalogue.
     kind : "value"; "difference" = other side − this side; "ratio" = larger side over smaller side.
     limit : None = mean ± twice the sd of the clinic's own controls. marked : a second, stronger limit.
     level : the value means nothing without the anatomical zero.
     verified : False = "unverified cut-off": seen in the literature, not read in its source.
     spread : sd of healthy people behind the limit, in its unit; None where the limit is no such.
+    adults : which limit comes from the healthy adults of the angle norms: "limit", or "marked" alone; None =
+        neither. Here it is that of their comfortable speed, `judge_flags` takes it at the person's.
     """
 
     name: str
@@ -43,11 +45,11 @@ class Rule:
     level: bool = False
     verified: bool = True
     spread: float | None = None
+    adults: Literal["limit", "marked"] | None = None
 
 
 CURVES: Final[Mapping[str, CurveFigure]] = {
-    "knee_flexion_peak_swing_deg": CurveFigure("knee_flexion", "max", 60, 85),
-    "pelvis_obliquity_max_swing_deg": CurveFigure("pelvis_obliquity", "max", 60, 100),
+    **{name: entry.curve for name, entry in LIMIT_FIGURES.items() if entry.curve is not None},
     **list_curve_figures(),
 }
 """What rules may read from the cycle curves: figures of their own (docs/science/flags.md, "Rules") and the
@@ -76,8 +78,9 @@ def _above_norm(name: str, measure: str, parameter: str, *, level: bool) -> Rule
     mean, sd, apart = _wbds(parameter)
     sd = single_side_sd(sd, apart)
     return Rule(
-        name, measure, "value", "above", mean + 2.0 * sd, f"mean + 2 SD, {WBDS}", level=level, spread=sd
-    )
+        name, measure, "value", "above", mean + 2.0 * sd, f"mean + 2 SD, {WBDS}", level=level, spread=sd,
+        adults="limit",
+    )  # fmt: skip
 
 
 def _below_norm(parameter: str) -> float:
@@ -89,7 +92,10 @@ def _below_norm(parameter: str) -> float:
 def _apart(joint: str, variable: str, parameter: str) -> Rule:
     limit = 2.0 * _wbds(parameter)[2]
     source = f"2 SD of left − right, {WBDS}"
-    return Rule(f"{joint}_range_asymmetry", f"{variable}_rom_deg", "difference", "above", limit, source)
+    return Rule(
+        f"{joint}_range_asymmetry", f"{variable}_rom_deg", "difference", "above", limit, source,
+        adults="limit",
+    )  # fmt: skip
 
 
 RULES: Final[tuple[Rule, ...]] = (
@@ -106,6 +112,7 @@ RULES: Final[tuple[Rule, ...]] = (
         marked=_below_norm("knee_min_stance(20-60%)"),
         level=True,
         verified=False,
+        adults="marked",
     ),
     Rule(
         name="low_dorsiflexion_swing",
@@ -133,6 +140,8 @@ RULES: Final[tuple[Rule, ...]] = (
     Rule("temporal_asymmetry", SWING_TO_STANCE, "ratio", "above", 1.1, _OVERALL, ""),
 )
 """In the order of a report: knee, ankle and foot, pelvis and hip, sides against each other."""
+
+require_entries((rule.measure for rule in RULES), "core.flags.rules")
 
 PERRY_MPS: Final = (0.4, 0.8)
 """Speeds between the classes of walking after stroke: Perry et al. 1995 (docs/science/flags.md)."""

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.errors import FormatError, Notice
+from core.errors import FormatError, Notice, Severity
 from core.frames import Floats, Segment
 from core.held_samples import cut_blocks, is_complete
 from core.recording import ImuStream
@@ -26,6 +26,9 @@ ASSUMED_RATE_HZ: Final = 100.0
 """Shown, never used for results: the notice `rate_unknown` is an error."""
 MOST_OUT_OF_ORDER: Final = 0.01
 """Share of rows that may run backwards before we say that the file holds two takes [our choice]."""
+FEW_ROWS: Final = 0.01
+"""Share of rows that a file may lose for information only: whether what is missing changes a number is judged
+on the time axis, which reports gaps and filled samples (core/quality/assessment.py) [our choice]."""
 
 
 _SUMMED: Final = 16
@@ -217,6 +220,7 @@ def _in_order(d: Draft) -> Draft:
                 "out_of_order",
                 f"{d.source}: {back + lost} rows with a repeated, reversed or missing counter were left out.",
                 d.device_id,
+                severity=grade_loss(back + lost, len(d.ticks)),
             ),
         )
     if len(keep) == len(d.ticks):
@@ -230,6 +234,11 @@ def _in_order(d: Draft) -> Draft:
         quat=None if d.quat is None else d.quat[keep],
         notices=notices,
     )
+
+
+def grade_loss(lost: int, rows: int) -> Severity:
+    """Severity of rows that a file lost: information up to `FEW_ROWS`, a warning beyond."""
+    return "info" if lost <= FEW_ROWS * rows else "warning"
 
 
 def _wrap(d: Draft, ticks: Floats) -> float:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from core.errors import FormatError, InputError, Notice
-from core.formats.draft import MOST_OUT_OF_ORDER, signal_digest
+from core.formats.draft import MOST_OUT_OF_ORDER, grade_loss, signal_digest
 from core.formats.live_clock import LiveClock, Micros, sample_times_us
 from core.formats.live_log import (
     FILE_MARK,
@@ -212,12 +212,12 @@ def _in_order(
     lost = int(np.count_nonzero(~rising))
     if not lost:
         return t_us, samples, []
-    severity = "warning" if lost <= MOST_OUT_OF_ORDER * len(t_us) else "error"
+    severity = grade_loss(lost, len(t_us)) if lost <= MOST_OUT_OF_ORDER * len(t_us) else "error"
     message = (
         f"{lost} of {len(t_us)} samples of stream {info.stream} repeat or run backwards in time and were "
         "left out; the sensor's clock jumped."
     )
-    notice = Notice("out_of_order", message, info.sensors[0].id, severity=severity)  # type: ignore[arg-type]
+    notice = Notice("out_of_order", message, info.sensors[0].id, severity=severity)
     return t_us[rising], samples[rising], [notice]
 
 

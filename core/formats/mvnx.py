@@ -18,7 +18,7 @@ from core import rotation
 from core.errors import FormatError, Notice
 from core.formats import text
 from core.formats.aliases import segment_named
-from core.formats.draft import Draft, make_draft
+from core.formats.draft import Draft, grade_loss, make_draft
 from core.formats.source_spec import SourceSpec
 from core.frames import GRAVITY, Floats
 
@@ -149,6 +149,7 @@ class _Reader:
                 Notice(
                     "truncated_line",
                     f"{self._source}: {self._broken} frames lack the sensors' signals and were left out.",
+                    severity=grade_loss(self._broken, self._broken + len(self._rows)),
                 )
             )
         table = self._read_rows()

@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.csv as pc
 
 from core.errors import FormatError, Notice
+from core.formats.draft import grade_loss
 from core.frames import Floats
 
 SEPARATORS: Final = (b"\t", b";", b",", b"|", b" ")
@@ -165,6 +166,7 @@ def read_columns(
             Notice(
                 "bad_cells",
                 f"{source}: {bad} cells are not numbers and count as missing; the export may be damaged.",
+                severity=grade_loss(bad, len(found) * len(wanted)),
             )
         )
     rows = len(found)
@@ -180,6 +182,7 @@ def read_columns(
                 "truncated_line",
                 f"{source}: {len(broken)} of {rows + len(broken)} lines do not have {len(names)} columns "
                 "and were left out; the file may have been cut off while it was written.",
+                severity=grade_loss(len(broken), rows + len(broken)),
             )
         )
     return Columns(values, tuple(notices))

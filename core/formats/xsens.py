@@ -146,6 +146,7 @@ def cut_notice(source: str, cut: bool) -> list[Notice]:
         Notice(
             "truncated_line",
             f"{source} ends in the middle of its last line, which was left out; copy it again.",
+            severity="info",
         )
     ]
 

@@ -8,7 +8,7 @@ walking smears the moment of a peak, and the peak of the mean curve is up to 11Â
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import groupby
@@ -24,6 +24,7 @@ from core.norms.profile import MODES, PROFILES, CurveReference, ScoreSpread
 from core.norms.speed import COMFORTABLE, SLOWEST
 from core.norms.tables import read_columns, read_rows
 from core.norms.values import NormValue, angle_values, explain_difference, single_side_sd
+from core.parameters.catalogue import CurveFigure, find_entry, require_entries
 
 ASKED: Final = "healthy adults asked to walk at this speed"
 """Who the people are, printed beside every such norm. Who is slow from habit, being old, moves less."""
@@ -137,8 +138,12 @@ _ROWS: Final[Mapping[str, str]] = {
 }
 """Our figure â†’ its row in the model of the individual figures."""
 
-_HIP: Final = ("hip_flexion_min_deg", "hip_flexion_rom_deg")
+_OF_MEAN_CURVE: Final = ("hip_flexion_min_deg", "hip_flexion_rom_deg", "pelvis_obliquity_max_swing_deg")
 """Figures read from the mean curve, for want of single ones; a value at contact needs no single curves."""
+
+require_entries((*_ROWS, *_OF_MEAN_CURVE), "core.norms.at_speed")
+
+_STATISTICS: Final[Mapping[str, Callable[[Floats], float]]] = {"min": np.min, "max": np.max, "range": np.ptp}
 
 _BINS: Final = ((0.12, "loso_sd_v05_12"), (0.25, "loso_sd_v12_25"), (0.36, "loso_sd_v25_36"))
 _LAST_BIN: Final = "loso_sd_v36_55"
@@ -167,11 +172,11 @@ def angle_values_at_speed(
             usual_band = adult_kinematics(age).bands[band.variable]
             change = float(band.mean_deg[0] - usual_band.mean_deg[0])
             n, sd = band.n, norm.sd * float(band.sd_deg[0] / usual_band.sd_deg[0])
-        elif name in _HIP:
-            hip, usual_hip = (b["hip_flexion"].mean_deg for b in (bands, adult_kinematics(age).bands))
-            pick = np.min if name == _HIP[0] else np.ptp
-            change = float(pick(hip) - pick(usual_hip))
-            n, sd = bands["hip_flexion"].n, hypot(norm.sd, HIP_SD_DEG)
+        elif name in _OF_MEAN_CURVE and (figure := _figure_of(name)).variable in bands:
+            change = _read(figure, bands) - _read(figure, adult_kinematics(age).bands)
+            n = bands[figure.variable].n
+            grown = norm.sd * _growth(figure, bands, adult_kinematics(age).bands)
+            sd = hypot(norm.sd, HIP_SD_DEG) if figure.variable == "hip_flexion" else grown
         else:
             continue
         found[name] = NormValue(
@@ -186,6 +191,28 @@ def angle_values_at_speed(
             note=norm.note,
         )
     return found
+
+
+def _figure_of(name: str) -> CurveFigure:
+    entry = find_entry(name)
+    if entry is None or entry.curve is None:
+        raise KeyError(name)
+    return entry.curve
+
+
+def _window(figure: CurveFigure) -> slice:
+    return slice(figure.start_pct, figure.end_pct + 1)
+
+
+def _read(figure: CurveFigure, bands: Mapping[str, NormBand]) -> float:
+    """A figure of the mean curve, degrees."""
+    return float(_STATISTICS[figure.statistic](bands[figure.variable].mean_deg[_window(figure)]))
+
+
+def _growth(figure: CurveFigure, bands: Mapping[str, NormBand], usual: Mapping[str, NormBand]) -> float:
+    """How much more people differ at this speed than at their comfortable one, where a figure is read."""
+    now, then = (of[figure.variable].sd_deg[_window(figure)] for of in (bands, usual))
+    return float(np.sqrt(np.mean(now**2) / np.mean(then**2)))
 
 
 def walkway_values_at_speed(v: float, leg_m: float) -> Mapping[str, NormValue]:

@@ -14,7 +14,7 @@ from core.norms.at_speed import (
 )
 from core.norms.kinematics import NormBand, adult_kinematics
 from core.norms.place import NormPlacement, place_difference, place_value
-from core.norms.speed import WalkingSpeed, walking_speed
+from core.norms.speed import SPEED_SD, WalkingSpeed, walking_speed
 from core.norms.values import (
     NormValue,
     Pace,
@@ -43,7 +43,8 @@ class Norms:
     bands : variable → band over the cycle, each with its zero; at this speed as `values`.
     comfortable, comfortable_bands : of people at their own comfortable speed, where the above are at this
         one; empty where the above are of these people already.
-    reason : why no angle is compared: "no_norm_for_age", "no_speed_matched_norm" (slower than anybody).
+    reason : why no angle is compared: "no_norm_for_age", "no_speed_matched_norm" (slower or faster than the
+        reference people).
     timing_reason : why no time or distance is compared: these, or "age_unknown", "sex_unknown". Gait speed
         itself is held against the speed healthy people like, however slow the person.
     """
@@ -135,19 +136,30 @@ def _look_up(
 _EXPECTED: Final = ("step_length_m", "cadence_spm")
 
 
+def _is_too_fast(speed: WalkingSpeed | None, timing: Mapping[str, NormValue]) -> bool:
+    """Whether a person walks faster than the people of a walkway table that has no classes of pace."""
+    liked = timing.get("gait_speed_mps")
+    if speed is None or liked is None or not liked.comparable:
+        return False
+    return speed.speed_mps > liked.mean + SPEED_SD * liked.sd
+
+
 def _at_comfortable_speed(
     age: float | None, sex: Sex | None, speed: WalkingSpeed | None, anatomical: Collection[str]
 ) -> Norms:
-    """The reference of people who walk as they like, for those who are not slower than any of them."""
+    """The reference of people at their comfortable speed, for those whose speed is within its range."""
     slow = speed is not None and speed.is_slow
+    fast = speed is not None and speed.is_fast
     bands = adult_kinematics(age)
-    reason = bands.reason or ("no_speed_matched_norm" if slow else None)
+    reason = bands.reason or ("no_speed_matched_norm" if slow or fast else None)
     values = {} if reason else dict(angle_values(age, anatomical).values)
     # a class of speeds is of people of this age and sex, whose legs are in it already
     pace = pace_of(age, sex, None if speed is None else speed.speed_mps)
     timing = temporal_values(age, sex, pace or "normal")
     missing = timing.reason or (
-        "no_speed_matched_norm" if pace is None or (slow and not bands.reason) else None
+        "no_speed_matched_norm"
+        if pace is None or (slow and not bands.reason) or _is_too_fast(speed, timing.values)
+        else None
     )
     if missing is None:
         values |= timing.values

@@ -33,11 +33,18 @@ NORM_LEG_M: Final = 0.828
 SLOWEST: Final = 0.085
 """v* below which they did not walk (0.24 m/s on a leg of 0.828 m): a norm would be extrapolated."""
 
-COMFORTABLE: Final = 1.25 / sqrt(GRAVITY * NORM_LEG_M)
-"""v* at which the norms by speed meet those of comfortable walking, 0.439; above it the latter hold."""
-
 WBDS_MPS: Final = (1.25, 0.16)
 """Mean and sd of the speed at which the adults of the angle norms walked."""
+
+COMFORTABLE: Final = WBDS_MPS[0] / sqrt(GRAVITY * NORM_LEG_M)
+"""v* at which the norms by speed meet those of comfortable walking, 0.439; above it the latter hold."""
+
+SPEED_SD: Final = 2.0
+"""Standard deviations above the mean speed of the reference people up to which they are the norm (our choice:
+nineteen in twenty of them walked no further from it)."""
+
+FASTEST: Final = (WBDS_MPS[0] + SPEED_SD * WBDS_MPS[1]) / sqrt(GRAVITY * NORM_LEG_M)
+"""v* above which no adult of the angle norms is expected, 0.551 (1.57 m/s on a leg of 0.828 m)."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +69,11 @@ class WalkingSpeed:
     def is_slow(self) -> bool:
         """Slower than anybody in the tables of comfortable walking."""
         return self.equivalent_mps < SLOW_MPS
+
+    @property
+    def is_fast(self) -> bool:
+        """Faster than the adults of the angle norms walked."""
+        return self.norm_speed > FASTEST
 
     @property
     def norm_speed(self) -> float:

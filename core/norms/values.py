@@ -10,7 +10,7 @@ from typing import Final, Literal, cast
 from core.frames import GRAVITY
 from core.norms.speed import WBDS_MPS
 from core.norms.tables import LEVEL, WBDS, WBDS_N, read_rows, wbds_group
-from core.parameters.catalogue import CATALOGUE, NormKey
+from core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES, NormKey, find_entry
 
 Sex = Literal["female", "male"]
 Pace = Literal["slow", "normal", "fast"]
@@ -79,14 +79,14 @@ def list_norm_keys(table: Literal["angles", "walkway"]) -> dict[str, NormKey]:
     """Parameters of the catalogue with a reference in a table, and their rows there."""
     return {
         name: entry.norm
-        for name, entry in CATALOGUE.items()
+        for name, entry in (*CATALOGUE.items(), *LIMIT_FIGURES.items())
         if entry.norm is not None and entry.norm.table == table
     }
 
 
 def is_angle(name: str) -> bool:
     """The reference of a parameter is that of the adults of the cycle curves."""
-    entry = CATALOGUE.get(name)
+    entry = find_entry(name)
     return entry is not None and entry.norm is not None and entry.norm.table == "angles"
 
 

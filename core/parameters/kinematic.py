@@ -16,7 +16,7 @@ import numpy as np
 from core.angles import JointAngles
 from core.events.result import Strides
 from core.frames import FOOT, SIDES, SUFFIX, Bools, Floats, Oriented, Segment, Side
-from core.parameters.catalogue import CATALOGUE, CurveFigure, list_curve_figures
+from core.parameters.catalogue import CATALOGUE, CurveFigure, find_entry, list_curve_figures
 from core.parameters.plausible import IMPOSSIBLE, LEAST_KNEE
 from core.parameters.resample import resample_in_turn
 from core.parameters.result import CycleCurves, MeanCurve, Parameter
@@ -33,7 +33,7 @@ MEAN_ZERO: Final = ("pelvis_rotation", "foot_progression")
 
 def is_level(name: str) -> bool:
     """The parameter is a joint angle with a zero, not a range: how the person stood is part of it."""
-    entry = CATALOGUE.get(name)
+    entry = find_entry(name)
     return entry is not None and entry.curve is not None and entry.curve.statistic != "range"
 
 

@@ -261,6 +261,10 @@ def _gap_notice(
     segment: Segment, signals: SensorSignals, uniform: UniformRecording, invalid: float, params: QualityParams
 ) -> list[Notice]:
     holes = [h for h in find_runs(~signals.valid) if h[1] - h[0] >= GAP_S * uniform.rate_hz]
+    if any(n.code == "unequal_lengths" and n.sensor == segment for n in uniform.notices):
+        # that notice says what is missing before the sensor began and after it stopped
+        holes = [h for h in holes if h[0] > 0 and h[1] < len(signals.valid)]
+        invalid = sum(end - start for start, end in holes) / len(signals.valid)
     if not holes:
         return []
     start, end = max(holes, key=lambda h: h[1] - h[0])

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from core.frames import Side
+from core.parameters.catalogue import require_entries
 from core.parameters.result import Parameter
 from server.export.content import ExportContent, SignedForm
 from server.report.level import define_parameter, label_parameter
@@ -32,6 +33,8 @@ LOINC: Final = {
     ),
 }
 """Parameter → LOINC code and its name, of the same measurement."""
+
+require_entries(LOINC, "server.export.fhir")
 
 UCUM: Final = {
     "": "1",

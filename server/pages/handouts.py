@@ -8,6 +8,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
+from core.change import Change
 from core.parameters.catalogue import CATALOGUE
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -102,8 +103,11 @@ def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[s
     old = None if before is None else reviewed.read_numbers(before.found, before.edits)
     if old is not None and not _is_usable(old):
         old = before = None
-    norms = comparisons.find_norms(patient, this.session, new)
-    changes = () if old is None else compare_figures(old, new, norms, patient.affected_side)
+    if before is None or old is None:
+        changes: tuple[Change, ...] = ()
+    else:
+        norms = comparisons.pair_norms(patient, (before.session, old), (this.session, new))
+        changes = compare_figures(old, new, norms, patient.affected_side)
     trained = next((w.content for w in written if w.ended_at is None), None)
     return {
         "patient": patient,

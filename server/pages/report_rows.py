@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
+from core.parameters.catalogue import require_entries
 from core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
 from server.report import level
 from server.report.model import ReportModel
@@ -47,13 +48,15 @@ FIRST_ROWS: Final = 10
 NOT_ON_PAPER: Final = ("swing_pct", "swing_time_s", "turning_angle_deg")
 """What the rest of a stride leaves, and what a straight walk has none of."""
 
+require_entries((*MATTERING, *NOT_ON_PAPER), "server.pages.report_rows")
+
 
 def select_first(model: ReportModel) -> tuple[ParameterRow, ...]:
     """The ten rows that matter most of what these sensors gave, in fixed order; of squats and tests all.
 
-    An angle from the anatomical zero stands in for the same one from standing.
+    A joint angle is measured from the zero of its curve.
     """
-    rows = {row.name: row for _, group in model.groups for row in group}
+    rows = {row.name: row for _, group in model.page_groups for row in group}
     if model.squats is not None:
         return tuple(row for row in rows.values() if row.group == SQUAT)
     if model.functional is not None and not model.strides:
@@ -66,7 +69,7 @@ def select_first(model: ReportModel) -> tuple[ParameterRow, ...]:
 def fold_groups(model: ReportModel, first: Sequence[ParameterRow]) -> list[dict[str, Any]]:
     """All other rows by group; the head of each says how many are beyond the norm, so that none hides."""
     shown = {row.name for row in first}
-    groups = ((name, [row for row in rows if row.name not in shown]) for name, rows in model.groups)
+    groups = ((name, [row for row in rows if row.name not in shown]) for name, rows in model.page_groups)
     return [{"name": name, "rows": rows, "words": _count_beyond(rows)} for name, rows in groups if rows]
 
 
@@ -84,16 +87,14 @@ def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[P
 
     On paper only what was measured has a row; `missing` says the rest in one line.
     """
-    groups = [(name, rows) for name, rows in model.groups if name not in SECONDARY]
+    groups = [(name, rows) for name, rows in model.page_groups if name not in SECONDARY]
     if all(row.reason for _, rows in groups for row in rows):
         return []
     if not paper:
         return groups
-    # a level from the anatomical zero says more than the same one from standing
-    known = {level.from_standing(r.name) for name, rows in groups if name == level.GROUP for r in rows}
-    left_out = {*NOT_ON_PAPER, *known}
     short = (
-        (name, tuple(r for r in rows if r.reason is None and r.name not in left_out)) for name, rows in groups
+        (name, tuple(r for r in rows if r.reason is None and r.name not in NOT_ON_PAPER))
+        for name, rows in groups
     )
     return [(name, rows) for name, rows in short if rows]
 

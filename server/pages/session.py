@@ -273,6 +273,7 @@ def _draw_report(
         "others": select_others(model, first) if paper else [],
         "folds": fold_groups(model, first),
         "ranks": {} if model.headline is None else model.headline.ranks,
+        "curve_ranks": {} if model.headline is None else model.headline.curve_ranks,
         "missing": [
             (r.title, r.reason.removeprefix("not measured: "))
             for name, rows in model.groups

@@ -11,12 +11,13 @@ from starlette.responses import Response
 
 from core.activity.parameters import WORN_H
 from core.frames import Protocol, Side
+from core.parameters.catalogue import require_entries
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import HEX_ID, Db, Id, Reviewed
 from server.pages.shell import record_opening, render_page
-from server.report.change_words import change_words, find_term
+from server.report.change_words import SCORE_TERMS, change_words, find_term
 from server.report.daily_life import format_hours
 from server.report.daily_trend import PerformanceDay, draw_daily_trend
 from server.report.trend_chart import PlannedAssessment, trend_svg
@@ -45,6 +46,8 @@ FIGURES: Final = (
     "double_support_pct",
 )
 """On the patient's page: what is trained, then the first of these that were measured."""
+
+require_entries((name for name in FIGURES if name not in SCORE_TERMS), "server.pages.trends")
 FIGURES_SHOWN: Final = 5
 FIGURE_HEIGHT: Final = 128
 

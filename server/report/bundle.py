@@ -133,9 +133,35 @@ def read_warnings(data: Mapping[str, Any]) -> tuple[Notice, ...]:
 
 
 def keep_told(notices: Iterable[Notice]) -> tuple[Notice, ...]:
-    """Those that are told of an analysis."""
+    """Those that are told of an analysis, one of every fault."""
     told = {*ABOUT_FILES, "duplicate_stream"}
-    return tuple(n for n in notices if n.severity == "error" or n.code not in told)
+    return join_faults(tuple(n for n in notices if n.severity == "error" or n.code not in told))
+
+
+FAILURE_CAUSES: Final = ("unequal_lengths", "channel_stuck", "gap")
+"""Why a sensor failed (`sensor_failed`), the most precise first."""
+
+FAILURE_EFFECTS: Final = ("foot_missing", "figure_incomplete")
+"""What is missing for want of that very sensor."""
+
+
+def join_faults(notices: Sequence[Notice]) -> tuple[Notice, ...]:
+    """Join what is said of one failed sensor into one notice: why it failed, then what follows."""
+    failed = {n.sensor for n in notices if n.code == "sensor_failed"}
+    causes: dict[str | None, Notice] = {}
+    for code in FAILURE_CAUSES:
+        for n in notices:
+            if n.code == code and n.sensor in failed:
+                causes.setdefault(n.sensor, n)
+    joined = []
+    for n in notices:
+        if n.severity != "error" and n.sensor in failed and n.code in (*FAILURE_CAUSES, *FAILURE_EFFECTS):
+            continue
+        cause = causes.get(n.sensor) if n.code == "sensor_failed" else None
+        if cause is not None:
+            n = replace(n, message=f"{cause.message} {n.message}", t_s=cause.t_s)
+        joined.append(n)
+    return tuple(joined)
 
 
 def apply_review(bundle: Bundle, measured: MeasuredGait, edits: Sequence[Edit]) -> Bundle:

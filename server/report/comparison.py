@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from core.change import NOT_MEASURED_ALIKE, Change, parameter_changes, withdraw_verdicts
 from core.frames import Side
-from core.norms import Norms, NormValue
+from core.norms import Norms
 from core.parameters.catalogue import CATALOGUE
 from server.report.change_words import SCORE_TERMS, ChangeWords, change_words, find_term
 from server.report.columns import write_csv
@@ -22,6 +22,9 @@ STANDING: Final = "from standing"
 """Of what a change is whose row stands for another zero."""
 
 Group = tuple[str, tuple[ParameterRow, ...]]
+
+NormsOfTwo = tuple[Norms, Norms]
+"""References of the earlier and of the later session."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +48,16 @@ class ComparedRow:
 
 
 def compare_figures(
-    before: Numbers, after: Numbers, norms: Norms | None = None, affected: Side | None = None
+    before: Numbers, after: Numbers, norms: NormsOfTwo | None = None, affected: Side | None = None
 ) -> tuple[Change, ...]:
-    """What changed of every figure that either session has, in the order of the table."""
-    known: Mapping[str, NormValue] = {} if norms is None else norms.values
+    """What changed of every figure that either session has, in the order of the table.
+
+    Parameters
+    ----------
+    norms : of the earlier and of the later session, each at its own speed; without them changes have no
+        direction.
+    """
+    known = None if norms is None else (norms[0].values, norms[1].values)
     there = {(p.name, p.side) for n in (before, after) for p in collect_figures(n) if p.mean is not None}
     order = {name: i for i, name in enumerate((*CATALOGUE, *SCORE_TERMS))}
     found = [
@@ -62,7 +71,7 @@ def compare_figures(
 def compare_rows(
     before: Numbers,
     after: Numbers,
-    norms: Norms | None = None,
+    norms: NormsOfTwo | None = None,
     affected: Side | None = None,
     *,
     comparable: bool = True,

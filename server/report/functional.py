@@ -14,7 +14,7 @@ from core.norms.functional import (
     find_six_minute_norm,
     find_test_norm,
 )
-from core.parameters.catalogue import CATALOGUE
+from core.parameters.catalogue import CATALOGUE, require_entries
 from core.parameters.result import Parameter
 from server.report.bundle import Bundle
 from server.report.svg import format_coordinate, stretch
@@ -28,6 +28,8 @@ TOTALS: Final = (
     "sway_rms_mps2",
 )
 """The figure that stands for a test, by what was measured."""
+
+require_entries(TOTALS, "server.report.functional")
 
 SEGMENTS: Final[Mapping[str, str]] = {
     "sit_to_stand": "Rising",

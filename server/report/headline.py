@@ -13,11 +13,11 @@ from math import hypot
 from typing import Final, Literal
 
 from core.change import Change, ChangedFact, SortedChanges, name_fact
-from core.errors import Notice
 from core.events.result import COMPARED, Strides
 from core.flags import Flag
 from core.frames import SIDES, Side
 from core.norms.lookup import Norms
+from core.parameters.catalogue import find_entry
 from core.parameters.flats import OTHER
 from core.parameters.variability import NORMAL_95
 from server.report.change_words import change_words, find_term
@@ -99,7 +99,7 @@ class Headline:
 
     Parameters
     ----------
-    badge : how many strides count and what to do first, in one sentence.
+    badge : how many strides count, in one sentence; empty for poor data.
     stands_out, changed : all sentences, largest first. looked_at : figures that could have spoken.
     changes : every change since the visit before, by its verdict.
     """
@@ -129,8 +129,18 @@ class Headline:
 
     @property
     def ranks(self) -> dict[str, int]:
-        """Parameter → place of the sentence that it proves; the number stands before its row."""
+        """Rank of the sentence by the name of its figure; printed at the row of that name."""
         return {s.name: rank for rank, s in enumerate(self.shown, 1)}
+
+    @property
+    def curve_ranks(self) -> dict[str, tuple[int, ...]]:
+        """Ranks of the sentences about figures of a cycle curve, by its variable; printed at its chart."""
+        ranks: dict[str, tuple[int, ...]] = {}
+        for name, rank in self.ranks.items():
+            entry = find_entry(from_standing(name) or name)
+            if entry is not None and entry.curve is not None:
+                ranks[entry.curve.variable] = (*ranks.get(entry.curve.variable, ()), rank)
+        return ranks
 
     @property
     def standouts_left(self) -> tuple[str, ...]:
@@ -163,26 +173,22 @@ def _tells(sentence: HeadlineSentence, fact: ChangedFact) -> bool:
     )
 
 
-def say_badge(kind: str, strides: Strides, notices: Sequence[Notice]) -> str:
-    """How many strides count and what to know of them, in one sentence.
+def say_badge(kind: str, strides: Strides) -> str:
+    """How many strides count, in one sentence; empty for data that are not good enough to count them.
 
     Parameters
     ----------
     kind : ok, warn or bad, of the data as a whole.
     """
+    if kind == "bad":
+        return ""
     left, right = (len(strides.select_used(side)) for side in SIDES)
     count = left + right
     counted = f"{count} stride{'' if count == 1 else 's'} used, {left} left and {right} right"
-    if kind == "bad":
-        stopped = next((n.message for n in notices if n.severity == "error"), None)
-        return stopped or "Numbers are withheld or in doubt; the notices below say why."
     if min(left, right) < COMPARED and strides.strides:
         return f"{counted}: fewer than {COMPARED} of a side are compared with nobody."
     if not strides.strides:
         return "Steps are told by the trunk; sides are not compared."
-    told = sum(n.severity == "warning" for n in notices)
-    if kind == "warn" and told:
-        return f"{counted}; {'one notice says' if told == 1 else f'{told} notices say'} what to check below."
     return f"{counted}."
 
 
@@ -193,7 +199,8 @@ def find_standouts(
 
     Parameters
     ----------
-    rows : of the parameter table, those from the anatomical zero too. norms : they were held against.
+    rows : of the parameter table, every angle from the zero of its curve (`level.choose_zero`).
+    norms : they were held against.
     flags : values against limits.
     """
     told = [row for row in rows if _phrases(row.name) is not None and not row.low_confidence]
@@ -297,32 +304,41 @@ def _people(row: ParameterRow, family: Family) -> str:
 
 
 def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence | None:
-    """The sides against each other, None where their strides and measurement leave open which is larger."""
+    """The sides against each other, of the one further from its norm.
+
+    None where strides and measurement leave open which is larger, and where both are within the norm.
+    """
     s = row.symmetry
     if s is None or not s.clear or s.low is None or s.high is None or not (p.smaller or p.larger):
         return None
     if row.left is None or row.right is None:
         return None
-    norm = norms.values.get(row.name) or norms.comfortable.get(row.name)
+    name = from_standing(row.name) or row.name
+    norm = norms.values.get(name) or norms.comfortable.get(name)
     healthy = BEYOND_SD * norm.difference_sd if norm is not None and norm.difference_sd else 0.0
     share = p.apart * 0.5 * (abs(row.left.value) + abs(row.right.value))
     size = abs(s.difference) / max(0.5 * (s.high - s.low), healthy, share, p.least)
     larger: Side = s.first if s.difference > 0.0 else OTHER[s.first]
-    side = _side_spoken_of(row, larger, p)
+    side = _side_off_norm(row) if _has_norm(row) else larger if p.names_larger else OTHER[larger]
+    if side is None:
+        return None
     words = {"d": _number(row, abs(s.difference)), "cm": format_number(100.0 * abs(s.difference), 0)}
     return _sentence(
         row.name, p.family, "sides", size, p.larger if side == larger else p.smaller, words, side
     )
 
 
-def _side_spoken_of(row: ParameterRow, larger: Side, p: Phrases) -> Side:
-    """Of two sides with words for both the one further from the norm; without a norm the smaller."""
-    if not (p.smaller and p.larger):
-        return OTHER[larger] if p.smaller else larger
-    most, least = _cell(row, larger), _cell(row, OTHER[larger])
-    if most is None or least is None or most.z is None or least.z is None:
-        return OTHER[larger]
-    return larger if abs(most.z) > abs(least.z) else OTHER[larger]
+def _has_norm(row: ParameterRow) -> bool:
+    return any(c is not None and c.z is not None for c in (row.left, row.right))
+
+
+def _side_off_norm(row: ParameterRow) -> Side | None:
+    """The side further from its norm; None where both are within it."""
+    z = {side: c.z for side in SIDES if (c := _cell(row, side)) is not None and c.z is not None}
+    certain = (_certain_z(row, _cell(row, side)) for side in SIDES)
+    if not any(one is not None and abs(one) > BEYOND_SD for one in certain):
+        return None
+    return max(z, key=lambda side: abs(z[side]))
 
 
 def _join_steps(found: list[HeadlineSentence], rows: Mapping[str, ParameterRow]) -> list[HeadlineSentence]:

@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from core.parameters.catalogue import require_entries
+
 Family = Literal[
     "speed", "step", "support", "foot_contact", "foot_swing", "push_off", "knee_stance", "knee_swing", "hip",
     "trunk",
@@ -27,8 +29,9 @@ class Phrases:
     family : of which one figure speaks.
     least : smallest difference of the sides worth saying, in the figure's unit; our choice.
     apart : healthy sides differ by less, as a share of their mean; 0 where the norm says it or nobody.
-    smaller, larger : of two sides that differ, spoken of the side with the smaller or the larger value; with
-        both, of the side that is further from the norm.
+    smaller, larger : of two sides that differ, with the side of the smaller or of the larger value named. The
+        side further from the norm is named.
+    names_larger : without a norm the side of the larger value is named, else that of the smaller.
     both_low, both_high : both sides, or the whole take, beyond the norm.
     side_low, side_high : one side beyond the norm.
     up, down : of a change since the visit before.
@@ -45,6 +48,7 @@ class Phrases:
     up: str = ""
     down: str = ""
     apart: float = 0.0
+    names_larger: bool = False
 
 
 PHRASES: Final[Mapping[str, Phrases]] = {
@@ -81,7 +85,9 @@ PHRASES: Final[Mapping[str, Phrases]] = {
         "step",
         0.02,
         apart=0.08,
+        smaller="The {side} step takes *{d} s less* than the {other}",
         larger="The {side} step takes *{d} s longer* than the {other}",
+        names_larger=True,
         up="The {side} step takes *{d} s longer*",
         down="The {side} step takes *{d} s less*",
     ),
@@ -89,7 +95,9 @@ PHRASES: Final[Mapping[str, Phrases]] = {
         "support",
         2.0,
         apart=0.05,
+        smaller="The {side} stance phase is *{d} points shorter* than the {other}",
         larger="The {side} leg carries longer: *{d} points* more stance than the {other}",
+        names_larger=True,
         both_low="Both feet carry *shortly*: {l} % and {r} % of the stride, usual {a} to {b}",
         both_high="Both feet carry *long*: {l} % and {r} % of the stride, usual {a} to {b}",
         side_low="The {side} leg carries *shortly*: {v} % of the stride, usual {a} to {b}",
@@ -109,6 +117,7 @@ PHRASES: Final[Mapping[str, Phrases]] = {
         "foot_contact",
         5.0,
         smaller="The {side} foot lands *{d}° flatter* than the {other}",
+        larger="The {side} foot lands with the toes *{d}° higher* than the {other}",
         both_low="Both feet land *flat*: toes {l}° and {r}° up, usual {a}° to {b}°",
         both_high="Both feet land *steeply*: toes {l}° and {r}° up, usual {a}° to {b}°",
         side_low="The {side} foot lands *flat*: toes {v}° up, usual {a}° to {b}°",
@@ -120,6 +129,7 @@ PHRASES: Final[Mapping[str, Phrases]] = {
         "foot_contact",
         5.0,
         smaller="The {side} ankle is *{d}° more pointed* at contact than the {other}",
+        larger="The {side} ankle is *{d}° more dorsiflexed* at contact than the {other}",
         up="The {side} ankle is *{d}° less pointed* at contact",
         down="The {side} ankle is *{d}° more pointed* at contact",
     ),
@@ -127,6 +137,7 @@ PHRASES: Final[Mapping[str, Phrases]] = {
         "foot_swing",
         5.0,
         smaller="The {side} toes *hang {d}° lower* in swing than the {other}",
+        larger="The {side} ankle is *{d}° more dorsiflexed* in swing than the {other}",
         both_low="Both feet *hang down* in swing: {l}° and {r}° up, usual {a}° to {b}°",
         side_low="The {side} foot *hangs down* in swing: {v}° up, usual {a}° to {b}°",
         up="The {side} toes are held *{d}° higher* in swing",
@@ -135,14 +146,18 @@ PHRASES: Final[Mapping[str, Phrases]] = {
     "circumduction_m": Phrases(
         "foot_swing",
         0.02,
+        smaller="The {side} foot swings *{cm} cm less* to the side than the {other}",
         larger="The {side} foot swings *{cm} cm further* to the side than the {other}",
+        names_larger=True,
         up="The {side} foot swings *{cm} cm further* to the side",
         down="The {side} foot swings *{cm} cm less* to the side",
     ),
     "foot_pitch_tc_deg": Phrases(
         "push_off",
         5.0,
+        smaller="The {side} heel rises *{d}° more* at push-off than the {other}",
         larger="The {side} heel rises *{d}° less* at push-off than the {other}",
+        names_larger=True,
         up="The {side} heel rises *{d}° less* at push-off",
         down="The {side} heel rises *{d}° more* at push-off",
     ),
@@ -161,7 +176,9 @@ PHRASES: Final[Mapping[str, Phrases]] = {
     "knee_flexion_min_stance_deg": Phrases(
         "knee_stance",
         5.0,
+        smaller="The {side} knee is *{d}° straighter* in stance than the {other}",
         larger="The {side} knee stays *{d}° more bent* in stance than the {other}",
+        names_larger=True,
         both_low="Both knees go *past straight* in stance: {l}° and {r}°, usual {a}° to {b}°",
         both_high="Both knees stay *bent* while they carry: {l}° and {r}°, usual {a}° to {b}°",
         side_low="The {side} knee goes *past straight* in stance: {v}°, usual {a}° to {b}°",
@@ -172,7 +189,9 @@ PHRASES: Final[Mapping[str, Phrases]] = {
     "knee_flexion_ic_deg": Phrases(
         "knee_stance",
         5.0,
+        smaller="The {side} knee lands *{d}° straighter* than the {other}",
         larger="The {side} knee lands *{d}° more bent* than the {other}",
+        names_larger=True,
         both_high="Both knees land *bent*: {l}° and {r}°, usual {a}° to {b}°",
         side_high="The {side} knee lands *bent*: {v}°, usual {a}° to {b}°",
         up="The {side} knee lands *{d}° more bent*",
@@ -182,6 +201,7 @@ PHRASES: Final[Mapping[str, Phrases]] = {
         "knee_swing",
         5.0,
         smaller="The {side} knee bends *{d}° less* in swing than the {other}",
+        larger="The {side} knee bends *{d}° more* in swing than the {other}",
         both_low="Both knees bend *little* in swing: {l}° and {r}°, usual {a}° to {b}°",
         both_high="Both knees bend *much* in swing: {l}° and {r}°, usual {a}° to {b}°",
         side_low="The {side} knee bends *little* in swing: {v}°, usual {a}° to {b}°",
@@ -204,7 +224,9 @@ PHRASES: Final[Mapping[str, Phrases]] = {
     "hip_flexion_min_deg": Phrases(
         "hip",
         5.0,
+        smaller="The {side} hip extends *{d}° further* than the {other}",
         larger="The {side} hip stays *{d}° short* of the {other} behind the body",
+        names_larger=True,
         both_high="Both hips stay *short* behind the body: {l}° and {r}°, usual {a}° to {b}°",
         side_high="The {side} hip stays *short* behind the body: {v}°, usual {a}° to {b}°",
         up="The {side} hip goes *{d}° less far* behind the body",
@@ -224,6 +246,8 @@ PHRASES: Final[Mapping[str, Phrases]] = {
     ),
 }
 """In the order in which equals are told."""
+
+require_entries(PHRASES, "server.report.headline_phrases")
 
 SHORT_AND_QUICK: Final = (
     "Steps are *short and quick*: {l} m at {c} a minute, usual at this speed {a} to {b} m"

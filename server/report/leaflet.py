@@ -8,6 +8,7 @@ from typing import Final
 
 from core.change import NOT_MEASURED_ALIKE, Change
 from core.frames import Side
+from core.parameters.catalogue import require_entries
 from core.parameters.result import Parameter
 from server.report.wording import format_number
 
@@ -47,6 +48,8 @@ FIGURES: Final = (
     ),
 )
 """Speed, step and knee: what people who train their walk ask about."""
+
+require_entries((f.name for f in FIGURES), "server.report.leaflet")
 
 REAL: Final = ("real_change", "clinically_relevant")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -10,7 +10,7 @@ from core.events.result import Strides
 from core.frames import SIDES
 from core.norms import Norms
 from core.parameters.anatomical_zero import anatomical_parameters, standing_name, standing_offset_deg
-from core.parameters.catalogue import CATALOGUE
+from core.parameters.catalogue import find_entry
 from core.parameters.result import CycleCurves, Parameter
 from core.parameters.rows import Column
 from core.standing_angles import JOINTS, PELVIS
@@ -32,7 +32,7 @@ def from_standing(name: str) -> str | None:
 
 def define_parameter(name: str) -> str:
     """What a figure is, in a sentence, "" where the catalogue has none; from the anatomical zero too."""
-    entry = CATALOGUE.get(from_standing(name) or name)
+    entry = find_entry(from_standing(name) or name)
     if entry is None or from_standing(name) is None:
         return "" if entry is None else entry.definition
     return entry.definition.replace(STANDING, "from the anatomical zero")
@@ -41,7 +41,7 @@ def define_parameter(name: str) -> str:
 def label_parameter(name: str) -> str:
     """What a figure is called, the name itself where the catalogue has none; a level says its zero."""
     standing = from_standing(name)
-    entry = CATALOGUE.get(standing or name)
+    entry = find_entry(standing or name)
     if entry is None:
         return name
     return entry.label if standing is None else title_of(standing, entry.label, "anatomical")
@@ -94,6 +94,26 @@ def level_rows(
     found = _measured_parameters(curves, standing_deg, estimated)
     rows = parameter_rows(found, norms, zero="anatomical")
     return tuple(replace(row, name=_level_name(row.name), group=GROUP) for row in rows)
+
+
+def choose_zero(rows: Iterable[ParameterRow], anatomical: Collection[str]) -> tuple[ParameterRow, ...]:
+    """Rows of a page: every joint angle once, measured from the zero of its curve.
+
+    Parameters
+    ----------
+    anatomical : variables whose curves are drawn from the anatomical zero.
+    """
+    given = tuple(rows)
+    names = {row.name for row in given}
+
+    def is_of_page(row: ParameterRow) -> bool:
+        entry = find_entry(from_standing(row.name) or row.name)
+        is_anatomical = entry is not None and entry.curve is not None and entry.curve.variable in anatomical
+        if from_standing(row.name) is not None:
+            return is_anatomical
+        return not (is_anatomical and _level_name(row.name) in names)
+
+    return tuple(row for row in given if is_of_page(row))
 
 
 def _measured_parameters(

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from core.flags import Flag
+from core.flags import RULES, Flag
 from server.report.wording import format_number, reason_words
 
 NAMES: Final[Mapping[str, str]] = {
@@ -29,8 +29,10 @@ NAMES: Final[Mapping[str, str]] = {
 }
 """Rule → what is held against its limit."""
 
+if _unnamed := {rule.name for rule in RULES} - set(NAMES):
+    raise ValueError(f"server.report.limits has no words for the rules {', '.join(sorted(_unnamed))}.")
+
 NOTES: Final[Mapping[str, str]] = {
-    "no_speed_matched_norm": "the people of the limit walk faster",
     "sides_stand_differently": "a difference in standing is part of it",
 }
 
@@ -40,6 +42,7 @@ REASONS: Final[Mapping[str, str]] = {
     "side_missing": "the other side is missing",
     "near_zero": "a side is near zero",
     "no_norm_for_age": "the people of the limit are adults",
+    "no_speed_matched_norm": "no norm at this walking speed",
     "too_few_strides": "too few strides to judge",
     "sides_alike": "strides and measurement do not say that the sides differ",
 }
@@ -54,10 +57,12 @@ class LimitRow:
 
     Parameters
     ----------
+    measure : name of what is held against the limit.
     kind : "warn" beyond its limit, "bad" beyond a second one too, "ok" within, "none" not to be said.
     """
 
     name: str
+    measure: str
     side: str
     value: str
     limit: str
@@ -96,6 +101,7 @@ def _row(f: Flag) -> LimitRow:
     kind = "none" if f.exceeded is None else "bad" if f.marked else "warn" if f.exceeded else "ok"
     return LimitRow(
         name=NAMES.get(f.name, f.name.replace("_", " ").capitalize()),
+        measure=f.measure,
         side=f.side or "",
         value="–" if f.value is None else f"{format_number(f.value, digits)}{unit}",
         limit="" if f.limit is None else f"{sign} {format_number(f.limit, digits)}{unit}",

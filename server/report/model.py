@@ -22,6 +22,7 @@ from core.norms.lookup import Norms, look_up_norms
 from core.norms.profile import CurveReference
 from core.parameters import cycle_curves
 from core.parameters.anatomical_zero import anatomical_variables
+from core.parameters.catalogue import require_entries
 from core.parameters.result import CycleCurves
 from core.parameters.uncertainty import mark_estimated
 from core.scores import Scores, score_curves
@@ -36,7 +37,7 @@ from server.report.estimator import (
 )
 from server.report.functional import TEST_NORM_NOTE, FunctionalView, functional_view
 from server.report.headline import Headline, find_standouts, say_badge
-from server.report.level import level_rows
+from server.report.level import choose_zero, level_rows
 from server.report.limits import LimitsView, limits_view
 from server.report.notes import curve_notes, norm_note
 from server.report.panels import CurvePanel, SideCurve, curve_panels
@@ -65,6 +66,8 @@ KEY_NUMBERS: Final = (
     "daily_rise_count",
 )
 """Parameters for the overview, in this order of preference."""
+
+require_entries(KEY_NUMBERS, "server.report.model")
 
 SHOWN_LARGE: Final = 4
 """So many of them are shown, those that were measured."""
@@ -168,6 +171,12 @@ class ReportModel:
     def key_curve(self) -> CurvePanel:
         """Panel of knee flexion."""
         return next(p for p in self.panels if p.variable.name == KEY_CURVE)
+
+    @property
+    def page_groups(self) -> tuple[tuple[str, tuple[ParameterRow, ...]], ...]:
+        """The groups as a page shows them: every joint angle once, measured from the zero of its curve."""
+        rows = (row for _, group in self.groups for row in group)
+        return group_rows(choose_zero(rows, _list_anatomical(self.panels)))
 
     @property
     def has_sides(self) -> bool:
@@ -325,7 +334,7 @@ def report_model(
         limits=limits_view(flags) if flags else None,
         headline=None
         if bundle.repetitions is not None or bundle.activity is not None or by_trunk
-        else _headline(bundle, quality, rows, norms, flags),
+        else _headline(bundle, quality, choose_zero(rows, _list_anatomical(panels)), norms, flags),
         daily=daily_life_view(bundle.activity),
         profile=None
         if curves is None
@@ -336,6 +345,10 @@ def report_model(
             else _scores(bundle, curves, age, matched),
         ),
     )
+
+
+def _list_anatomical(panels: Sequence[CurvePanel]) -> set[str]:
+    return {p.variable.name for p in panels if p.zero == "anatomical"}
 
 
 def _scores(
@@ -372,7 +385,7 @@ def _headline(
     flags: Sequence[Flag],
 ) -> Headline:
     """Poor data say nothing of the person: then the badge alone speaks."""
-    badge = say_badge(quality.kind, bundle.strides, bundle.warnings)
+    badge = say_badge(quality.kind, bundle.strides)
     if quality.kind == "bad":
         return Headline(badge)
     standouts, looked_at = find_standouts(rows, norms, flags)

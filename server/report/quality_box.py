@@ -6,13 +6,14 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, cast
 
+from core.activity.parameters import WORN_H
 from core.parameters.result import Parameter
 from core.quality import concern_paths_alone, find_shown_level
 from core.quality.assessment import Verdict
 from core.squat.repetitions import FOOT_LIFTED
 from server.report.bundle import Bundle, is_functional
 from server.report.estimator import estimator_view
-from server.report.wording import format_number, place_words
+from server.report.wording import format_number, place_words, speak_places
 
 CALIBRATION_METHODS: Final[Mapping[str, str]] = {
     "walking_direction": "from standing and walking",
@@ -25,6 +26,9 @@ CALIBRATION_METHODS: Final[Mapping[str, str]] = {
     "trunk_bow": "from bows of the trunk",
 }
 """Method of a calibration → words."""
+
+NO_WHOLE_DAY: Final = f"No day has {WORN_H:g} hours of wear time, so no values per day are reported."
+IN_DOUBT: Final = "Numbers are withheld or in doubt."
 
 
 @dataclass(frozen=True)
@@ -50,19 +54,27 @@ class QualityItem:
 
 @dataclass(frozen=True)
 class QualityBox:
-    """Verdict (`kind` ok, warn, bad and its word) and the facts behind it."""
+    """Verdict (`kind` ok, warn, bad and its word) and the facts behind it.
+
+    Parameters
+    ----------
+    reason : why the data are not good, in sentences; empty where they are.
+    more : warnings beside that reason.
+    """
 
     kind: str
     word: str
     items: tuple[QualityItem, ...]
+    reason: str = ""
+    more: int = 0
 
 
 def quality_box(bundle: Bundle) -> QualityBox:
     """Judge a finished analysis.
 
     Bad when the analysis stopped, no stride counts, the signals are poor or the pose estimator cannot stand
-    behind its result; warn when the signals are only usable, the estimator doubts or any stage has a warning;
-    else ok.
+    behind its result; warn when the signals are only usable, the estimator doubts, any stage has a warning or
+    no day of daily life is complete; else ok. A notice for information changes nothing.
     """
     kind, word = data_verdict(
         bundle.quality, bundle.estimator, {n.severity for n in bundle.warnings}, bundle.parameters
@@ -81,7 +93,32 @@ def quality_box(bundle: Bundle) -> QualityBox:
         ),
         *_estimator(bundle.estimator),
     ]
-    return QualityBox(kind, word, tuple(items))
+    reason, more = explain_verdict(kind, bundle)
+    return QualityBox(kind, word, tuple(items), reason, more)
+
+
+def explain_verdict(kind: str, bundle: Bundle) -> tuple[str, int]:
+    """Why the data are not good, and how many warnings there are besides.
+
+    What stopped the analysis goes first, then sensors that contradict each other, a sensor that failed, and
+    the first of the other warnings.
+    """
+    if kind == "ok":
+        return "", 0
+    daily = _daily_steps(bundle.parameters)
+    if kind == "warn" and daily is not None and not daily.n:
+        return NO_WHOLE_DAY, sum(n.severity == "warning" for n in bundle.warnings)
+    told = [n for n in bundle.warnings if n.severity in ("error", "warning")]
+    told.sort(key=lambda n: (n.severity != "error", n.code != "sensor_failed"))
+    health = None if bundle.estimator is None else bundle.estimator["verdict"]
+    reasons = tuple(bundle.quality.get("reasons", ()))
+    if kind == "bad" and health == "bad" and reasons and not (told and told[0].severity == "error"):
+        return speak_places(reasons[-1]), len(told)
+    if told:
+        return speak_places(told[0].message), len(told) - 1
+    if reasons:
+        return speak_places(reasons[0]), 0
+    return (IN_DOUBT if kind == "bad" else ""), 0
 
 
 def data_verdict(
@@ -112,13 +149,15 @@ def data_verdict(
         or any(p.name == "stride_time_s" and p.n for p in parameters)
         or _trunk_steps(parameters)
     )
-    daily = _daily_steps(parameters) is not None
-    if not squats and not daily and not walked:
+    daily = _daily_steps(parameters)
+    if not squats and daily is None and not walked:
         return "bad", "No strides"
     if level == "poor":
         return "bad", "Poor data" if estimator is None or health != "bad" else _name_bad_estimate(estimator)
     if level == "usable" or "warning" in severities:
         return "warn", "Usable, see notices"
+    if daily is not None and not daily.n:
+        return "warn", "No complete day"
     return "ok", "Good data"
 
 

@@ -9,13 +9,16 @@ from itertools import pairwise
 from typing import Final
 
 from core.frames import Side
-from server.report.change_words import ChangeWords, change_words, format_limit
+from core.parameters.catalogue import require_entries
+from server.report.change_words import SCORE_TERMS, ChangeWords, change_words, format_limit
 from server.report.svg import KEY, format_coordinate
 from server.report.trends import AnalysedVisit, Trend, TrendSeries, collect_figures, follow_figures
 from server.report.wording import Term, format_number, reason_words
 
 FIGURES: Final = ("gait_speed_mps", "gps_sagittal_deg", "step_length_m")
 """In this order as long as their lines fit into `MOST_LINES`; step length where there is no score."""
+
+require_entries((name for name in FIGURES if name not in SCORE_TERMS), "server.report.trend_strip")
 
 MOST_LINES: Final = 3
 LEAST_VISITS: Final = 3

@@ -17,7 +17,7 @@ from core.change.limits import Limb
 from core.condition import WalkingCondition
 from core.frames import SIDES, Side
 from core.norms import Norms, NormValue
-from core.parameters.catalogue import CATALOGUE
+from core.parameters.catalogue import CATALOGUE, require_entries
 from core.parameters.result import Parameter
 from server.report.change_words import SCORE_TERMS, find_term
 from server.report.numbers import Numbers
@@ -34,6 +34,8 @@ PRIMARY: Final = (
     "gps_sagittal_deg",
 )
 """Figures shown when the reader has chosen none; without any of them the first that are there."""
+
+require_entries((name for name in PRIMARY if name not in SCORE_TERMS), "server.report.trends")
 
 SCORE_MODE: Final = "offset_removed"
 """Shape without level: angles start from the standing of that day."""
@@ -131,7 +133,7 @@ def names_in(visits: Sequence[AnalysedVisit]) -> tuple[str, ...]:
 def follow_figures(
     visits: Sequence[AnalysedVisit],
     names: Sequence[str],
-    norms: Norms | None = None,
+    norms: Sequence[Norms] = (),
     usual: Mapping[str, NormValue] | None = None,
     affected: Side | None = None,
 ) -> tuple[Trend, ...]:
@@ -139,15 +141,18 @@ def follow_figures(
 
     Parameters
     ----------
-    norms : of this person at the speed of the last visit. usual : of people of this age and sex at their own
-        comfortable speed; the reference of speed itself, which cannot be matched by speed.
+    norms : of this person, one of every visit at its speed; empty = none. A trend shows that of the last
+        visit without feedback.
+    usual : of people of this age and sex at their own comfortable speed; the reference of speed itself,
+        which cannot be matched by speed.
     affected : side, None = none or both.
     """
     tables = [{(p.name, p.side): p for p in collect_figures(visit.numbers)} for visit in visits]
     found = []
+    last = next((i for i in reversed(range(len(visits))) if not visits[i].feedback), len(visits) - 1)
     for name in names:
-        norm = _norm(name, visits, norms, usual or {})
-        lines = [_line(name, side, visits, tables, norm, affected) for side in (None, *SIDES)]
+        norm = _norm(name, visits, norms[last] if norms else None, usual or {})
+        lines = [_line(name, side, visits, tables, norms, affected) for side in (None, *SIDES)]
         kept = tuple(line for line in lines if line is not None)
         if kept:
             found.append(Trend(name, find_term(name, _unit(name, tables)), kept, norm))
@@ -204,7 +209,7 @@ def _line(
     side: Side | None,
     visits: Sequence[AnalysedVisit],
     tables: Sequence[Table],
-    norm: NormValue | None,
+    norms: Sequence[Norms],
     affected: Side | None,
 ) -> TrendSeries | None:
     measured = [
@@ -217,13 +222,13 @@ def _line(
     assessed = [k for k, (i, _, _) in enumerate(measured) if visits[i].kind == "assessment"]
     base = next((k for k in assessed if not measured[k][1].estimated), assessed[0] if assessed else None)
     first = None if base is None else measured[base][1]
-    known = None if norm is None else {name: norm}
 
     def change(k: int) -> Change | None:
         i, p, _ = measured[k]
         if first is None or k == base or visits[i].feedback:
             return None
-        return parameter_changes([first], [p], affected, known)[0]
+        at = (norms[measured[base or 0][0]].values, norms[i].values) if norms else None
+        return parameter_changes([first], [p], affected, at)[0]
 
     points = [
         TrendValue(i, value, p.sd, p.n, p.ci_low, p.ci_high, change(k), p.estimated)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from core.parameters.catalogue import CATALOGUE, Comparison
+from core.parameters.catalogue import Comparison, find_entry
 from core.parameters.kinematic import is_level
 from core.parameters.symmetry import Symmetry
 
@@ -88,8 +88,10 @@ class Term:
 
 
 def parameter_term(name: str) -> Term:
-    """How the table shows a parameter of the catalogue; KeyError for any other."""
-    e = CATALOGUE[name]
+    """How a parameter or a figure of a rule is shown; KeyError for a name the catalogue does not have."""
+    e = find_entry(name)
+    if e is None:
+        raise KeyError(name)
     return Term(e.label, e.printed_unit, e.group, e.digits, e.scale, e.comparison)
 
 
@@ -187,7 +189,7 @@ GROUPS: Final[Mapping[str, str]] = {
 
 NO_NORM: Final[Mapping[str, str]] = {
     "no_norm_for_age": "No norm for this age: the reference people are adults.",
-    "no_speed_matched_norm": "No norm at this speed: nobody in the reference walked as slowly.",
+    "no_speed_matched_norm": "No norm at this speed: it is outside the range of the reference people.",
     "age_unknown": "No norm for timing: enter the year of birth.",
     "sex_unknown": "No norm for timing: enter the sex.",
 }

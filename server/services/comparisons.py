@@ -120,8 +120,15 @@ def compare_sessions(reviewed: ReviewedAnalyses, found: SessionPair) -> tuple[Co
     """The table of a comparison; raises IntegrityError."""
     old = reviewed.read_numbers(found.before.found, found.before.edits)
     new = reviewed.read_numbers(found.after.found, found.after.edits)
-    known = find_norms(found.patient, found.after.session, new)
+    known = pair_norms(found.patient, (found.before.session, old), (found.after.session, new))
     return compare_rows(old, new, known, found.patient.affected_side, comparable=found.comparable)
+
+
+def pair_norms(
+    patient: Patient, before: tuple[Session, Numbers], after: tuple[Session, Numbers]
+) -> tuple[Norms, Norms]:
+    """The references of a person at two sessions, each at its own speed."""
+    return find_norms(patient, *before), find_norms(patient, *after)
 
 
 def find_norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:

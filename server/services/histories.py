@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 from sqlalchemy import Connection
@@ -13,6 +13,7 @@ from core.condition import WalkingCondition, is_alike
 from core.norms import Norms, NormValue, look_up_norms, temporal_values
 from server.report import daily_trend
 from server.report.daily_trend import CapacityVisit, PerformanceDay
+from server.report.numbers import Numbers
 from server.report.trends import AnalysedVisit, VisitKind
 from server.services import analyses, edit_log, programmes, sessions
 from server.services.errors import NotFound
@@ -39,12 +40,12 @@ class PatientHistory:
     others: tuple[OtherWalks, ...]
     programmes: tuple[Programme, ...]
 
-    @property
-    def norms(self) -> Norms | None:
-        """Of this person at the speed of the last visit, if possible without feedback; None without any."""
-        if not self.visits:
-            return None
-        numbers = next((v for v in reversed(self.visits) if not v.feedback), self.visits[-1]).numbers
+    @cached_property
+    def norms(self) -> tuple[Norms, ...]:
+        """Of this person at every visit, at its speed."""
+        return tuple(self._find_norms(visit.numbers) for visit in self.visits)
+
+    def _find_norms(self, numbers: Numbers) -> Norms:
         speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
         belt = self.condition is not None and self.condition.protocol == "treadmill"
         return look_up_norms(

@@ -13,7 +13,7 @@ from server.report.headline import find_changes
 from server.report.level import level_column
 from server.report.model import PreviousVisit, ReportModel, report_model
 from server.services import analyses, controls, edit_log
-from server.services.comparisons import find_norms
+from server.services.comparisons import pair_norms
 from server.services.controls import ControlVisit
 from server.services.errors import NotFound
 from server.services.histories import AnalysedSession
@@ -55,7 +55,8 @@ def read(
     if before is None:
         return bundle, model
     old, new = reviewed.read_numbers(before.found, before.edits), reviewed.read_numbers(found, edits)
-    changed = compare_figures(old, new, find_norms(patient, session, new), patient.affected_side)
+    known = pair_norms(patient, (before.session, old), (session, new))
+    changed = compare_figures(old, new, known, patient.affected_side)
     since = PreviousVisit(before.session.id, before.session.performed_on)
     headline = model.headline
     if headline is not None and model.quality.kind != "bad":

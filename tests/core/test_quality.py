@@ -162,6 +162,21 @@ def test_losses_and_holes_are_counted() -> None:
     assert report.level == "usable"
 
 
+def test_a_sensor_that_stopped_early_is_not_reported_again_as_a_gap() -> None:
+    acc, gyr = signals(2000, still=500)
+    keep = np.ones(800, np.bool_)
+    keep[300:500] = False
+    for rows, gaps in ((np.flatnonzero(keep), ["10.0 %"]), (np.arange(800), [])):
+        short = stream("b", acc[rows] + 1.0, gyr[rows], t_s=rows / 100.0)
+        others = {"foot_l": stream("a", acc, gyr), "pelvis": stream("c", acc + 2.0, gyr)}
+        recording = take({**others, "shank_l": short})
+        uniform = synchronise(recording)
+        assert [n.code for n in uniform.notices] == ["unequal_lengths"]
+        said = [n.message for n in assess(recording, uniform).notices if n.code == "gap"]
+        assert len(said) == len(gaps)
+        assert all(share in message for share, message in zip(gaps, said, strict=True))
+
+
 @pytest.mark.parametrize(("lost_s", "told"), [(0.07, False), (0.3, True)])
 def test_the_end_that_a_late_clock_leaves_empty_is_told_from_a_tenth_of_a_second_on(
     lost_s: float, told: bool

@@ -6,6 +6,7 @@ declares a parameter. docs/contributing.md says how to add one.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
 
 from core.parameters.catalogue import (
@@ -13,6 +14,7 @@ from core.parameters.catalogue import (
     daily,
     distances,
     functional,
+    limit_figures,
     phases,
     squat,
     support,
@@ -31,12 +33,54 @@ from core.parameters.catalogue.entry import (
     unit_of,
 )
 
-CATALOGUE: Final[dict[str, ParameterEntry]] = {
-    entry.name: entry
+
+def index_entries(entries: Iterable[ParameterEntry]) -> dict[str, ParameterEntry]:
+    """Index entries by name; ValueError for a name that occurs twice."""
+    index: dict[str, ParameterEntry] = {}
+    for entry in entries:
+        if entry.name in index:
+            raise ValueError(f"The catalogue has two entries of the name {entry.name}.")
+        index[entry.name] = entry
+    return index
+
+
+CATALOGUE: Final[dict[str, ParameterEntry]] = index_entries(
+    entry
     for part in (distances, times, phases, angles, walking, trunk, support, squat, functional, daily)
     for entry in part.ENTRIES
-}
+)
 """Parameter name → its entry, in the order of the tables. Read at every call, so that a test may add one."""
+
+LIMIT_FIGURES: Final[dict[str, ParameterEntry]] = index_entries(limit_figures.ENTRIES)
+"""Figures without a row in the tables: the rules of core/flags compare them with limits."""
+
+index_entries((*CATALOGUE.values(), *LIMIT_FIGURES.values()))
+
+
+def find_entry(name: str) -> ParameterEntry | None:
+    """Return the entry of a parameter or of a figure of a rule; None for an unknown name."""
+    return CATALOGUE.get(name) or LIMIT_FIGURES.get(name)
+
+
+def require_entries(names: Iterable[str], user: str) -> None:
+    """Check that a registry names only figures of the catalogue.
+
+    Called where the registry is built, so that an unknown name fails at import and not on a page.
+
+    Parameters
+    ----------
+    user : the registry, for the message.
+
+    Raises
+    ------
+    ValueError
+        Naming the registry and every name without an entry.
+    """
+    unknown = sorted({name for name in names if find_entry(name) is None})
+    if unknown:
+        raise ValueError(
+            f"{user} uses figures that core/parameters/catalogue does not have: {', '.join(unknown)}."
+        )
 
 
 def list_names(group: str, of: Scope = "stride") -> tuple[str, ...]:
@@ -62,6 +106,7 @@ def name_counted(name: str) -> str:
 
 __all__ = [
     "CATALOGUE",
+    "LIMIT_FIGURES",
     "NEEDS",
     "Comparison",
     "CurveFigure",
@@ -69,9 +114,12 @@ __all__ = [
     "NormKey",
     "ParameterEntry",
     "Scope",
+    "find_entry",
+    "index_entries",
     "list_curve_figures",
     "list_names",
     "list_trainable",
     "name_counted",
+    "require_entries",
     "unit_of",
 ]

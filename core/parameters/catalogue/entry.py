@@ -66,6 +66,8 @@ SWAY: Final = "Sway in quiet standing"
 FUNCTIONAL: Final = (TUG, CHAIR, WALK_TESTS, SWAY)
 """Groups of the functional tests (core/functional_tests)."""
 DAILY: Final = "Daily life"
+LIMITS: Final = "Values against limits"
+"""Group of the figures that are only compared with a limit: no table has rows of them."""
 
 UNITS: Final[Mapping[str, tuple[str, str]]] = {
     "mps": ("m/s", "m/s"),

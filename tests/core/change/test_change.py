@@ -140,10 +140,22 @@ def test_own_repeated_measurements_go_before_published_limits() -> None:
 
 
 def test_a_change_towards_the_norm_is_told_where_the_norm_compares() -> None:
-    norm = NormValue("gait_speed_mps", 1.17, 0.16, None, "g", "s")
-    assert one("gait_speed_mps", 0.6, 0.8, norms={"gait_speed_mps": norm}).towards_norm is True
-    assert one("gait_speed_mps", 1.2, 1.5, norms={"gait_speed_mps": norm}).towards_norm is False
+    norm = {"gait_speed_mps": NormValue("gait_speed_mps", 1.17, 0.16, None, "g", "s")}
+    assert one("gait_speed_mps", 0.6, 0.8, norms=(norm, norm)).towards_norm is True
+    assert one("gait_speed_mps", 1.2, 1.5, norms=(norm, norm)).towards_norm is False
     assert one("gait_speed_mps", 0.6, 0.8).towards_norm is None
+
+
+def test_each_visit_is_placed_in_the_norm_at_its_own_speed() -> None:
+    """Double support 31.6 % at a speed at which 37.7 ± 4.5 is usual, then 27.2 where 30.2 ± 4.5 is."""
+    name = "double_support_pct"
+    slow, faster = ({name: NormValue(name, m, 4.5, 52, "g", "s")} for m in (37.7, 30.2))
+    assert one(name, 31.6, 27.2, norms=(slow, faster)).towards_norm is True
+    assert one(name, 31.6, 27.2, norms=(faster, faster)).towards_norm is False
+    assert one(name, 31.6, 27.2, norms=({}, faster)).towards_norm is None
+    assert one(name, 31.6, 27.2, norms=(slow, {})).towards_norm is None
+    other = {name: replace(slow[name], comparable=False)}
+    assert one(name, 31.6, 27.2, norms=(other, faster)).towards_norm is None
 
 
 def test_levels_from_standing_say_so() -> None:

@@ -186,12 +186,35 @@ def test_circumduction_is_held_against_own_controls_or_nothing() -> None:
     assert "6 controls of this clinic" in left.source
 
 
-def test_who_walks_slower_than_any_norm_is_told_so() -> None:
-    slow = [Parameter("gait_speed_mps", None, 20, 0.5, 0.1, "m/s")]
-    found = judge_flags(curves({"pelvis_obliquity": (5.0, 0.0), "knee_flexion": (30.0, 60.0)}), slow)
-    hike = flag(found, "hip_hiking", "left")
-    assert (hike.exceeded, hike.note) == (True, "no_speed_matched_norm")
-    assert flag(found, "stiff_knee", "left").note == "sides_stand_differently", "its limit is of patients"
+def walked_at(speed_mps: float) -> tuple[Flag, ...]:
+    speed = [Parameter("gait_speed_mps", None, 20, speed_mps, 0.1, "m/s")]
+    walked = {"pelvis_obliquity": (5.0, 0.0), "knee_flexion": (30.0, 60.0), "hip_flexion": (9.0, 9.0)}
+    return judge_flags(curves(walked), speed, {"hip_flexion_l": 0.0, "hip_flexion_r": 0.0})
+
+
+@pytest.mark.parametrize("name", ["hip_hiking", "low_hip_extension"])
+def test_limits_of_healthy_adults_are_those_of_adults_at_this_speed(name: str) -> None:
+    slow, usual = (flag(walked_at(v), name, "left") for v in (0.5, 1.25))
+    assert (slow.exceeded, usual.exceeded) == (slow.value > slow.limit, True)  # type: ignore[operator]
+    assert slow.limit != pytest.approx(usual.limit, abs=1e-3)
+    assert slow.spread is not None
+    assert usual.spread is not None
+    assert slow.spread > usual.spread
+    assert "Schreiber" in slow.source
+
+
+@pytest.mark.parametrize("speed_mps", [0.15, 1.75])
+def test_limits_of_healthy_adults_are_not_applied_at_a_speed_at_which_none_walked(speed_mps: float) -> None:
+    found = walked_at(speed_mps)
+    for rule in RULES:
+        if rule.adults != "limit":
+            continue
+        for side in SIDES:
+            of = flag(found, rule.name, side)
+            assert (of.exceeded, of.limit, of.certain) == (None, None, False)
+            assert of.value is None or of.reason == "no_speed_matched_norm"
+    stiff = flag(found, "stiff_knee", "left")
+    assert (stiff.exceeded, stiff.note) == (True, "sides_stand_differently"), "its limit is of patients"
 
 
 def test_children_are_not_held_against_adult_norms() -> None:

@@ -81,6 +81,7 @@ def test_a_repeated_packet_is_left_out_and_said() -> None:
     stream = one(mt_text(ACC, GYR, counter=counter))
     assert len(stream.t_s) == 299
     assert codes(stream) == ["out_of_order"]
+    assert stream.notices[0].severity == "info", "one row in 300 changes no number"
 
 
 def test_two_takes_in_one_file_are_refused() -> None:
@@ -147,6 +148,7 @@ def test_a_cut_off_last_line_is_left_out_and_said() -> None:
         stream = one(whole[:-cut])
         assert len(stream.t_s) == 299, cut
         assert codes(stream) == ["truncated_line"], cut
+        assert stream.notices[0].severity == "info"
     assert codes(one(whole[:-1])) == []
 
 
@@ -156,6 +158,7 @@ def test_damaged_cells_count_as_missing_and_are_said() -> None:
     lines[50] = "\t".join([*cells[:4], "#####", *cells[5:]])
     stream = one("\n".join(lines))
     assert codes(stream) == ["bad_cells"]
+    assert stream.notices[0].severity == "info"
     assert len(stream.t_s) == 300
     assert np.isnan(stream.acc).sum() == 1
 

@@ -115,9 +115,29 @@ def test_the_walkway_norm_is_that_of_the_pace_walked(
     if pace is None:
         assert found.timing_reason == "no_speed_matched_norm"
         assert "cadence_spm" not in found.values
-        assert "knee_flexion_rom_deg" in found.values
+        assert "knee_flexion_rom_deg" not in found.values
     else:
         assert f"{pace} pace" in found.values["cadence_spm"].group
+
+
+@pytest.mark.parametrize("age", [None, 30, 65])
+@pytest.mark.parametrize("height_m", [None, 1.65, 1.9])
+def test_comfortable_walkers_are_no_norm_of_somebody_who_walks_faster_than_they_did(
+    age: float | None, height_m: float | None
+) -> None:
+    """1.25 ± 0.16 m/s: at 1.68 m/s a healthy hip moves by 10° more than theirs."""
+    fast, brisk = (look_up_norms(age, "male", v, height_m) for v in (1.70, 1.40))
+    assert (fast.reason, dict(fast.bands)) == ("no_speed_matched_norm", {})
+    assert fast.place("hip_flexion_rom_deg", 55.0).reason == "no_speed_matched_norm"
+    assert fast.values["gait_speed_mps"].mean > 1.0, "speed itself keeps the speed that people like"
+    assert (brisk.reason, "hip_flexion_rom_deg" in brisk.values) == (None, True)
+
+
+def test_times_at_a_fast_speed_have_the_norm_of_the_fast_class_or_none() -> None:
+    assert "fast pace" in look_up_norms(30, "male", 1.70).values["cadence_spm"].group
+    old = look_up_norms(72, "female", 1.70)
+    assert (old.timing_reason, "cadence_spm" in old.values) == ("no_speed_matched_norm", False)
+    assert look_up_norms(72, "female", 1.40).timing_reason is None
 
 
 def test_without_age_or_sex_angles_are_compared_and_times_are_not() -> None:

@@ -16,7 +16,8 @@ from core.parameters.catalogue import CATALOGUE
 from core.parameters.result import Parameter
 from server.report.headline import LARGEST, MOST, Headline, find_changes, find_standouts
 from server.report.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
-from server.report.table import parameter_rows
+from server.report.level import choose_zero
+from server.report.table import ParameterRow, parameter_rows
 
 WORDS = {"side", "other", "d", "v", "l", "r", "a", "b", "cm", "c", "word"}
 LONGEST = 100
@@ -88,6 +89,36 @@ def test_of_two_sides_that_differ_the_one_off_the_norm_is_spoken_of() -> None:
     assert told == ["The left hip moves 16° more than the right"]
 
 
+@pytest.mark.parametrize("name", [n for n, p in PHRASES.items() if p.smaller or p.larger])
+@pytest.mark.parametrize("off", ["left", "right"])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_the_leg_further_from_its_norm_is_named(name: str, off: Side, sign: float) -> None:
+    """The other leg is 0.5 SD off the mean, on the same side of it."""
+    p = PHRASES[name]
+    sd = max(p.least, p.apart * 10.0, 0.02)
+    mean = 10.0 * sd
+    values = {"left": mean + sign * 0.5 * sd, "right": mean + sign * 0.5 * sd, off: mean + sign * 4.0 * sd}
+    norms = norm(name, mean, sd, apart=sd)
+    measured_ = both_sides(name, values["left"], values["right"], sd=0.01 * sd)
+    exact = tuple(replace(m, uncertainty=0.01 * sd) for m in measured_)
+    (sentence,) = find_standouts(parameter_rows(exact, norms), norms)[0]
+    assert (sentence.side, sentence.kind) == (off, "sides")
+    assert sentence.text.split()[1] == off
+
+
+@pytest.mark.parametrize("name", [n for n, p in PHRASES.items() if p.smaller or p.larger])
+def test_legs_within_their_norm_make_no_sentence_about_sides(name: str) -> None:
+    p = PHRASES[name]
+    sd = 2.0 * max(p.least, p.apart * 10.0, 0.02)
+    mean = 10.0 * sd
+    pair = both_sides(name, mean - 1.5 * sd, mean + 1.5 * sd, sd=0.01 * sd)
+    exact = tuple(replace(m, uncertainty=0.01 * sd) for m in pair)
+    norms = norm(name, mean, sd, apart=0.1 * sd)
+    assert said(norms, *exact) == []
+    (sentence,) = find_standouts(parameter_rows(exact), Norms(None, None))[0]
+    assert sentence.side == ("right" if p.names_larger else "left"), "without a norm the sides are compared"
+
+
 def test_within_two_deviations_nothing_stands_out() -> None:
     norms = norm("gait_speed_mps", 1.25, 0.16)
     found, looked_at = find_standouts(parameter_rows((measured("gait_speed_mps", None, 0.94),), norms), norms)
@@ -113,6 +144,39 @@ def test_the_caption_says_whom_the_sentences_compare_with() -> None:
     assert Headline("", uneven).compared_with == "against the other side"
     assert Headline("", (*alone, *uneven)).compared_with == "against people of this age and the other side"
     assert Headline("").compared_with == ""
+
+
+def standing_pair(left: float, right: float) -> tuple[ParameterRow, ...]:
+    """Rows of one figure from standing, where the sides differ, and from the anatomical zero, where not."""
+    name = "hip_flexion_min_deg"
+    from_standing = parameter_rows(both_sides(name, -23.0, -15.0), Norms(None, None))
+    anatomical = parameter_rows(both_sides(name, left, right, sd=20.0), Norms(None, None), zero="anatomical")
+    return (*from_standing, *(replace(r, name="hip_flexion_min_anatomical_deg") for r in anatomical))
+
+
+def test_a_sentence_is_about_the_row_whose_zero_is_that_of_the_curve() -> None:
+    """From standing the right hip stays 8° short, from the anatomical zero there is no clear difference."""
+    rows = standing_pair(-10.8, -3.2)
+    assert rows[1].difference == "no clear difference"
+    for anatomical, names in (({"hip_flexion"}, []), (set(), ["hip_flexion_min_deg"])):
+        page = choose_zero(rows, anatomical)
+        assert len(page) == 1
+        found, _ = find_standouts(page, Norms(None, None))
+        assert [s.name for s in found] == names
+        assert all(row.difference != "no clear difference" for row in page if row.name in names)
+
+
+def test_a_rank_is_that_of_a_row_and_of_its_curve() -> None:
+    rows = parameter_rows(
+        [
+            *both_sides("knee_flexion_max_swing_deg", 20.0, 60.0),
+            *both_sides("circumduction_m", 0.2, 0.0, 0.01),
+        ],
+        Norms(None, None),
+    )
+    headline = Headline("", find_standouts(rows, Norms(None, None))[0])
+    assert set(headline.ranks) == {row.name for row in rows}
+    assert headline.curve_ranks == {"knee_flexion": (headline.ranks["knee_flexion_max_swing_deg"],)}
 
 
 def test_few_strides_are_compared_with_nobody() -> None:

@@ -183,7 +183,7 @@ def test_sides_are_judged_apart() -> None:
 
 def test_speed_is_compared_with_people_at_their_own_pace_whatever_the_persons() -> None:
     slow = [visit(0, speed(0.5))]
-    norms, usual = look_up_norms(75, "male", 0.5), temporal_values(75, "male").values
+    norms, usual = [look_up_norms(75, "male", 0.5)], temporal_values(75, "male").values
     (trend,) = follow_figures(slow, ["gait_speed_mps"], norms, usual)
     assert trend.norm is not None
     assert trend.norm.mean > 1.0

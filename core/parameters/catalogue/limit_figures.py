@@ -1,0 +1,52 @@
+"""Figures that only the rules of core/flags read: compared with a limit, without a row in the tables."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from core.parameters.catalogue.entry import (
+    FLEXION,
+    HEIGHT,
+    LIMITS,
+    SIZE,
+    CurveFigure,
+    NormKey,
+    ParameterEntry,
+)
+
+ENTRIES: Final = (
+    ParameterEntry(
+        "knee_flexion_peak_swing_deg",
+        label="Knee flexion, peak in mid-swing",
+        group=LIMITS,
+        digits=1,
+        scale=(10, 90),
+        comparison=FLEXION,
+        definition="Largest flexion of the knee in mid-swing (60 to 85 % of the stride), from the person's "
+        "own standing.",
+        needs=("knee",),
+        curve=CurveFigure("knee_flexion", "max", 60, 85),
+    ),
+    ParameterEntry(
+        "pelvis_obliquity_max_swing_deg",
+        label="Pelvic obliquity, peak in swing",
+        group=LIMITS,
+        digits=1,
+        scale=(-15, 15),
+        comparison=HEIGHT,
+        definition="Largest rise of the pelvis on the side that swings, from the person's own standing.",
+        needs=("pelvis_sensor",),
+        curve=CurveFigure("pelvis_obliquity", "max", 60, 100),
+        norm=NormKey("angles", "pelvis_obliquity_swing_max(60-100%)"),
+    ),
+    ParameterEntry(
+        "swing_to_stance",
+        label="Swing time over stance time",
+        group=LIMITS,
+        digits=2,
+        scale=(0, 1),
+        comparison=SIZE,
+        definition="Mean swing time of a leg divided by its mean stance time.",
+        needs=("foot_off",),
+    ),
+)
