@@ -235,6 +235,27 @@ async def test_set_up_makes_the_first_administrator_once(tmp_path: Path) -> None
             assert not one_time.is_valid(c, other, "set_up")
 
 
+async def test_web_servers_with_a_shared_key_issue_one_set_up_address(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with open_clinic(tmp_path) as clinic:
+
+        def issue(key: bytes) -> str:
+            with clinic.db.write() as c:
+                return one_time.issue_set_up(c, key)
+
+        token = issue(b"key of both")
+        assert issue(b"key of both") == token
+        other = issue(b"another key")
+        assert other != token
+        with clinic.db.read() as c:
+            assert not one_time.is_valid(c, token, "set_up")
+            assert one_time.is_valid(c, other, "set_up")
+        monkeypatch.setattr(one_time, "LIFE", dt.timedelta(seconds=-1))
+        expired = issue(b"key of both")
+        assert issue(b"key of both") != expired
+
+
 async def test_a_one_time_address_signs_in_once(clinic: Clinic) -> None:
     admin = clinic.user("admin")
     with clinic.db.write() as c:
