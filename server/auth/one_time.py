@@ -73,9 +73,7 @@ def use(c: Connection, token: str, purpose: str) -> str | None:
     return row[0]
 
 
-def _store(
-    c: Connection, token: str, purpose: str, user_id: str | None, expires_at: dt.datetime
-) -> str:
+def _store(c: Connection, token: str, purpose: str, user_id: str | None, expires_at: dt.datetime) -> str:
     c.execute(
         insert(one_time_token).values(
             token_sha256=token_hash(token), user_id=user_id, purpose=purpose, expires_at=expires_at
@@ -85,7 +83,7 @@ def _store(
 
 
 def _derive(shared_key: bytes, expires_at: dt.datetime) -> str:
-    """Return the token that every holder of the key computes for this expiry; as hard to guess as a random one."""
+    """Return the token that every holder of the key computes for this expiry."""
     return hmac.new(shared_key, f"set-up {expires_at.isoformat()}".encode(), hashlib.sha256).hexdigest()
 
 

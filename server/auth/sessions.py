@@ -21,7 +21,7 @@ from server.storage.tables import login_session, now, user
 TOUCH_EVERY = dt.timedelta(seconds=30)
 """Activity is written at most this often: each write costs one fsync."""
 CHECK_EVERY_S: Final = 10.0
-"""How often an open websocket asks whether its sign-in still holds."""
+"""How often an open websocket or event stream checks whether its sign-in still holds."""
 MOST_KEPT: Final = 1000
 """Sign-ins that live in memory because the disk refused them."""
 

@@ -64,11 +64,12 @@ def test_only_an_open_bind_without_tls_is_refused() -> None:
             {"host": EVERYWHERE, "behind_tls": True, "allowed_hosts": ("gait.clinic.example", "b")},
             "https://gait.clinic.example",
         ),
-        ({"behind_tls": True, "allowed_hosts": ("gait.clinic.example:8443",)}, "https://gait.clinic.example:8443"),
+        (
+            {"behind_tls": True, "allowed_hosts": ("gait.clinic.example:8443",)},
+            "https://gait.clinic.example:8443",
+        ),
         ({"allowed_hosts": ("gait.clinic.example",)}, "http://127.0.0.1:8123"),
     ],
 )
-def test_the_public_address_names_a_host_that_a_browser_reaches(
-    given: dict[str, Any], address: str
-) -> None:
+def test_the_public_address_names_a_host_that_a_browser_reaches(given: dict[str, Any], address: str) -> None:
     assert Settings(**given).make_public_address(8123) == address
