@@ -136,7 +136,7 @@ class Worker:
 
     def _attend(self, claim: Claim, child: Child) -> None:
         """See one attempt to its end, whichever it is."""
-        log.info("job %s (%s), attempt %d", claim.job_id, claim.kind, claim.attempt)
+        log.info("job %s (%s), claim %d", claim.job_id, claim.kind, claim.attempt)
         try:
             child.send(_order(claim))
             end = self._listen(claim, child)
