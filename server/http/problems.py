@@ -24,7 +24,7 @@ from core.errors import SagittalError
 from server.http.headers import add_security_headers
 from server.http.templates import render
 from server.log import request_id
-from server.storage.blobs import StoreAway
+from server.storage.blobs import IntegrityError, StoreAway
 from server.storage.refusal import is_busy, refusal_of
 
 log = logging.getLogger(__name__)
@@ -156,6 +156,8 @@ def install(app: FastAPI) -> None:
             problem.headers = {**(problem.headers or {}), **_list_allowed(connection.scope)}
         if problem.status == HTTPStatus.INTERNAL_SERVER_ERROR and isinstance(error, LOGGED_HERE):
             log.error("%s %s", connection.scope["type"], problem.code, exc_info=error)
+        if isinstance(error, IntegrityError):  # somebody must restore it: one line says which
+            log.error("%s: %s", problem.code, error.message)
         if problem.status == HTTPStatus.INSUFFICIENT_STORAGE:
             log.warning("%s refused: %s", connection.scope["type"], problem.code)
         if isinstance(connection, WebSocket):
@@ -198,7 +200,7 @@ def _wants_page(connection: HTTPConnection) -> bool:
 
 
 def _list_allowed(scope: Scope) -> dict[str, str]:
-    """Return the header Allow with every method that a route offers at this path, not only the first one's."""
+    """Return the header Allow with every method that any route offers at this path."""
     routes = [one for one in scope["app"].routes if not isinstance(one, Mount)]
     allowed = [
         method
