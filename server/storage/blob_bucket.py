@@ -14,7 +14,15 @@ from pathlib import Path
 from typing import BinaryIO, ClassVar, Final
 
 from server.storage import fs
-from server.storage.blobs import Blob, BlobFile, BlobStore, Receiver, check_address, make_damaged, make_missing
+from server.storage.blobs import (
+    Blob,
+    BlobFile,
+    BlobStore,
+    Receiver,
+    check_address,
+    make_damaged,
+    make_missing,
+)
 from server.storage.s3_bucket import S3Bucket
 from server.storage.trash import Address, Trash, TrashedFile, name_stamp, parse_way
 
