@@ -106,7 +106,7 @@ class LogLane:
             if records and not self._broken:
                 try:
                     self.log.append(b"".join(records))
-                except Exception as error:
+                except Exception as error:  # noqa: BLE001 - logged, whatever it is
                     self._disk.note_refusal(error, f"the live log {self.log.path.name}")
                     self._break(error)
                 else:
@@ -121,7 +121,7 @@ class LogLane:
                 return
             try:
                 self.log.sync()
-            except Exception as error:
+            except Exception as error:  # noqa: BLE001 - logged, whatever it is
                 self._disk.note_refusal(error, f"the live log {self.log.path.name}")
                 self._break(error)
             else:

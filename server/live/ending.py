@@ -127,7 +127,7 @@ class Ending:
         while True:
             try:
                 kept = await asyncio.to_thread(live_recordings.keep, *self._keep, path)
-            except Exception as error:
+            except Exception as error:  # noqa: BLE001 - logged, whatever it is
                 self._disk.note_refusal(error, f"live take {take_id}")
             else:
                 self._disk.note_success()

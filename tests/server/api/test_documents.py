@@ -55,5 +55,5 @@ async def test_a_film_without_its_token_is_not_signed_in(
 ) -> None:
     body = {"json": {"consent": True, "began_us": 1}} if not more else {"content": b"x"}
     async with clinic.client(headers=headers) as client:
-        answer = await client.request(method, f"{API}/live/takes/{'0' * 32}/film{more}", **body)  # type: ignore[arg-type]
+        answer = await client.request(method, f"{API}/live/takes/{'0' * 32}/film{more}", **body)
     assert (answer.status_code, answer.json()["code"]) == (401, "token_not_valid")
