@@ -22,7 +22,7 @@ from server.live.hub import Hub
 from server.metrics import StateCollector
 from server.nodes.registry import Nodes
 from server.processes.supervisor import Workers
-from server.services import custody, erasure
+from server.services import custody, erasure, report_links
 from server.services.custody import refuse_strangers
 from server.services.films import FilmIntake
 from server.services.reviewed import ReviewedAnalyses
@@ -43,6 +43,10 @@ def _look_after(db: Database, blobs: BlobStore, settings: Settings) -> None:
     erasure.finish(db, blobs, settings)
     with db.read() as c:
         doubted = custody.find_doubt(c, settings)
+        orphaned = report_links.list_orphaned(c)
+    if orphaned:  # made by accounts that had left before links ended with them
+        with db.write() as c:
+            report_links.end_orphaned(c, None)
     if doubted is not None:
         log.warning("%s No stored file is taken away meanwhile; see `sagittal check`.", doubted)
 

@@ -132,11 +132,6 @@ class Settings:
                 f"backup_dir is '{self.backup_dir}', inside the data folder: a backup would be lost with it. "
                 "Give a folder on another disk or computer."
             )
-        if self.host not in LOOPBACK and not self.behind_tls:
-            raise SettingsError(
-                f"host is '{self.host}': patients' data would cross the network unencrypted. Put a TLS proxy "
-                "in front and set SAGITTAL_BEHIND_TLS=1, or listen on 127.0.0.1."
-            )
 
     def _check_node(self) -> None:
         name, address = self.node_name, self.node_address
@@ -156,6 +151,24 @@ class Settings:
                 f"node_name is '{name}', but the database is a file, which one web server has for itself. "
                 "Several need PostgreSQL: set SAGITTAL_DATABASE_URL."
             )
+
+    def require_private_traffic(self) -> None:
+        """Raise SettingsError if the web server would listen on a network without TLS in front of it."""
+        if self.host not in LOOPBACK and not self.behind_tls:
+            raise SettingsError(
+                f"host is '{self.host}': patients' data would cross the network unencrypted. Put a TLS proxy "
+                "in front and set SAGITTAL_BEHIND_TLS=1, or listen on 127.0.0.1."
+            )
+
+    def make_public_address(self, port: int) -> str:
+        """Return the address at which a browser reaches the web server that listens on a port.
+
+        Behind TLS it is the first allowed host. An unspecified host (0.0.0.0, ::) is reached as localhost.
+        """
+        if self.behind_tls and self.allowed_hosts:
+            return f"https://{self.allowed_hosts[0]}"
+        host = "localhost" if _is_unspecified(self.host) else self.host
+        return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
 
     @property
     def secure_cookies(self) -> bool:
@@ -332,6 +345,13 @@ def _is_some_network(text: str) -> bool:
     """Whether it names some addresses; were all of them believed, every client could lie about its own."""
     try:
         return ipaddress.ip_network(text).prefixlen > 0
+    except ValueError:
+        return False
+
+
+def _is_unspecified(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_unspecified
     except ValueError:
         return False
 

@@ -18,6 +18,7 @@ from sqlalchemy import make_url
 from server.main import _parser
 from server.settings import Settings, load_settings
 from tests.data import ROOT
+from tests.server.clinic import open_clinic
 from tests.test_packaging import EXTRAS, INSTRUCTIONS, last
 
 TEXT = (ROOT / "compose.yaml").read_text("utf-8")
@@ -33,8 +34,9 @@ VARIABLES = {"SAGITTAL_HOME"} | {
 IMAGE = dict(part.split("=", 1) for part in shlex.split(last("ENV")))
 
 
-def fill(text: str) -> str:
+def fill(text: str, tls: str = "") -> str:
     """A value as compose gives it to the container."""
+    text = text.replace("${SAGITTAL_TLS:-}", tls)
     return re.sub(r"\$\{[^}]*\}", DOMAIN, text)
 
 
@@ -73,6 +75,7 @@ def test_every_volume_secret_and_service_that_is_named_is_declared_and_used() ->
             one["source"] if isinstance(one, dict) else str(one).split(":")[0]
             for service in SERVICES.values()
             for one in service.get(kind, [])
+            if not str(one).startswith("./")  # a folder beside the file
         }
         assert named == set(COMPOSE[kind])
     for service in SERVICES.values():
@@ -115,6 +118,46 @@ def test_the_proxy_reaches_the_port_on_which_the_server_listens() -> None:
         settings = load_settings(environment=environment_of(host))
         assert (settings.host, str(settings.port)) == ("0.0.0.0", port)  # noqa: S104
         assert port == last("EXPOSE")
+
+
+CHOICES = {
+    "": [],
+    "tls internal": ["tls", "internal"],
+    "tls /tls/gait.crt /tls/gait.key": ["tls", "/tls/gait.crt", "/tls/gait.key"],
+}
+
+
+@pytest.mark.parametrize("tls", CHOICES)
+def test_the_proxy_takes_a_certificate_of_the_intranet(tls: str) -> None:
+    site = [line.split() for line in fill(COMPOSE["configs"]["caddyfile"]["content"], tls).splitlines()]
+    assert [words for words in site if words and words[0] == "tls"] == ([CHOICES[tls]] if tls else [])
+    assert site.index([DOMAIN, "{"]) == 0
+    if tls.endswith(".key"):
+        [mounted] = [one.split(":") for one in SERVICES["proxy"]["volumes"] if one.startswith("./")]
+        assert mounted[1:] == [str(Path(CHOICES[tls][1]).parent), "ro"]
+    assert not tls or f'SAGITTAL_TLS="{tls}"' in TEXT
+
+
+@pytest.mark.anyio
+async def test_the_health_check_of_the_proxy_is_answered(tmp_path: Path) -> None:
+    """With the host that the proxy sends; the name of the service alone is none of the allowed ones."""
+    caddyfile = fill(COMPOSE["configs"]["caddyfile"]["content"])
+    [uri] = re.findall(r"health_uri (\S+)", caddyfile)
+    [host] = re.findall(r"health_headers {\s+Host (\S+)\s+}", caddyfile)
+    settings = load_settings(environment=environment_of("web-a"))
+    async with open_clinic(tmp_path, allowed_hosts=settings.allowed_hosts, behind_tls=True) as clinic:
+        async with clinic.client(headers={"Host": host}) as client:
+            assert (await client.get(uri)).status_code == 200
+        async with clinic.client(headers={"Host": "web-a:8000"}) as client:
+            assert (await client.get(uri)).status_code == 400
+
+
+def test_containers_of_ours_have_no_privileges_and_all_logs_have_an_end() -> None:
+    for service in OURS.values():
+        assert service["cap_drop"] == ["ALL"]
+        assert "no-new-privileges:true" in service["security_opt"]
+    for service in SERVICES.values():
+        assert {"max-size", "max-file"} <= service["logging"]["options"].keys()
 
 
 def test_each_web_server_has_a_name_of_its_own_and_the_address_of_its_service() -> None:

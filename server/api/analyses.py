@@ -9,7 +9,7 @@ from starlette.responses import Response
 
 from server.api import schemas
 from server.api.documents import refusals
-from server.api.downloads import attachment
+from server.api.downloads import ANY_FILE, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -61,12 +61,7 @@ def read_analysis(analysis_id: Id, db: Db, trail: OpenTrail, who: Reader) -> sch
 @router.get(
     "/analyses/{analysis_id}/files/{name}",
     response_class=Response,
-    responses={
-        200: {
-            "description": "The file",
-            "content": {"*/*": {"schema": {"type": "string", "format": "binary"}}},
-        }
-    },
+    responses=ANY_FILE,
 )
 def read_file(analysis_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
     """Download a result file; its name says which analysis it is of, never of whom."""

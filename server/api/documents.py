@@ -21,7 +21,7 @@ _WORDS = {
     "413": "Larger than a limit of the settings",
     "422": "A field or the data is not as expected",
     "429": "Too many failed attempts",
-    "503": "Busy with other changes or sign-ins; try again in some seconds",
+    "503": "Busy with other changes or sign-ins, try again in a few seconds; or a stored file cannot be read",
     "507": "The server's disk is full or cannot be written; nothing was saved",
 }
 _PROBLEM = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/ProblemDetails"}}}

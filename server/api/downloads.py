@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
 from urllib.parse import quote
 
 from starlette.responses import Response
 
 BINARY = {"type": "string", "format": "binary"}
 """Schema of a body of plain bytes."""
+ANY_FILE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "The file",
+        "content": {"application/json": {"schema": {}}, "*/*": {"schema": BINARY}},
+    }
+}
+"""`responses` of an operation that sends files of several types, JSON among them."""
 
 TYPES = {
     ".json": "application/json",

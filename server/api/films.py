@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Path, Request
+from fastapi import APIRouter, Depends, Header, Path, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
@@ -24,15 +24,23 @@ router = APIRouter(
     tags=["live"],
     dependencies=[require(Action.STREAM)],
 )
-Bearer = Annotated[str, Header(description="Bearer and the token that the code gave", max_length=200)]
+
+
+def _read_token(
+    authorization: Annotated[str, Header(description="Bearer and the token that the code gave")] = "",
+) -> str:
+    if not authorization:
+        raise films.TokenNotValid
+    return authorization.removeprefix("Bearer ")
+
+
+Token = Annotated[str, Depends(_read_token)]
 
 
 @router.post("", response_model=films.FilmProgress, responses=refusals(401), openapi_extra=PUBLIC)
-def begin_film(
-    take_id: Id, body: schemas.FilmBeginning, authorization: Bearer, intake: Films
-) -> films.FilmProgress:
+def begin_film(take_id: Id, body: schemas.FilmBeginning, token: Token, intake: Films) -> films.FilmProgress:
     """Begin the film of a take, or ask how far it is; it is kept who let the person be filmed."""
-    return intake.begin(take_id, _token(authorization), body.began_us, consent=body.consent)
+    return intake.begin(take_id, token, body.began_us, consent=body.consent)
 
 
 @router.put(
@@ -45,7 +53,7 @@ async def add_piece(
     take_id: Id,
     number: Annotated[int, Path(ge=0, le=1_000_000, description="0, 1, …")],
     request: Request,
-    authorization: Bearer,
+    token: Token,
     intake: Films,
 ) -> films.FilmProgress:
     """Keep a piece; the answer comes when it is on the disk. A piece may come twice, a gap is refused."""
@@ -60,14 +68,10 @@ async def add_piece(
                 )
     except ClientDisconnect:
         raise Problem(400, "upload_cut", "The connection broke within the piece. Send it again.") from None
-    return await run_in_threadpool(intake.add, take_id, _token(authorization), number, bytes(piece))
+    return await run_in_threadpool(intake.add, take_id, token, number, bytes(piece))
 
 
 @router.post("/end", response_model=schemas.EndedFilm, responses=refusals(401, 409), openapi_extra=PUBLIC)
-def end_film(take_id: Id, authorization: Bearer, intake: Films) -> schemas.EndedFilm:
+def end_film(take_id: Id, token: Token, intake: Films) -> schemas.EndedFilm:
     """Set the film beside its take, once that is over; of a take that came to nothing it is discarded."""
-    return schemas.EndedFilm(kept=intake.end(take_id, _token(authorization)))
-
-
-def _token(authorization: str) -> str:
-    return authorization.removeprefix("Bearer ")
+    return schemas.EndedFilm(kept=intake.end(take_id, token))

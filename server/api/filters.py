@@ -14,7 +14,7 @@ from starlette.responses import Response
 from core.estimators import PaperReference
 from server.api import schemas
 from server.api.documents import refusals
-from server.api.downloads import BINARY, attachment
+from server.api.downloads import ANY_FILE, attachment
 from server.api.files import RAW_BODY, read_size, receive_body
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -126,7 +126,7 @@ def read_run(run_id: Id, db: Db, trail: OpenTrail, who: Reader) -> FilterRunAnsw
 @router.get(
     "/filter-runs/{run_id}/files/{name}",
     response_class=Response,
-    responses={200: {"description": "The file", "content": {"*/*": {"schema": BINARY}}}},
+    responses=ANY_FILE,
 )
 def read_run_file(run_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
     """Download a file of a comparison; its name says which one it is of, never of whom."""

@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
 from server import context
-from server.auth.access import find_end, require
+from server.auth.access import find_end, require, wait_for_end
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail
@@ -23,7 +23,7 @@ from server.services import jobs
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 KEEP_ALIVE_S = 15.0
-"""Proxies cut lines that are silent for longer (nginx: 60 s); a sign-in that ended is noticed as often."""
+"""Proxies cut lines that are silent for longer (nginx: 60 s)."""
 RETRY_MS = 2000
 """How long a browser waits before it connects again."""
 
@@ -72,7 +72,7 @@ async def watch_job(
             jobs.get(c, job_id)
 
     await run_in_threadpool(check)
-    events = _events(feed, job_id, lambda: find_end(request) is None)
+    events = _events(feed, job_id, lambda: find_end(request))
     return StreamingResponse(events, media_type="text/event-stream", headers={"X-Accel-Buffering": "no"})
 
 
@@ -88,18 +88,27 @@ def cancel_job(
         return jobs.cancel(c, queue, who, job_id)
 
 
-async def _events(feed: JobFeed, job_id: str, is_open: Callable[[], bool]) -> AsyncIterator[str]:
-    """Format what the feed says; between changes say now and then that the line is alive."""
+async def _events(feed: JobFeed, job_id: str, find_end: Callable[[], str | None]) -> AsyncIterator[str]:
+    """Format the changes of a job as events, with a comment in between so that proxies keep the line open.
+
+    Parameters
+    ----------
+    find_end : why the stream must end, None while it may go on; however often the job changes, it is called
+        every `CHECK_EVERY_S`.
+    """
     watch = cast("AsyncGenerator[JobView, None]", feed.watch(job_id))
     async with contextlib.aclosing(watch) as views:
         pending = asyncio.ensure_future(anext(views, None))
+        over = asyncio.create_task(wait_for_end(find_end))
         try:
             yield f"retry: {RETRY_MS}\n\n"
             while True:
-                done, _ = await asyncio.wait({pending}, timeout=KEEP_ALIVE_S)
+                done, _ = await asyncio.wait(
+                    {pending, over}, timeout=KEEP_ALIVE_S, return_when=asyncio.FIRST_COMPLETED
+                )
+                if over in done:
+                    return
                 if not done:
-                    if not await run_in_threadpool(is_open):
-                        return
                     yield ": waiting\n\n"
                     continue
                 view = pending.result()
@@ -108,5 +117,6 @@ async def _events(feed: JobFeed, job_id: str, is_open: Callable[[], bool]) -> As
                 yield f"data: {_JOB.dump_json(view).decode()}\n\n"
                 pending = asyncio.ensure_future(anext(views, None))
         finally:
+            over.cancel()
             pending.cancel()
-            await asyncio.gather(pending, return_exceptions=True)
+            await asyncio.gather(over, pending, return_exceptions=True)

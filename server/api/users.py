@@ -18,6 +18,7 @@ from server.auth.roles import Action, Role
 from server.context import Db, Failures, Id, OpenLogins
 from server.http.json_body import StrictJsonRoute
 from server.http.problems import Problem
+from server.services import report_links
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/users", tags=["users"])
 Admin = Annotated[Identity, require(Action.MANAGE_USERS)]
@@ -44,7 +45,11 @@ def add_user(body: account_schemas.UserNew, db: Db, who: Admin) -> account_schem
 def change_user(
     user_id: Id, body: account_schemas.UserChange, db: Db, logins: OpenLogins, failures: Failures, who: Admin
 ) -> account_schemas.User:
-    """Change role, shown name, password, or close the account; sign-ins end, by a new password tokens too."""
+    """Change role, shown name, password, or close the account.
+
+    Sign-ins end, by a new password tokens too. Links to reports end with the account of their maker, and when
+    the maker may no longer open the patient.
+    """
     values = body.model_dump(exclude_unset=True, mode="json")
     fields = sorted(values)
     if "password" in values:
@@ -57,6 +62,7 @@ def change_user(
         if "password_hash" in values:
             api_tokens.revoke_all(c, user_id)
         audit.record(c, who, "user.changed", "user", user_id, {"fields": fields, "role": row.role})
+        report_links.end_orphaned(c, who)
     if "password_hash" in values:
         failures.forgive(row.name)
     return user_answer(row)

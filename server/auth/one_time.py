@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import datetime as dt
+import hashlib
+import hmac
 
 from sqlalchemy import Connection, delete, func, insert, select, update
 
@@ -29,15 +31,30 @@ def needs_set_up(c: Connection) -> bool:
     return not c.execute(select(func.count()).select_from(user)).scalar_one()
 
 
-def issue_set_up(c: Connection) -> str:
-    """Return the token of the first administrator's set-up address; an earlier one ends."""
+def issue_set_up(c: Connection, shared_key: bytes = b"") -> str:
+    """Return the token of the first administrator's set-up address; there is one at a time.
+
+    Parameters
+    ----------
+    shared_key : secret of several web servers, all of which return the same token while it is valid. Without
+        one, a new token replaces the earlier one.
+    """
+    if shared_key:
+        valid = one_time_token.c.used_at.is_(None) & (one_time_token.c.expires_at > now())
+        query = select(one_time_token.c.token_sha256, one_time_token.c.expires_at)
+        for row in c.execute(query.where(one_time_token.c.purpose == "set_up", valid)):
+            token = _derive(shared_key, row.expires_at)
+            if token_hash(token) == row.token_sha256:
+                return token
     c.execute(delete(one_time_token).where(one_time_token.c.purpose == "set_up"))
-    return _issue(c, "set_up", None)
+    expires_at = now() + LIFE
+    token = _derive(shared_key, expires_at) if shared_key else new_token()
+    return _store(c, token, "set_up", None, expires_at)
 
 
 def issue_sign_in(c: Connection, user_id: str) -> str:
     """Return a token whose address signs this person in once."""
-    return _issue(c, "sign_in", user_id)
+    return _store(c, new_token(), "sign_in", user_id, now() + LIFE)
 
 
 def is_valid(c: Connection, token: str, purpose: str) -> bool:
@@ -56,14 +73,18 @@ def use(c: Connection, token: str, purpose: str) -> str | None:
     return row[0]
 
 
-def _issue(c: Connection, purpose: str, user_id: str | None) -> str:
-    token = new_token()
+def _store(c: Connection, token: str, purpose: str, user_id: str | None, expires_at: dt.datetime) -> str:
     c.execute(
         insert(one_time_token).values(
-            token_sha256=token_hash(token), user_id=user_id, purpose=purpose, expires_at=now() + LIFE
+            token_sha256=token_hash(token), user_id=user_id, purpose=purpose, expires_at=expires_at
         )
     )
     return token
+
+
+def _derive(shared_key: bytes, expires_at: dt.datetime) -> str:
+    """Return the token that every holder of the key computes for this expiry."""
+    return hmac.new(shared_key, f"set-up {expires_at.isoformat()}".encode(), hashlib.sha256).hexdigest()
 
 
 def _find(c: Connection, token: str, purpose: str) -> tuple[str | None] | None:

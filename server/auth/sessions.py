@@ -15,13 +15,13 @@ from server.auth.roles import Role
 from server.auth.sight import NOTHING, opens_parts
 from server.auth.tokens import new_token, token_hash
 from server.storage.db import Database
-from server.storage.refusal import refusal_of
+from server.storage.refusal import is_busy, refusal_of
 from server.storage.tables import login_session, now, user
 
 TOUCH_EVERY = dt.timedelta(seconds=30)
 """Activity is written at most this often: each write costs one fsync."""
 CHECK_EVERY_S: Final = 10.0
-"""How often an open websocket asks whether its sign-in still holds."""
+"""How often an open websocket or event stream checks whether its sign-in still holds."""
 MOST_KEPT: Final = 1000
 """Sign-ins that live in memory because the disk refused them."""
 
@@ -60,7 +60,9 @@ class Logins:
         self._absolute = absolute
         self._clock = clock
         self._kept: dict[str, _Login] = {}  # opened while the disk refused
-        self._seen: dict[str, dt.datetime] = {}  # activity that the disk refused
+        self._seen: dict[
+            str, dt.datetime
+        ] = {}  # activity that the disk refused, or that another write held up
         self._ended: set[str] = set()  # ends that the disk refused
 
     def start(self, c: Connection, user_id: str, replaces: str | None) -> str:
@@ -199,7 +201,8 @@ class Logins:
                         .values(last_seen_at=at)
                     )
             except OperationalError as error:
-                if refusal_of(error) is None:
+                # busy or refused: a page that only reads need not wait for this again
+                if refusal_of(error) is None and not is_busy(error):
                     raise
             else:
                 self._seen.pop(login_id, None)

@@ -148,6 +148,11 @@ def opens_parts(parts: Mapping[str, str]) -> ColumnElement[bool]:
     return or_(user.c.role == Role.ADMIN.value, ~TEAMS_ARE_ON, and_(*owned))
 
 
+def sees_patient(patient_id: ColumnElement[str]) -> ColumnElement[bool]:
+    """Whether the account of a statement over `user` may open a patient, as a condition of the statement."""
+    return or_(user.c.role == Role.ADMIN.value, ~TEAMS_ARE_ON, _is_seen(user.c.id, patient_id))
+
+
 def _is_seen(user_id: str | ColumnElement[str], patient_id: ColumnElement[str]) -> ColumnElement[bool]:
     member = select(care_team_member.c.patient_id).where(care_team_member.c.user_id == user_id)
     opened = select(emergency_access.c.patient_id).where(

@@ -36,6 +36,10 @@ def demo(port: int | None) -> int:
                 "host": "127.0.0.1",
                 "port": port or 0,
                 "workers": DEMO_WORKERS,
+                "behind_tls": False,
+                "allowed_hosts": (),
+                "node_name": "",
+                "node_address": "",
                 "database_url": "",  # nor may they come among its patients
                 "bucket": "",
                 "backup_dir": "",  # the clinic's own backups must not be pushed out by simulated ones

@@ -17,13 +17,15 @@ from server.settings import Settings, SettingsError, load_settings
 def serve(data_dir: Path | None, host: str | None, port: int | None, workers: int | None) -> int:
     """Serve until SIGTERM or Ctrl-C; 1 when the folder is in use or belongs to a newer version."""
     from server.auth import one_time
+    from server.nodes.passage import read_key
     from server.storage.db import Database
 
     settings = load_settings({"data_dir": data_dir, "host": host, "port": port, "workers": workers})
 
     def announce(address: str) -> None:
+        shared_key = read_key(settings.node_key) if settings.node_name else b""
         with closing(Database(settings.database_source)) as db, db.write() as c:
-            token = one_time.issue_set_up(c) if one_time.needs_set_up(c) else None
+            token = one_time.issue_set_up(c, shared_key) if one_time.needs_set_up(c) else None
         if token:
             say(f"First start: set up the first administrator at {address}/set-up/{token}")
         say(f"Sagittal is at {address} (data in {settings.data_dir})")
@@ -32,7 +34,13 @@ def serve(data_dir: Path | None, host: str | None, port: int | None, workers: in
 
 
 def run(settings: Settings, announce: Callable[[str], None]) -> int:
-    """Run web server and workers; `announce` gets the address once requests are answered."""
+    """Run web server and workers; `announce` gets the public address once requests are answered.
+
+    Raises
+    ------
+    SettingsError
+        it would listen on a network without TLS.
+    """
     from core.errors import SagittalError
     from server.app import create_app
     from server.log import start_log
@@ -53,6 +61,7 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
     from server.web_server.listener import make_room, open_listener
     from server.worker.backing_up import BackupKeeper
 
+    settings.require_private_traffic()
     start_log(settings)
     # what SQLite and libraries make is for the server's user only, as what we make is
     os.umask(0o077)
@@ -97,8 +106,7 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
     app.state.workers = workers
     limits = ConnectionLimits(most=make_room(settings.max_connections))
     server = build_server(app, settings, limits)
-    host = f"[{settings.host}]" if ":" in settings.host else settings.host
-    address = f"http://{host}:{listener.getsockname()[1]}"
+    address = settings.make_public_address(listener.getsockname()[1])
     threading.Thread(target=_when_started, args=(server, lambda: announce(address)), daemon=True).start()
     # uvicorn stops gracefully and then raises the signal again: without a handler that would end us here,
     # before the workers have given their jobs back

@@ -16,6 +16,7 @@ from sqlalchemy.exc import DataError, OperationalError
 from starlette.exceptions import HTTPException as AnyHttpException
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.routing import Match, Mount
 from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketState
 
@@ -23,11 +24,14 @@ from core.errors import SagittalError
 from server.http.headers import add_security_headers
 from server.http.templates import render
 from server.log import request_id
-from server.storage.blobs import StoreAway
+from server.storage.blobs import IntegrityError, StoreAway
 from server.storage.refusal import is_busy, refusal_of
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
+
+
+METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS")
 
 
 # all other exceptions go on to the server, which logs them
@@ -148,8 +152,12 @@ def install(app: FastAPI) -> None:
         problem = as_problem(error)
         if _names_nothing(error) and _wants_page(connection):
             problem = Problem(404, "not_found", SENTENCES["not_found"])  # an address cut short
+        if problem.status == HTTPStatus.METHOD_NOT_ALLOWED:
+            problem.headers = {**(problem.headers or {}), **_list_allowed(connection.scope)}
         if problem.status == HTTPStatus.INTERNAL_SERVER_ERROR and isinstance(error, LOGGED_HERE):
             log.error("%s %s", connection.scope["type"], problem.code, exc_info=error)
+        if isinstance(error, IntegrityError):  # somebody must restore it: one line says which
+            log.error("%s: %s", problem.code, error.message)
         if problem.status == HTTPStatus.INSUFFICIENT_STORAGE:
             log.warning("%s refused: %s", connection.scope["type"], problem.code)
         if isinstance(connection, WebSocket):
@@ -189,6 +197,17 @@ def _wants_page(connection: HTTPConnection) -> bool:
     # a form of a page without scripts posts to the API and is a browser's page request all the same
     is_form = connection.headers.get("content-type", "").startswith("application/x-www-form-urlencoded")
     return is_form or not connection.url.path.startswith(("/api/", "/health/", "/static/"))
+
+
+def _list_allowed(scope: Scope) -> dict[str, str]:
+    """Return the header Allow with every method that any route offers at this path."""
+    routes = [one for one in scope["app"].routes if not isinstance(one, Mount)]
+    allowed = [
+        method
+        for method in METHODS
+        if any(one.matches({**scope, "method": method})[0] is Match.FULL for one in routes)
+    ]
+    return {"Allow": ", ".join(allowed)} if allowed else {}
 
 
 def _names_nothing(error: Exception) -> bool:

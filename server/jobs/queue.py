@@ -43,6 +43,7 @@ class JobView:
     Parameters
     ----------
     state : queued, running, done, failed or cancelled.
+    attempt : attempts so far, without those that were given back unharmed; 0 = none yet.
     stage, fraction, message : progress of the running attempt, None before its first word; fraction 0 to 1.
     cancel_requested : somebody asked to stop it; it will within two seconds.
     error_code, error_message : why it failed, else None.
@@ -69,7 +70,10 @@ class JobView:
         return self.finished_at is not None
 
 
-VIEW_COLUMNS = tuple(job.c[name] for name in JobView.__dataclass_fields__)
+VIEW_COLUMNS = tuple(
+    (job.c.attempt - job.c.released).label("attempt") if name == "attempt" else job.c[name]
+    for name in JobView.__dataclass_fields__
+)
 
 
 def job_view(row: Row[Any]) -> JobView:
@@ -172,7 +176,10 @@ class JobQueue(Protocol):
         """Report that the attempt ended without a word: run again, the third time give up."""
 
     def release(self, claim: Claim) -> bool:
-        """Give the job back unharmed: the worker shuts down, or its files cannot be reached now."""
+        """Give the job back unharmed: the worker shuts down, or its files cannot be reached now.
+
+        It does not count as an attempt of the job.
+        """
 
     def listen(self) -> AbstractContextManager[Wait]:
         """While the block runs, an idle worker can wait for a job that may be claimed."""

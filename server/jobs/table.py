@@ -201,7 +201,12 @@ class TableQueue:
     def release(self, claim: Claim) -> bool:
         """See JobQueue."""
         with self._db.write() as c:
-            free = {"state": "queued", "worker": None, "lease_until": None}
+            free = {
+                "state": "queued",
+                "worker": None,
+                "lease_until": None,
+                "released": job.c.released + 1,
+            }
             if c.execute(update(job).where(_fence(claim)).values(**free)).rowcount != 1:
                 return False
             self._announce(c, claim.job_id)

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any, Protocol
 
+from server.storage.disk_log import DiskLog
 from server.storage.segments import TakeLog
 
 log = logging.getLogger(__name__)
@@ -82,11 +83,11 @@ class LogLane:
 
     Parameters
     ----------
-    log : owned by the lane from now on. owner : told what happens.
+    log : owned by the lane from now on. owner : told what happens. disk : of all lanes, reports failures.
     """
 
-    def __init__(self, log: TakeLog, owner: LaneOwner, post: Post) -> None:
-        self.log = log
+    def __init__(self, log: TakeLog, owner: LaneOwner, post: Post, disk: DiskLog) -> None:
+        self.log, self._disk = log, disk
         self._owner, self._post = owner, post
         self._queue: deque[bytes] = deque()
         self._lock = threading.Lock()
@@ -105,8 +106,8 @@ class LogLane:
             if records and not self._broken:
                 try:
                     self.log.append(b"".join(records))
-                except Exception as error:
-                    log.exception("the live log %s cannot be written", self.log.path.name)
+                except Exception as error:  # noqa: BLE001 - logged, whatever it is
+                    self._disk.note_refusal(error, f"the live log {self.log.path.name}")
                     self._break(error)
                 else:
                     self._written += len(records)
@@ -120,11 +121,12 @@ class LogLane:
                 return
             try:
                 self.log.sync()
-            except Exception as error:
-                log.exception("the live log %s cannot be synced", self.log.path.name)
+            except Exception as error:  # noqa: BLE001 - logged, whatever it is
+                self._disk.note_refusal(error, f"the live log {self.log.path.name}")
                 self._break(error)
             else:
                 self._synced = self._written
+                self._disk.note_success()
                 self._post(self._owner.note_synced, self._synced)
 
     def mend(self) -> None:
@@ -165,6 +167,7 @@ class Committer:
 
     def __init__(self, interval_s: float = INTERVAL_S) -> None:
         self._interval_s = interval_s
+        self.disk = DiskLog(log)
         self._woken: deque[LogLane] = deque()
         self._dirty: dict[LogLane, None] = {}
         self._work = threading.Event()

@@ -27,6 +27,7 @@ from server.settings import Settings
 from server.storage import fs
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.storage.disk_log import DiskLog
 
 log = logging.getLogger(__name__)
 
@@ -56,6 +57,7 @@ class Ending:
         over: Callable[[live.LiveTakeRecord], None],
     ) -> None:
         self._keep = (db, blobs, queue)
+        self._disk = DiskLog(log)
         self._settings = settings
         self._rows = rows
         self._journal, self._pool, self._over = journal, pool, over
@@ -124,9 +126,12 @@ class Ending:
         path = live_recordings.log_path(self._settings.live, take_id)
         while True:
             try:
-                return await asyncio.to_thread(live_recordings.keep, *self._keep, path)
-            except Exception:
-                log.exception("live take %s is not stored yet; trying again", take_id)
+                kept = await asyncio.to_thread(live_recordings.keep, *self._keep, path)
+            except Exception as error:  # noqa: BLE001 - logged, whatever it is
+                self._disk.note_refusal(error, f"live take {take_id}")
+            else:
+                self._disk.note_success()
+                return kept
             await asyncio.sleep(AGAIN_S)
 
     async def _drain(self, take: ActiveTake) -> None:

@@ -16,6 +16,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from core.feedback import Cue
 from server.services.live_training import note_feedback
 from server.storage.db import Database
+from server.storage.disk_log import DiskLog
 from server.storage.live_tables import live_event, live_take
 from server.storage.tables import now
 
@@ -31,6 +32,7 @@ class Journal:
     def __init__(self, db: Database, interval_s: float = INTERVAL_S) -> None:
         self._db = db
         self._interval_s = interval_s
+        self._disk = DiskLog(log)
         self._rows: list[dict[str, Any]] = []
         self._guard = threading.Lock()
         self._work = threading.Event()
@@ -70,11 +72,13 @@ class Journal:
                 if kept:
                     c.execute(insert(live_event), kept)
                     note_feedback(c, {row["take_id"] for row in kept if _told(row)})
-        except SQLAlchemyError:
-            log.exception("%d live events are not written yet", len(rows))
+        except SQLAlchemyError as error:
+            self._disk.note_refusal(error, "live events")
             with self._guard:
                 self._rows = rows + self._rows
             self._work.set()
+        else:
+            self._disk.note_success()
 
     def _run(self) -> None:
         while not self._stop.is_set():

@@ -73,7 +73,7 @@ class Recorder:
         self.hello = intake.hello
         self._intake = intake
         self.damage = log.damage
-        self._lane = LogLane(log, self, post)
+        self._lane = LogLane(log, self, post, committer.disk)
         self._committer = committer
         self._listener = listener
         self._size = log.size

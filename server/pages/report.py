@@ -132,12 +132,12 @@ def show_shared(
     """The report that a link leads to, for who has its address; without the patient's code."""
     address = address_of(request)
     guessed = f"{SHARED} {address}"  # who guesses elsewhere stops nobody here
-    throttle.check(guessed, address)
     try:
         with db.read() as c:
             link = report_links.find_by_token(c, token)
     except LinkNotFound:
-        throttle.fail(guessed, address)
+        # only failures: whoever has a valid link reads, whatever others at the same address have guessed
+        throttle.begin(guessed, address)
         trail.record_refused("report_link.refused", "session", None, address)
         raise
     report_links.note_opening(db, link, address)

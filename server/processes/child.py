@@ -27,6 +27,7 @@ from server.settings import Settings, load_settings
 BEHIND: Final = 5
 """Added to the niceness of a worker, and again to that of who computes for it: pages and live takes have the
 processor first, then leases. Not more: on a machine that is busy with other things jobs must get on."""
+BOUND: Final = "server.processes.bound"
 FAR_BEHIND: Final = 2 * BEHIND
 """Of a process beside the web server that computes for long."""
 
@@ -43,7 +44,7 @@ def start_child(
     ours, theirs = socket.socketpair()
     with theirs:
         process = subprocess.Popen(  # noqa: S603 - our own interpreter and module; a fork takes milliseconds
-            [sys.executable, "-m", module, str(theirs.fileno()), str(os.getpid())],
+            [sys.executable, "-m", BOUND, module, str(theirs.fileno()), str(os.getpid())],
             env=make_environment(settings),
             stdin=subprocess.PIPE,
             pass_fds=[theirs.fileno()],
@@ -53,14 +54,16 @@ def start_child(
 
 
 def start_module(module: str, settings: Settings, behind: int = 0) -> subprocess.Popen[bytes]:
-    """Run a module of ours without a line; it can tell our end by its standard input (lifeline.py).
+    """Run a module of ours without a line; it ends with this process (lifeline.py).
+
+    A module that has to tidy up first calls `call_when_parent_ends`.
 
     Parameters
     ----------
     behind : by how much it is nicer than this process, from its first import on.
     """
     process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
-        [sys.executable, "-m", module], env=make_environment(settings), stdin=subprocess.PIPE
+        [sys.executable, "-m", BOUND, module], env=make_environment(settings), stdin=subprocess.PIPE
     )
     _put_behind(process.pid, behind)
     return process

@@ -17,15 +17,21 @@ PR_SET_PDEATHSIG = 1
 """prctl(2): the signal to get when the parent dies; linux/prctl.h."""
 
 
+_actions: list[Callable[[], None]] = []
+
+
 def call_when_parent_ends(action: Callable[[], None]) -> None:
-    """Call `action` in a thread when the starter has gone."""
+    """Call `action` in a thread when the starter has gone; it replaces what was to be called before."""
+    is_first = not _actions
+    _actions[:] = [action]
+    if is_first:
+        threading.Thread(target=_await_end, name="lifeline", daemon=True).start()
 
-    def wait() -> None:
-        while os.read(0, 1):
-            pass
-        action()
 
-    threading.Thread(target=wait, name="lifeline", daemon=True).start()
+def _await_end() -> None:
+    while os.read(0, 1):
+        pass
+    _actions[0]()
 
 
 def die_with(parent_pid: int) -> None:

@@ -76,6 +76,8 @@ def are_on(c: Connection) -> bool:
 def switch_on(c: Connection, actor: audit.Actor, *, begin_with_past: bool) -> None:
     """From now on a patient is seen by the team only; without effect where they are on.
 
+    Links to reports end where their maker is not in the team.
+
     Parameters
     ----------
     begin_with_past : whoever has opened or changed something of a patient so far is in the team; a team that
@@ -89,6 +91,7 @@ def switch_on(c: Connection, actor: audit.Actor, *, begin_with_past: bool) -> No
         c.execute(insert(care_team_member), [{"patient_id": p, "user_id": u, "since": at} for p, u in rows])
     c.execute(insert(clinic_option).values(name=CARE_TEAMS, since=at))
     audit.record(c, actor, "care_teams.on", "clinic", None, {"members": len(rows)})
+    report_links.end_orphaned(c, actor)
 
 
 def switch_off(c: Connection, actor: audit.Actor) -> None:
@@ -124,7 +127,13 @@ def list_team(c: Connection, patient_id: str) -> list[TeamMember]:
 def set_team(
     c: Connection, actor: audit.Actor, patient_id: str, user_ids: Collection[str]
 ) -> list[TeamMember]:
-    """Say who is in the team of a patient; raises NotFound, of no open account too."""
+    """Set the care team of a patient and end the report links of those who leave it.
+
+    Raises
+    ------
+    NotFound
+        the patient, or no open account has one of the ids.
+    """
     patients.get(c, patient_id)
     wanted = set(user_ids)
     known = {one.user_id: is_in for one, is_in in list_people(c, patient_id)}
@@ -139,6 +148,7 @@ def set_team(
     if wanted != before:
         detail = {"added": sorted(wanted - before), "removed": sorted(before - wanted)}
         audit.record(c, actor, "care_team.changed", "patient", patient_id, detail)
+        report_links.end_orphaned(c, actor)
     return list_team(c, patient_id)
 
 

@@ -2,7 +2,7 @@
 
 403 not_yours
 404 not_found · 409 code_taken, name_taken, no_files, not_confirmed · 413 file_too_large, set_too_large,
-too_many_files · 422 bad_value · 503 node_away · 507 disk_full · 500 blob_damaged, blob_missing
+too_many_files · 422 bad_value · 503 node_away, blob_damaged, blob_missing · 507 disk_full
 """
 
 from __future__ import annotations

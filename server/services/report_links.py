@@ -2,7 +2,8 @@
 
 Whoever has the address may read, so the address holds a random token of 256 bits that is shown once. The
 database keeps its hash and finds it by that: how long this takes tells nothing of the token. What a link
-opens bears a number instead of the patient's code. Who reopens a report ends its links.
+opens bears a number instead of the patient's code. Who reopens a report ends its links. They also end with
+their maker's account, and as soon as the maker may no longer open the patient (`end_orphaned`).
 """
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ from sqlalchemy import Connection, insert, select, update
 
 from server import audit
 from server.auth.identity import Identity
-from server.auth.sight import find_emergency
+from server.auth.sight import find_emergency, sees_patient
 from server.auth.tokens import new_token, token_hash
 from server.services import sessions, signed_reports
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.storage.db import Database
 from server.storage.report_tables import report_link, signed_report
-from server.storage.tables import new_id, now
+from server.storage.tables import new_id, now, session, user
 
 MOST_DAYS: Final = 90
 USUAL_DAYS: Final = 14
@@ -94,6 +95,7 @@ def make(
             report_id=report_id,
             token_sha256=token_hash(token),
             made_by=name,
+            maker_id=None if actor is None else actor.user_id,
             made_at=time,
             expires_at=expires_at,
             openings=0,
@@ -107,13 +109,20 @@ def make(
     return get(c, link_id), token
 
 
-def revoke(c: Connection, actor: audit.Actor | None, link_id: str) -> ReportLink:
-    """End a link now; one that has ended stays as it is. Raises NotFound."""
+def revoke(c: Connection, actor: audit.Actor | None, link_id: str, because: str | None = None) -> ReportLink:
+    """End a link now; one that has ended stays as it is. Raises NotFound.
+
+    Parameters
+    ----------
+    because : reason for the audit log, None = somebody ended this link.
+    """
     found = get(c, link_id)
     if found.revoked_at is None:
         c.execute(update(report_link).where(report_link.c.id == link_id).values(revoked_at=now()))
         session_id = signed_reports.get(c, found.report_id).session_id
         detail = {"report_id": found.report_id, "link_id": link_id}
+        if because is not None:
+            detail["because"] = because
         audit.record(c, actor, "report_link.revoked", "session", session_id, detail)
     return get(c, link_id)
 
@@ -125,6 +134,25 @@ def end_of_emergency(c: Connection, actor: audit.Actor | None, access_id: str) -
     )
     for link_id in c.execute(query).scalars().all():
         revoke(c, actor, link_id)
+
+
+def list_orphaned(c: Connection) -> list[str]:
+    """Return ids of open links whose maker's account is closed or may no longer open the patient."""
+    may_share = user.c.active & sees_patient(session.c.patient_id)
+    query = (
+        select(report_link.c.id)
+        .join(user, user.c.id == report_link.c.maker_id)
+        .join(signed_report, signed_report.c.id == report_link.c.report_id)
+        .join(session, session.c.id == signed_report.c.session_id)
+        .where(report_link.c.revoked_at.is_(None), report_link.c.expires_at > now(), ~may_share)
+    )
+    return list(c.execute(query).scalars())
+
+
+def end_orphaned(c: Connection, actor: audit.Actor | None) -> None:
+    """End those links; to be called in every transaction that takes access to patients from an account."""
+    for link_id in list_orphaned(c):
+        revoke(c, actor, link_id, because="maker_left")
 
 
 def reopen_report(

@@ -14,7 +14,15 @@ from pathlib import Path
 from typing import BinaryIO, ClassVar, Final
 
 from server.storage import fs
-from server.storage.blobs import Blob, BlobFile, BlobStore, Receiver, check_address, make_missing
+from server.storage.blobs import (
+    Blob,
+    BlobFile,
+    BlobStore,
+    Receiver,
+    check_address,
+    make_damaged,
+    make_missing,
+)
 from server.storage.s3_bucket import S3Bucket
 from server.storage.trash import Address, Trash, TrashedFile, name_stamp, parse_way
 
@@ -90,6 +98,8 @@ class BucketBlobs(BlobStore):
         content = self._bucket.load_part(_key(space, sha256), start, stop)
         if content is None:
             raise make_missing(sha256)
+        if len(content) != stop - start:
+            raise make_damaged(sha256)
         return content
 
     def has(self, space: str, sha256: str) -> bool:

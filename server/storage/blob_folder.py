@@ -17,6 +17,7 @@ from server.storage.blobs import (
     age_of,
     check_address,
     is_space,
+    make_damaged,
     make_missing,
 )
 from server.storage.trash import FolderTrash
@@ -73,7 +74,10 @@ class FolderBlobs(BlobStore):
             raise make_missing(sha256)
         with file:
             file.seek(start)
-            return file.read(stop - start)
+            content = file.read(stop - start)
+        if len(content) != stop - start:
+            raise make_damaged(sha256)
+        return content
 
     def has(self, space: str, sha256: str) -> bool:
         """See BlobStore."""

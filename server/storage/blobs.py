@@ -37,7 +37,7 @@ INCOMING = "incoming"
 class IntegrityError(SagittalError):
     """A stored file is gone or its bytes are not those that were stored."""
 
-    status = 500
+    status = 503
 
 
 class StoreAway(SagittalError):  # noqa: N818 - says what is the matter
@@ -171,7 +171,15 @@ class BlobStore(ABC):
 
     @abstractmethod
     def read_part(self, space: str, sha256: str, start: int, stop: int) -> bytes:
-        """Bytes from `start` to before `stop`, as they are; raises IntegrityError blob_missing, StoreAway."""
+        """Bytes from `start` to before `stop`, as they are.
+
+        Raises
+        ------
+        IntegrityError
+            blob_missing; blob_damaged where the file is shorter.
+        StoreAway
+            the store cannot be reached.
+        """
 
     @abstractmethod
     def has(self, space: str, sha256: str) -> bool:

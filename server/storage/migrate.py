@@ -1,7 +1,7 @@
 """Bring a database to the schema of this version; never start on one we do not know.
 
     upgrade(settings.database_source)       # at start of the server and by `sagittal migrate`
-require_current(settings.database_source)   # in a worker: refuses instead of migrating
+await_current(settings.database_source, stop)   # in a worker: waits until a server has migrated
 copy_database(source, target)               # a backup's file, or the other engine
 """
 
@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import contextlib
 import io
+import logging
+import threading
 import time
 from pathlib import Path
 
@@ -25,6 +27,11 @@ from server.storage.db import Source, engine_of
 from server.storage.postgres import PostgresServer
 from server.storage.refusal import refusal_of
 from server.storage.sqlite_file import SqliteFile
+
+log = logging.getLogger(__name__)
+
+WAIT_S = 1.0
+"""Pause between two looks whether the schema is there."""
 
 INSTALLED = Path(server.__file__).parent / "migrations"
 SOURCE = Path(server.__file__).parent.parent / "migrations"
@@ -51,6 +58,10 @@ _OTHER_MIGRATES = "Another program is changing the database for its version. Sta
 
 class MigrationError(RuntimeError):
     """The database is not one this version can work with, or not reached; the message says what to do."""
+
+
+class NotMigratedError(MigrationError):
+    """The database has no schema yet, or an older one: the start of a server, or `migrate`, changes that."""
 
 
 def configuration(database: Source, scripts: Path | None = None) -> Config:
@@ -100,7 +111,7 @@ def require_database(database: Source) -> None:
         return
     if isinstance(database, Path):
         raise MigrationError(f"There is no database in {database.parent}; give the folder with --data.")
-    raise MigrationError(
+    raise NotMigratedError(
         "The database that SAGITTAL_DATABASE_URL names has no clinic. Check its name, or start the server."
     )
 
@@ -192,21 +203,45 @@ def copy_database(source: Source, target: Source, scripts: Path | None = None) -
 
 
 def require_current(database: Source, scripts: Path | None = None) -> None:
-    """Raise MigrationError unless there is a database and its schema is exactly this version's."""
+    """Raise MigrationError unless there is a database and its schema is exactly this version's.
+
+    NotMigratedError where a server of this version has only not been started yet.
+    """
     require_database(database)
     config = configuration(database, scripts)
     head = ScriptDirectory.from_config(config).get_current_head()
     at = _known(config, database)
     if at != head:
-        raise MigrationError(
+        raise NotMigratedError(
             f"The database is at revision {at}, this version needs {head}. "
             "Start the server or run `sagittal migrate`."
         )
     if isinstance(database, str) and not _has_delivery(database):
-        raise MigrationError(
+        raise NotMigratedError(
             "The database has no tables of this version's procrastinate, by which jobs are delivered. "
             "Start the server or run `sagittal migrate`; install the same version everywhere."
         )
+
+
+def await_current(database: Source, stop: threading.Event, pause_s: float = WAIT_S) -> None:
+    """Wait until the schema is this version's or `stop` is set; one log line says that it waits.
+
+    Raises
+    ------
+    MigrationError
+        waiting does not help: there is no such database, or a newer version has changed it.
+    """
+    is_waiting = False
+    while not stop.is_set():
+        try:
+            require_current(database)
+        except NotMigratedError as error:
+            if not is_waiting:
+                log.info("waiting until a server has prepared the database (%s)", error)
+            is_waiting = True
+            stop.wait(pause_s)
+        else:
+            return
 
 
 def _prepare_delivery(server: PostgresServer) -> None:

@@ -49,6 +49,7 @@ report_link = Table(
     reference("report_id", "signed_report"),
     Column("token_sha256", String(64), nullable=False, unique=True),  # the token is only in the address
     Column("made_by", String(200)),
+    reference("maker_id", "user", nullable=True, index=False),  # its account; made_by is the name it had
     Column("made_at", Utc, nullable=False),
     Column("expires_at", Utc, nullable=False),
     Column("revoked_at", Utc),

@@ -199,6 +199,7 @@ job = Table(
     Column("state", String(16), nullable=False),
     Column("attempt", Integer, nullable=False),  # number of claims: the fence
     Column("deaths", Integer, nullable=False),  # claims that ended without a word
+    Column("released", Integer, nullable=False, server_default="0"),  # claims given back unharmed
     Column("worker", String(100)),
     Column("lease_until", Utc),
     Column("cancel_requested", Boolean, nullable=False),

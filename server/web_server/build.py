@@ -25,6 +25,7 @@ def build_server(app: ASGIApp, settings: Settings, limits: ConnectionLimits) -> 
             loop="asyncio",
             http=make_connection_class(limits),
             proxy_headers=False,
+            server_header=False,
             timeout_graceful_shutdown=GRACE_S,
             ws_per_message_deflate=False,
             # the largest message of any socket is a tablet's

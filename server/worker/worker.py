@@ -33,7 +33,7 @@ from server.storage import fs
 from server.storage.blob_opening import open_blobs, require_use
 from server.storage.blobs import Blob, BlobStore, StoreAway
 from server.storage.db import Database
-from server.storage.migrate import require_current
+from server.storage.migrate import await_current, require_current
 from server.storage.refusal import is_busy
 from server.storage.tables import new_id
 from server.worker.messages import Checkpoint, ChildReady, Failure, Input, Order, Result, Stage
@@ -136,7 +136,7 @@ class Worker:
 
     def _attend(self, claim: Claim, child: Child) -> None:
         """See one attempt to its end, whichever it is."""
-        log.info("job %s (%s), attempt %d", claim.job_id, claim.kind, claim.attempt)
+        log.info("job %s (%s), claim %d", claim.job_id, claim.kind, claim.attempt)
         try:
             child.send(_order(claim))
             end = self._listen(claim, child)
@@ -342,14 +342,19 @@ def _order(claim: Claim) -> Order:
 
 
 def run_worker(settings: Settings, *, with_starter: bool = False) -> None:
-    """Be a worker until SIGTERM or SIGINT, or until the starter is gone; the job at hand is given back."""
-    require_current(settings.database_source)
+    """Be a worker until SIGTERM or SIGINT, or until the starter is gone; the job at hand is given back.
+
+    It waits for a server to prepare the database.
+    """
     load(settings.task_modules)
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     if with_starter:
         call_when_parent_ends(stop.set)
+    await_current(settings.database_source, stop)
+    if stop.is_set():
+        return
     db = Database(settings.database_source)
     try:
         custody.refuse_foreign_folder(db, settings, stop)

@@ -3,6 +3,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import logging
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 
 from core.simulate import Stand, Straight, mt_files, simulate
 from server.processes.supervisor import Workers
+from server.services import checks
 from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
@@ -178,7 +180,9 @@ async def test_every_page_about_a_person_leaves_one_audit_row(visit: Visit) -> N
             assert [(r["resource_id"], r["user_name"]) for r in new] == [(resource, "admin")], page
 
 
-async def test_a_damaged_result_is_never_sent(visit: Visit) -> None:
+async def test_a_damaged_result_is_never_sent_and_is_named(
+    visit: Visit, caplog: pytest.LogCaptureFixture
+) -> None:
     async with visit.clinic.client("viewer") as client:
         analysis = (await client.get(f"{visit.path}/analyses")).json()[0]
         sha256 = next(f["sha256"] for f in analysis["files"] if f["name"] == "events.csv")
@@ -186,7 +190,13 @@ async def test_a_damaged_result_is_never_sent(visit: Visit) -> None:
         whole = path.read_bytes()
         _replace(path, whole[:-1] + b"!")
         answer = await client.get(f"{API}/analyses/{analysis['id']}/files/events.csv")
-        assert (answer.status_code, answer.json()["code"]) == (500, "blob_damaged")
+        assert (answer.status_code, answer.json()["code"]) == (503, "blob_damaged")
+        assert answer.headers["content-type"] == "application/problem+json"
+        [line] = [r for r in caplog.records if r.levelno >= logging.WARNING]
+        assert sha256[:12] in line.getMessage()
+        assert line.exc_info is None
+        defects = checks.check(visit.clinic.db, visit.clinic.app.state.blobs, visit.clinic.settings)
+        assert [d.area for d in defects if sha256[:12] in d.message] == ["files"]
         _replace(path, whole)
         assert (await client.get(f"{API}/analyses/{analysis['id']}/files/events.csv")).content == whole
 

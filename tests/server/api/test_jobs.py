@@ -1,11 +1,16 @@
 from __future__ import annotations
 
+import asyncio
 import json
+from collections.abc import AsyncIterator
 
 import httpx
 import pytest
 
-from server.jobs.queue import Claim
+from server.api.jobs import _events
+from server.auth import access
+from server.jobs.feed import JobFeed
+from server.jobs.queue import Claim, JobView
 from tests.helpers.engines import on_both_engines
 from tests.server.clinic import Clinic
 from tests.server.serving import serve
@@ -93,3 +98,27 @@ async def test_watching_does_not_write_audit_rows(clinic: Clinic) -> None:
         before = (await client.get(f"{API}/audit", params={"limit": 1})).json()[0]["seq"]
         await client.get(f"{API}/jobs/{job}/events")
         assert (await client.get(f"{API}/audit", params={"limit": 1})).json()[0]["seq"] == before
+
+
+async def test_a_stream_ends_with_the_sign_in_however_busy_the_job_is(
+    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = await queued_job(clinic, "busy")
+    monkeypatch.setattr(access, "CHECK_EVERY_S", 0.0)
+    signed_in = iter((None, None))
+
+    class BusyFeed(JobFeed):
+        """A job that changes without a pause."""
+
+        async def watch(self, job_id: str) -> AsyncIterator[JobView]:
+            view = self._read({job_id})[job_id]
+            while True:
+                yield view
+                await asyncio.sleep(0)
+
+    async with asyncio.timeout(60):
+        stream = _events(BusyFeed(clinic.db), job, lambda: next(signed_in, "not_signed_in"))
+        lines = [line async for line in stream if line.startswith("data: ")]
+    assert lines
+    async with clinic.client("admin") as client:
+        await client.post(f"{API}/jobs/{job}/cancel")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import datetime as dt
+from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from alembic import command
 from sqlalchemy import select, update
 
 from server import audit
@@ -17,9 +19,10 @@ from server.services import report_links, signed_reports
 from server.services.care_teams import EMERGENCY, end_all_emergencies
 from server.services.signed_reports import DOCUMENT, PSEUDONYMISED
 from server.storage.care_tables import emergency_access
+from server.storage.migrate import configuration
 from server.storage.tables import new_id, now, user
 from server.storage.tables import patient as patient_table
-from tests.server.clinic import PASSWORD, Clinic
+from tests.server.clinic import PASSWORD, Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
 
@@ -211,6 +214,73 @@ async def test_an_emergency_ends_now_with_its_links(clinic: Clinic, by: str) -> 
     await switch(clinic, on=True, begin_with_past=True)
     assert await team(clinic, patient) == {"member"}
     await switch(clinic, on=False)
+
+
+async def set_team(clinic: Clinic, patient: str, *names: str) -> None:
+    async with clinic.client("admin") as client:
+        users = {"users": [clinic.user("clinician", name) for name in names]}
+        (await client.put(f"{API}/patients/{patient}/care-team", json=users)).raise_for_status()
+
+
+async def close(clinic: Clinic, name: str) -> None:
+    async with clinic.client("admin") as client:
+        (
+            await client.patch(f"{API}/users/{clinic.user('clinician', name)}", json={"active": False})
+        ).raise_for_status()
+
+
+@pytest.mark.parametrize("how", ["account", "team", "switch", "role"])
+async def test_links_end_when_their_maker_leaves(clinic: Clinic, how: str) -> None:
+    patient = await add(clinic, f"Rowan-{how}")
+    report = await sign(clinic, patient)
+    leaver, stayer = f"leaver-{how}", f"stayer-{how}"
+    for name in (leaver, stayer):
+        clinic.user("clinician", name)
+    if how in {"team", "role"}:
+        await switch(clinic, on=True)
+        await set_team(clinic, patient, leaver, stayer)
+    if how == "switch":
+        await set_team(clinic, patient, stayer)
+    if how == "role":
+        await set_team(clinic, patient, stayer)
+        async with clinic.client("admin") as client:
+            (
+                await client.patch(f"{API}/users/{clinic.user(leaver)}", json={"role": "admin"})
+            ).raise_for_status()
+    of_leaver, of_stayer = await share(clinic, leaver, report), await share(clinic, stayer, report)
+    assert leads(clinic, of_leaver)
+    if how == "account":
+        await close(clinic, leaver)
+    elif how == "team":
+        await set_team(clinic, patient, stayer)
+    elif how == "switch":
+        await switch(clinic, on=True)
+    else:
+        async with clinic.client("admin") as client:
+            user_id = clinic.user(leaver)
+            (await client.patch(f"{API}/users/{user_id}", json={"role": "clinician"})).raise_for_status()
+    assert not leads(clinic, of_leaver)
+    assert leads(clinic, of_stayer)
+    async with clinic.client("admin") as client:
+        rows = (await client.get(f"{API}/audit")).json()
+        ended = [row["detail"] for row in rows if row["action"] == "report_link.revoked"]
+    link_id = of_leaver["link"]["id"]
+    assert [d["because"] for d in ended if d["link_id"] == link_id] == ["maker_left"]
+    await switch(clinic, on=False)
+
+
+async def test_links_of_makers_who_had_left_before_an_upgrade_end_at_the_start(tmp_path: Path) -> None:
+    async with open_clinic(tmp_path) as clinic:
+        patient = await add(clinic, "Yew")
+        clinic.user("clinician", "leaver")
+        made = await share(clinic, "leaver", await sign(clinic, patient))
+        with clinic.db.write() as c:
+            c.execute(update(user).where(user.c.name == "leaver").values(active=False))
+        assert leads(clinic, made)
+        source = clinic.settings.database_source
+    command.downgrade(configuration(source), "0021")  # which did not know the makers
+    async with open_clinic(tmp_path) as clinic:
+        assert not leads(clinic, made)
 
 
 async def test_an_access_that_ended_meanwhile_does_not_come_back_with_a_backup(clinic: Clinic) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import datetime as dt
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,10 @@ from server.auth.roles import Role
 from server.auth.sessions import Logins
 from server.auth.throttle import MAX_PER_PAIR, Throttle
 from server.auth.tokens import token_hash
+from server.storage import sqlite_file
 from server.storage.db import Database
 from server.storage.tables import login_session, metadata, one_time_token
+from tests.helpers.databases import write_database
 from tests.helpers.engines import on_both_engines
 from tests.server.clinic import PASSWORD, Clinic, open_clinic
 
@@ -236,6 +239,27 @@ async def test_set_up_makes_the_first_administrator_once(tmp_path: Path) -> None
             assert not one_time.is_valid(c, other, "set_up")
 
 
+async def test_web_servers_with_a_shared_key_issue_one_set_up_address(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with open_clinic(tmp_path) as clinic:
+
+        def issue(key: bytes) -> str:
+            with clinic.db.write() as c:
+                return one_time.issue_set_up(c, key)
+
+        token = issue(b"key of both")
+        assert issue(b"key of both") == token
+        other = issue(b"another key")
+        assert other != token
+        with clinic.db.read() as c:
+            assert not one_time.is_valid(c, token, "set_up")
+            assert one_time.is_valid(c, other, "set_up")
+        monkeypatch.setattr(one_time, "LIFE", dt.timedelta(seconds=-1))
+        expired = issue(b"key of both")
+        assert issue(b"key of both") != expired
+
+
 async def test_a_one_time_address_signs_in_once(clinic: Clinic) -> None:
     admin = clinic.user("admin")
     with clinic.db.write() as c:
@@ -286,3 +310,21 @@ async def test_the_last_administrator_cannot_be_lost(tmp_path: Path) -> None:
         with clinic.db.read() as c:
             assert accounts.get(c, admin).role == Role.ADMIN
             assert c.execute(select(func.count()).select_from(login_session)).scalar_one() == 1
+
+
+def test_a_sign_in_is_read_while_another_program_holds_the_database(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sqlite_file, "BUSY_TIMEOUT_MS", 1)
+    write_database(tmp_path / "a.db")
+    clock = Clock()
+    with closing(Database(tmp_path / "a.db")) as db, closing(Database(tmp_path / "a.db")) as other:
+        logins = Logins(db, IDLE, ABSOLUTE, clock)
+        with db.write() as c:
+            token = logins.start(c, accounts.create(c, "anna", None, Role.VIEWER, "x").id, None)
+        with other.write():
+            for _ in range(3):
+                clock.now += IDLE * 0.9  # activity keeps it open though none can be written
+                assert logins.find(token) is not None
+        clock.now += IDLE * 0.9
+        assert logins.find(token) is not None

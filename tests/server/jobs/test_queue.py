@@ -71,6 +71,11 @@ class Bench:
         assert view is not None
         return view.state
 
+    def attempt(self, job_id: str) -> int:
+        view = self.queue.get(job_id)
+        assert view is not None
+        return view.attempt
+
 
 @pytest.fixture
 def bench(source: Source) -> Iterator[Bench]:
@@ -227,7 +232,10 @@ def test_a_cancelled_job_whose_worker_died_is_not_run_again(bench: Bench) -> Non
 def test_three_deaths_end_a_job_and_a_release_is_none(bench: Bench, way: str) -> None:
     view = bench.submit("a")
     for _ in range(5):
-        assert bench.queue.release(bench.claim())
+        claim = bench.claim()
+        assert bench.attempt(view.id) == 1
+        assert bench.queue.release(claim)
+        assert bench.attempt(view.id) == 0
     for _ in range(MAX_DEATHS):
         claim = bench.claim()
         if way == "expired":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import logging
 import os
 import threading
 import time
@@ -257,6 +258,31 @@ def test_a_disk_that_still_refuses_is_tried_again_at_the_next_hello(
             await until(lambda: heard.acks == [1])
 
     asyncio.run(run())
+
+
+def test_a_full_disk_is_one_line_of_the_log_however_many_batches_come(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    class Full(fs.System):
+        def write(self, fd: int, data: bytes | memoryview) -> int:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    async def run() -> None:
+        async with recording(tmp_path / "t.log") as (recorder, heard):
+            monkeypatch.setattr(fs, "system", Full())
+            for n in range(5):
+                recorder.offer(frame(0))
+                await until(lambda: len(heard.failures) == n + 1)  # noqa: B023
+                await recorder.reopen()  # as the tablet comes back: cutting a log needs no room
+            monkeypatch.setattr(fs, "system", fs.System())
+            recorder.offer(frame(0))
+            await until(lambda: heard.acks == [1])
+
+    asyncio.run(run())
+    refused, recovered = (r.getMessage() for r in caplog.records if r.levelno >= logging.WARNING)
+    assert refused.startswith("the live log t.log cannot be written (disk_full)")
+    assert recovered.startswith("writes succeed again")
+    assert not any(r.exc_info for r in caplog.records)
 
 
 def test_a_take_that_cannot_be_written_at_all_leaves_the_others_alone(

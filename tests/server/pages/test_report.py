@@ -177,9 +177,14 @@ async def test_a_link_opens_one_report_without_account_or_code_until_it_ends(cli
     assert {a.status_code for a in (expired, revoked, reopened, unknown)} == {404}
     assert {a.json()["code"] for a in (expired, revoked, reopened, unknown)} == {"link_not_valid"}
     assert after.json()["code"] == "not_in_force"
-    # who guesses is stopped before the next guess
-    async with clinic.client() as stranger:
+    # failures are throttled, and nobody with a valid link at the same address notices
+    async with clinic.client() as stranger, clinic.client("clinician") as client:
+        fourth = (
+            await client.post(f"/api/v1/signed-reports/{await sign(clinic, session)}/links", json={})
+        ).json()
         answers = [(await stranger.get(f"/r/{n:043d}")).status_code for n in range(12)]
+        assert (await stranger.get(fourth["url"])).status_code == 200
+        assert (await stranger.get(revoked.url)).status_code == 429
     assert answers[-1] == 429
     # and goes with the visit
     async with clinic.client("clinician") as client:

@@ -32,12 +32,12 @@ from server.report.headline import MOST, Headline, HeadlineSentence, find_stando
 from server.report.limits import limits_view
 from server.report.pdf import render_pdf
 from server.storage.tables import new_id
-from tests.marks import slow_beyond
+from tests.helpers.marks import slow_after
+from tests.helpers.true_walks import true_tracks
+from tests.helpers.walks import simulated
 from tests.server import analysed
 from tests.server.clinic import Clinic
 from tests.server.export.opened import open_walk
-from tests.true_walks import true_tracks
-from tests.walks import simulated
 from web.language import LANGUAGES
 
 pytestmark = pytest.mark.anyio
@@ -197,7 +197,7 @@ def test_every_figure_of_a_rule_has_a_name_and_a_definition() -> None:
         assert entry.definition
 
 
-@pytest.mark.parametrize("name", slow_beyond(2, NAMES))
+@pytest.mark.parametrize("name", slow_after(2, NAMES))
 async def test_every_rule_is_shown_whatever_its_rank(
     clinic: Clinic, pages: dict[str, Shown], name: str
 ) -> None:

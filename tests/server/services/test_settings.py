@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -27,7 +28,6 @@ def test_settings_survive_the_way_to_a_child_process(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("given", "env", "words"),
     [
-        ({"host": EVERYWHERE}, {}, "unencrypted"),
         ({"port": 70000}, {}, "port is 70000"),
         ({}, {"SAGITTAL_WORKERS": "two"}, "SAGITTAL_WORKERS is 'two'"),
         ({}, {"SAGITTAL_LEASE_S": "0"}, "lease_s is 0"),
@@ -44,3 +44,32 @@ def test_settings_survive_the_way_to_a_child_process(tmp_path: Path) -> None:
 def test_a_wrong_setting_is_named(given: dict[str, object], env: dict[str, str], words: str) -> None:
     with pytest.raises(SettingsError, match=words):
         load_settings(given, env)
+
+
+def test_only_an_open_bind_without_tls_is_refused() -> None:
+    with pytest.raises(SettingsError, match="unencrypted"):
+        Settings(host=EVERYWHERE).require_private_traffic()
+    for settings in (Settings(), Settings(host="::1"), Settings(host=EVERYWHERE, behind_tls=True)):
+        settings.require_private_traffic()
+
+
+@pytest.mark.parametrize(
+    ("given", "address"),
+    [
+        ({}, "http://127.0.0.1:8123"),
+        ({"host": "::1"}, "http://[::1]:8123"),
+        ({"host": EVERYWHERE, "behind_tls": True}, "http://localhost:8123"),
+        ({"host": "::", "behind_tls": True}, "http://localhost:8123"),
+        (
+            {"host": EVERYWHERE, "behind_tls": True, "allowed_hosts": ("gait.clinic.example", "b")},
+            "https://gait.clinic.example",
+        ),
+        (
+            {"behind_tls": True, "allowed_hosts": ("gait.clinic.example:8443",)},
+            "https://gait.clinic.example:8443",
+        ),
+        ({"allowed_hosts": ("gait.clinic.example",)}, "http://127.0.0.1:8123"),
+    ],
+)
+def test_the_public_address_names_a_host_that_a_browser_reaches(given: dict[str, Any], address: str) -> None:
+    assert Settings(**given).make_public_address(8123) == address

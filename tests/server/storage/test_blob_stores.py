@@ -85,6 +85,8 @@ def test_a_damaged_or_missing_file_is_never_given_and_another_put_mends_it(store
         store.damage(SPACE, NAME, other)
         assert code_of(lambda: blobs.read(SPACE, NAME)) == "blob_damaged"
         assert code_of(lambda: blobs.open(SPACE, NAME)) == "blob_damaged"
+    store.damage(SPACE, NAME, CONTENT[:5])
+    assert code_of(lambda: blobs.read_part(SPACE, NAME, 3, 9)) == "blob_damaged"
     blobs.put(SPACE, CONTENT)
     assert blobs.read(SPACE, NAME) == CONTENT
 

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import signal
 import socket
+import sqlite3
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 from contextlib import closing
 from pathlib import Path
@@ -276,6 +279,58 @@ def test_a_server_whose_port_is_in_use_migrates_nothing(
     assert "choose another with --port" in capsys.readouterr().err
     assert migrate.read_revision(tmp_path / "sagittal.db") == "0020"
     assert not (tmp_path / "backups").exists()
+
+
+def test_a_worker_waits_until_a_server_has_migrated(
+    bare_source: Source, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    class Stop(threading.Event):
+        """A server starts while the worker pauses for the third time."""
+
+        pauses = 0
+
+        def wait(self, timeout: float | None = None) -> bool:
+            self.pauses += 1
+            if self.pauses == 3:
+                migrate.upgrade(bare_source, backups=tmp_path / "backups")
+            return self.is_set()
+
+    if isinstance(bare_source, Path):  # a folder without a database is the wrong one
+        migrate.upgrade(bare_source, target="0020")
+    stop = Stop()
+    with caplog.at_level(logging.INFO, logger=migrate.__name__):
+        migrate.await_current(bare_source, stop)
+    assert stop.pauses == 3
+    migrate.require_current(bare_source)
+    [line] = [r for r in caplog.records if r.name == migrate.__name__]
+    assert line.getMessage().startswith("waiting until a server has prepared the database")
+
+
+def test_a_stopped_worker_does_not_wait_and_a_newer_database_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "sagittal.db"
+    migrate.upgrade(path, target="0020")
+    stop = threading.Event()
+    stop.set()
+    migrate.await_current(path, stop)
+    with closing(sqlite3.connect(path)) as db:
+        db.execute("UPDATE alembic_version SET version_num = 'from the future'")
+        db.commit()
+    with pytest.raises(migrate.MigrationError, match="newer one"):
+        migrate.await_current(path, threading.Event())
+
+
+def test_the_command_waits_quietly_and_ends_when_told(tmp_path: Path) -> None:
+    migrate.upgrade(tmp_path / "sagittal.db", target="0020")
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "server.main", "worker", "--data", str(tmp_path)],
+        cwd=ROOT, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    with worker:
+        assert worker.stderr is not None
+        assert "waiting until a server has prepared the database" in worker.stderr.readline()
+        worker.terminate()
+        assert worker.communicate(timeout=60)[1] == ""
+    assert worker.returncode == 0
 
 
 def test_a_worker_refuses_a_database_that_is_behind(tmp_path: Path) -> None:

@@ -1,0 +1,19 @@
+"""Run a module so that it ends with its starter from its first import on.
+
+    python -m server.processes.bound MODULE …
+
+Importing a module takes seconds, during which it cannot watch for the end of its starter itself.
+"""
+
+from __future__ import annotations
+
+import os
+import runpy
+import sys
+
+from server.processes.lifeline import call_when_parent_ends
+
+if __name__ == "__main__":
+    call_when_parent_ends(lambda: os._exit(1))
+    del sys.argv[0]
+    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)

@@ -1,0 +1,62 @@
+"""One log line when the disk refuses to be written, and one when it works again.
+
+disk = DiskLog(log)
+disk.note_refusal(error, "the live logs")      # of every failed write; other errors are logged in full
+disk.note_success()                            # of every write that succeeded
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from typing import Final
+
+from server.storage.refusal import refusal_of
+
+QUIET_S: Final = 60.0
+"""A disk that is full on and off is reported at most this often."""
+
+
+class DiskLog:
+    """Reports a disk that refuses, for one kind of writes.
+
+    Parameters
+    ----------
+    logger : where the lines go. clock : seconds.
+    """
+
+    def __init__(self, logger: logging.Logger, clock: Callable[[], float] = time.monotonic) -> None:
+        self._log, self._clock = logger, clock
+        self._guard = threading.Lock()
+        self._since: float | None = None
+        self._quiet_until: float | None = None
+
+    def note_refusal(self, error: BaseException, what: str) -> None:
+        """Report a failed write, once until writes succeed; an error of another kind has its traceback.
+
+        Parameters
+        ----------
+        what : cannot be written, for the log.
+        """
+        refusal = refusal_of(error)
+        why = refusal.value if refusal is not None else getattr(error, "strerror", None)
+        if why is None:
+            self._log.error("%s cannot be written", what, exc_info=error)
+            return
+        with self._guard:
+            at = self._clock()
+            if self._since is not None or (self._quiet_until is not None and at < self._quiet_until):
+                return
+            self._since, self._quiet_until = at, at + QUIET_S
+        self._log.error("%s cannot be written (%s); not repeated until writes succeed", what, why)
+
+    def note_success(self) -> None:
+        """Report that writes succeed again, if a refusal was reported."""
+        if self._since is None:
+            return
+        with self._guard:
+            since, self._since = self._since, None
+        if since is not None:
+            self._log.warning("writes succeed again, after %.0f s", self._clock() - since)
