@@ -60,7 +60,7 @@ def _sides(left: SideGait, right: SideGait = HEALTHY) -> dict[Side, SideGait]:
     return {"left": left, "right": right}
 
 
-SLOWLY: Final = Walker(sides=_both(SideGait(double_support=0.115, knee_wave=0.5)))
+SLOWLY: Final = Walker(sides=_both(SideGait(double_support=0.105, knee_wave=0.5)))
 """A healthy person who takes their time: both feet are on the floor longer, and the knee gives less."""
 
 QUICKLY: Final = Walker(sides=_both(SideGait(knee_swing_rad=deg(64.0))))
@@ -242,13 +242,15 @@ ELDERLY: Final = Walker(
         SideGait(
             double_support=0.15,
             contact_pitch_rad=deg(11.0),
+            heel_off=0.34,
+            push=0.98,
             knee_stance_rad=deg(1.0),
             knee_wave=0.2,
             knee_swing_rad=deg(66.0),
             hip_factor=0.9,
             ankle_swing_rad=deg(-6.0),
             clearance_m=0.010,
-            trailing_factor=1.2,
+            trailing_factor=1.1,
         )
     ),
 )
