@@ -60,6 +60,12 @@ def _sides(left: SideGait, right: SideGait = HEALTHY) -> dict[Side, SideGait]:
     return {"left": left, "right": right}
 
 
+SLOWLY: Final = Walker(sides=_both(SideGait(double_support=0.105, knee_wave=0.5)))
+"""A healthy person who takes their time: both feet are on the floor longer, and the knee gives less."""
+
+QUICKLY: Final = Walker(sides=_both(SideGait(knee_swing_rad=deg(64.0))))
+"""A healthy person in a hurry: the knee swings through more bent."""
+
 HEMIPARETIC: Final = Walker(
     variability=UNEVEN,
     width_m=0.15,
@@ -80,7 +86,15 @@ HEMIPARETIC: Final = Walker(
             clearance_m=-0.004,
             toe_out_rad=deg(14.0),
         ),
-        right=SideGait(length_factor=0.88, time_factor=0.84, double_support=0.15),
+        right=SideGait(
+            length_factor=0.88,
+            time_factor=0.84,
+            double_support=0.15,
+            contact_pitch_rad=deg(14.0),
+            knee_wave=0.5,
+            knee_swing_rad=deg(68.0),
+            ankle_swing_rad=deg(-4.0),
+        ),
     ),
 )
 
@@ -94,17 +108,34 @@ HEMI_MILD: Final = Walker(
             double_support=0.135,
             contact_pitch_rad=deg(5.0),
             push=0.8,
-            knee_swing_rad=deg(50.0),
+            knee_swing_rad=deg(53.0),
             circumduction_rad=deg(3.0),
             hike_rad=deg(2.5),
             ankle_swing_rad=deg(-3.0),
+            trailing_factor=0.5,
         ),
-        right=SideGait(length_factor=0.95, time_factor=0.93, double_support=0.125),
+        right=SideGait(
+            length_factor=0.95,
+            time_factor=0.93,
+            double_support=0.125,
+            knee_swing_rad=deg(68.0),
+            trailing_factor=1.2,
+        ),
     ),
 )
 
 STIFF_KNEE: Final = Walker(
-    sides=_sides(SideGait(knee_swing_rad=deg(20.0), circumduction_rad=deg(2.5), hike_rad=deg(4.0), push=0.65))
+    sides=_sides(
+        SideGait(
+            knee_swing_rad=deg(28.0),
+            hip_swing_rad=deg(-6.0),
+            ankle_swing_rad=deg(-12.0),
+            circumduction_rad=deg(2.5),
+            hike_rad=deg(4.0),
+            push=0.65,
+            trailing_factor=0.4,
+        )
+    )
 )
 
 DROP_FOOT: Final = Walker(
@@ -144,8 +175,16 @@ ANTALGIC: Final = Walker(
             double_support=0.14,
             push=0.75,
             contact_pitch_rad=deg(10.0),
+            knee_swing_rad=deg(63.0),
+            ankle_swing_rad=deg(-8.0),
         ),
-        right=SideGait(length_factor=0.90, time_factor=0.85, double_support=0.11),
+        right=SideGait(
+            length_factor=0.90,
+            time_factor=0.85,
+            double_support=0.11,
+            knee_swing_rad=deg(69.0),
+            ankle_swing_rad=deg(-6.0),
+        ),
     ),
 )
 
@@ -155,6 +194,7 @@ _PARKINSON_LEG: Final = SideGait(
     knee_stance_rad=deg(10.0),
     knee_swing_rad=deg(44.0),
     hip_factor=0.8,
+    ankle_swing_rad=deg(-16.0),
     clearance_m=0.003,
     double_support=0.14,
     flat_from=0.08,
@@ -182,12 +222,16 @@ SEVERE_SHUFFLE: Final = replace(
             contact_pitch_rad=0.0,
             push=0.22,
             knee_swing_rad=deg(30.0),
+            ankle_swing_rad=0.0,
             clearance_m=0.002,
         )
     ),
 )
 
-STEP_ASYMMETRY: Final = Walker(sides=_sides(SideGait(length_factor=0.85), SideGait(length_factor=1.15)))
+STEP_ASYMMETRY: Final = Walker(sides=_sides(
+        SideGait(length_factor=0.85, heel_off=0.26, knee_swing_rad=deg(65.0)),
+        SideGait(length_factor=1.15),
+    ))
 
 ELDERLY: Final = Walker(
     variability=ELDERLY_SPREAD,
@@ -198,11 +242,15 @@ ELDERLY: Final = Walker(
         SideGait(
             double_support=0.15,
             contact_pitch_rad=deg(11.0),
-            push=0.75,
-            knee_swing_rad=deg(52.0),
-            knee_stance_rad=deg(3.0),
-            hip_factor=0.85,
+            heel_off=0.34,
+            push=0.98,
+            knee_stance_rad=deg(1.0),
+            knee_wave=0.2,
+            knee_swing_rad=deg(66.0),
+            hip_factor=0.9,
+            ankle_swing_rad=deg(-6.0),
             clearance_m=0.010,
+            trailing_factor=1.1,
         )
     ),
 )
@@ -210,7 +258,7 @@ ELDERLY: Final = Walker(
 PATIENTS: Mapping[str, SimulatedPatient] = MappingProxyType(
     {
         "healthy": SimulatedPatient("Healthy person", 0.64, 0.54, Walker()),
-        "healthy_slow": SimulatedPatient("Healthy person walking slowly", 0.45, 0.68, Walker()),
+        "healthy_slow": SimulatedPatient("Healthy person walking slowly", 0.48, 0.73, SLOWLY),
         "hemiparetic": SimulatedPatient("Left hemiparesis", 0.40, 0.72, HEMIPARETIC),
         "hemi_mild": SimulatedPatient("Mild left hemiparesis", 0.52, 0.60, HEMI_MILD),
         "stiff_knee": SimulatedPatient("Stiff left knee", 0.55, 0.60, STIFF_KNEE),

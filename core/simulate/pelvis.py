@@ -50,12 +50,14 @@ def floor_path(
             yaws.append(yaws[-1])
         feet[step.side] = np.array([step.x_m, step.y_m])
         headings[step.side] = step.path_rad
-        stance_foot = feet["left" if step.side == "right" else "right"]
+        trailing: Side = "left" if step.side == "right" else "right"
+        stance_foot = feet[trailing]
         ahead = np.array([np.cos(step.path_rad), np.sin(step.path_rad)])
         share = (
             0.0 if step.closes else min(1.0, max(step.step_m, 0.0) / (FULL_FORWARD * walker.reference_step_m))
         )
-        place = 0.5 * (feet["left"] + feet["right"]) + share * walker.forward_m * ahead
+        lead = share * walker.forward_m * walker.sides[trailing].trailing_factor
+        place = 0.5 * (feet["left"] + feet["right"]) + lead * ahead
         halfway = 0.5 * (places[-1] + place)
         aside = stance_foot - halfway
         middle = halfway + walker.lateral * (aside - (aside @ ahead) * ahead)

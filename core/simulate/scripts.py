@@ -11,7 +11,7 @@ from typing import Final
 from core.errors import ParameterError
 from core.frames import Segment
 from core.simulate.mems import MEMS
-from core.simulate.patients import PATIENTS, SimulatedPatient
+from core.simulate.patients import PATIENTS, QUICKLY, SLOWLY, SimulatedPatient
 from core.simulate.script import Arc, Pivot, Script, SingleSteps, Stand, Straight, scale_script
 from core.simulate.setup import Dropout, RecordingSetup
 from core.simulate.simulation import Simulation, simulate
@@ -78,7 +78,8 @@ SCRIPTS: Mapping[str, Scenario] = MappingProxyType(
         "comfortable": Scenario("Walk at comfortable speed", _COMFORTABLE),
         "slow": Scenario(
             "Slow walk",
-            (Stand(6.0), Straight(14.4, 0.45, 0.68), Stand(3.0), Straight(12.6, 0.45, 0.68), Stand(4.0)),
+            (Stand(6.0), Straight(14.4, 0.48, 0.73), Stand(3.0), Straight(12.48, 0.48, 0.73), Stand(4.0)),
+            walker=SLOWLY,
         ),
         "fast_with_turns": Scenario(
             "Fast walk with turns",
@@ -93,6 +94,7 @@ SCRIPTS: Mapping[str, Scenario] = MappingProxyType(
                 Straight(8.0, 0.66, 0.47),
                 Stand(4.0),
             ),
+            walker=QUICKLY,
         ),
         "figure_of_eight": Scenario(
             "Figure of eight",

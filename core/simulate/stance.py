@@ -90,9 +90,13 @@ class StanceFoot:
         share = np.clip((self.timing.opposite[i] - heel_off) / (release - heel_off), 0.2, 0.9)
         power = np.log((0.5 - phase_0) / (RELEASE_PHASE - phase_0)) / np.log(share)
         phase = phase_0 + (RELEASE_PHASE - phase_0) * np.clip(u, 1e-9, 3.0) ** power
-        # long steps push off more: with the factor held at 1 the knee lands bent 14° at steps of 0.72 m
+        # long steps push off more: with the factor held at 1 the knee lands bent 14° at steps of 0.72 m;
+        # the step that counts is the other foot's, which this foot trails: of a limping person's two
+        # lengths its own next one would leave the heel too low for a long step and too high for a short one
         gait = self.walker.sides[self.side]
-        push = gait.push * self.walker.amplitude(self.prints[i + 1].step_m)
+        other = self.walker.sides["left" if self.side == "right" else "right"]
+        step_m = self.prints[i + 1].step_m * (other.length_factor / gait.length_factor)
+        push = gait.push * self.walker.amplitude(step_m)
         rise = FOOT_PITCH(phase) - FOOT_PITCH(np.asarray(phase_0))
         return np.where(u > 0.0, push * rise * smoothstep(u / 0.45), 0.0)
 

@@ -10,7 +10,7 @@ import numpy as np
 from core.frames import Bools, Floats, Side
 from core.simulate.script import Plan
 from core.simulate.shapes import smooth
-from core.simulate.walker import Walker
+from core.simulate.walker import SideGait, Walker
 
 RELEASE_PHASE = 0.59
 """Phase at which the foot leaves the floor; WBDS foot-off, 0.62, is about when the sole is 5 mm up."""
@@ -50,8 +50,11 @@ def foot_timing(plan: Plan, walker: Walker, side: Side) -> FootTiming:
         cycle = 2.0 * step if paused else stride
         opposite = landing.start_s
         release = min(opposite + gait.double_support * cycle, landing.time_s - 0.5 * step)
+        # the heel rises for the other foot's contact, not for the own release: who shares the weight
+        # longer lets go later, and a heel that waited for that would hold the ankle bent over a flat foot
+        before_release = RELEASE_PHASE - gait.heel_off + (gait.double_support - SideGait.double_support)
         heel_off = max(
-            release - (RELEASE_PHASE - gait.heel_off) * cycle,
+            release - before_release * cycle,
             before.time_s + (gait.flat_from + 0.02) * cycle,
         )
         rows.append(

@@ -72,6 +72,8 @@ class SideGait:
     knee_wave : share of the flexion wave at loading. hip_factor, ankle_factor : on the target curves.
     hip_swing_rad, ankle_swing_rad : added flexion and dorsiflexion in swing.
     circumduction_rad, hike_rad : added hip abduction, and rise of this side of the pelvis, in swing.
+    trailing_factor : on how far the pelvis is ahead of the middle of the feet when this foot trails. A foot
+        that pushes off weakly keeps its heel low, and its leg does not reach as far back.
 
     Commands are not results: lifts for clearance and the paths of both contacts bend them.
     """
@@ -95,6 +97,7 @@ class SideGait:
     ankle_factor: float = 1.0
     circumduction_rad: float = 0.0
     hike_rad: float = 0.0
+    trailing_factor: float = 1.0
 
 
 @dataclass(frozen=True)

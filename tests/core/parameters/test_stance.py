@@ -81,7 +81,8 @@ def test_what_is_missing_has_its_own_reason() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["comfortable", "hemiparetic", "antalgic", "drop_foot"])
 def test_simulated_feet_are_flat_when_they_really_are(name: str) -> None:
-    """The exact flat begins and ends at 0°, ours 3° away from it: it lasts longer, by what 3° take."""
+    """The exact flat begins and ends at 0°, ours 3° away from it: it lasts longer, by what 3° take; a weak
+    push-off raises the heel slowly."""
     truth = simulate_scenario(name, 5).truth
     tracks = true_tracks(truth)
     pitch = foot_pitches(tracks)
@@ -96,7 +97,7 @@ def test_simulated_feet_are_flat_when_they_really_are(name: str) -> None:
         angle = np.degrees(np.interp([flat, heel_off], truth.t_s, pitch[FOOT[s.side]]))
         assert np.abs(angle) == pytest.approx(np.minimum(3.0, np.abs(angle)), abs=0.3)
         assert s.start_s <= flat <= begins + 0.011
-        assert ends - 0.011 <= heel_off <= ends + 0.16
+        assert ends - 0.011 <= heel_off <= ends + 0.20
 
 
 def test_the_limit_is_a_centimetre_of_a_foot() -> None:

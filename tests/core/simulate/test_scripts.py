@@ -42,7 +42,7 @@ def test_height_reaches_the_recording_and_the_lengths() -> None:
     simulation = simulate_scenario("slow", seed=2, height_m=1.60)
     assert simulation.recording.subject.height_m == 1.60
     lengths = [s.length_m for s in simulation.truth.strides if s.side == "left"][2:10]
-    assert sum(lengths) / len(lengths) == pytest.approx(0.90 * 1.60 / 1.745, rel=0.03)
+    assert sum(lengths) / len(lengths) == pytest.approx(0.96 * 1.60 / 1.745, rel=0.03)
 
 
 def test_an_unknown_script_lists_the_known_ones() -> None:
