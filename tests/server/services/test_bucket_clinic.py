@@ -293,7 +293,7 @@ def test_a_job_waits_for_the_store_and_is_done_when_it_is_back(
         assert clinic.row(view).deaths == 0
         bucket.server.start()
         done = clinic.ended(view)
-        assert (done.state, done.error_code) == ("done", None)
+        assert (done.state, done.error_code, done.attempt) == ("done", None, 1)
         [result] = clinic.results()
         assert clinic.blobs.read(clinic.patient.id, result.files["result.txt"].sha256) == b"signals"
     finally:
