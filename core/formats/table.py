@@ -51,10 +51,10 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
 
 
 def _without_blank_end(table: text.Columns, spec: SourceSpec) -> text.Columns:
-    """Drop the last rows in which no sensor has a value: another signal of the file was recorded for longer."""
-    signals = [table.values[name] for c in spec.columns.values() for _, name in _asked(c)]
-    known = np.isfinite(signals).any(axis=0)
-    end = len(known) - int(np.argmax(known[::-1])) if known.any() else len(known)
+    """Drop the rows at the end in which no sensor has a value, as where an EMG was recorded for longer."""
+    names = [name for channels in spec.columns.values() for _, name in _asked(channels)]
+    known = np.flatnonzero(np.isfinite(table.stack(names)).any(axis=1))
+    end = known[-1] + 1 if len(known) else None
     return text.Columns({name: values[:end] for name, values in table.values.items()}, table.notices)
 
 
