@@ -1,24 +1,50 @@
-"""How a function is compiled that only other compiled functions call."""
+"""Compilation of functions that only other compiled functions call."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 import numba
+from numba.core.registry import CPUDispatcher
+
+
+class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
+    """A compiled function without an entry point for Python; compiled callers use it as any other."""
+
+    def __call__(self, *args: object, **kwargs: object) -> NoReturn:
+        """Refuse a call from Python, for which there is no machine code to jump to.
+
+        Raises
+        ------
+        TypeError
+            Always.
+        """
+        name = f"{self.py_func.__module__}.{self.py_func.__qualname__}"
+        raise TypeError(
+            f"{name} is compiled for other compiled functions only and cannot be called from Python. "
+            f"To try it, compile it with an entry point of its own: numba.njit({name}.py_func)(…)."
+        )
 
 
 def inner_njit(**options: bool | str) -> Callable[[Callable[..., Any]], Any]:
-    """A decorator like `numba.njit` without what Python and C would call the function by.
+    """Return a decorator like `numba.njit` that compiles no entry points for Python and C.
 
-    That is a tenth of the time that the ErKF takes to compile. Python that calls such a function all the same
-    ends at once, by a segmentation fault.
+    Each entry point would be compiled by itself, for every function and every signature. A call from Python
+    raises TypeError (`InnerDispatcher`); without its `__call__` the interpreter would crash.
 
     Parameters
     ----------
-    options : of `numba.njit`, besides those of all our loops.
+    options : of `numba.njit`, in addition to those that all our loops share.
     """
-    made: Callable[[Callable[..., Any]], Any] = numba.njit(
+    compile_function: Callable[[Callable[..., Any]], Any] = numba.njit(
         cache=True, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options
     )
-    return made
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        compiled = compile_function(function)
+        if isinstance(compiled, CPUDispatcher):  # not where NUMBA_DISABLE_JIT leaves the function as it is
+            compiled.__class__ = InnerDispatcher
+        return compiled
+
+    return decorate

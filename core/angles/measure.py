@@ -93,6 +93,9 @@ def _stack(orientations: Orientations, poses: Poses | None, part: slice) -> tupl
     if poses is not None:
         q += [x[part] for x in poses.q.values()]
         known += [poses.valid[part]] * len(poses.q)
+    if not q:
+        n = len(orientations.t_s[part])
+        return np.empty((n, 0, 4)), np.empty((n, 0), np.bool_)
     return np.stack(q, axis=1), np.stack(known, axis=1)
 
 

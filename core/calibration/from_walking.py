@@ -332,7 +332,7 @@ def _sign(
             sensor=segment,
         )
     for other, theirs in pushed.items():
-        if other[-1] == segment[-1]:
+        if other[-1] == segment[-1] and np.ptp(forward) > 0.0 and np.ptp(theirs) > 0.0:
             together = float(np.corrcoef(forward, theirs)[0, 1])
             if abs(together) >= TOGETHER:
                 return (axis if together > 0 else nearest_sign(axis, axis + np.pi)), other, ()

@@ -54,7 +54,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
 
     Raises
     ------
-    FormatError `empty`, `bad_table`, `missing_acc`, `unknown_unit`.
+    FormatError `empty`, `bad_table`, `ambiguous_column`, `missing_acc`, `unknown_unit`.
     """
     if data.startswith(_STUDIO):
         return _read_studio(data, source, spec)

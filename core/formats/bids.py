@@ -58,7 +58,8 @@ def describe_table(name: str, head: bytes, channels: bytes, sidecar: bytes | Non
 
     Raises
     ------
-    FormatError `missing_acc` (positions or angles alone), `unknown_unit`, `rate_missing`, `bad_table`.
+    FormatError `missing_acc` (positions or angles alone), `unknown_unit`, `rate_missing`, `bad_table`,
+    `ambiguous_column`.
     """
     rows = _rows(channels, name)
     cells = text.first_row(memoryview(head)).count(b"\t") + 1
@@ -74,10 +75,16 @@ def describe_table(name: str, head: bytes, channels: bytes, sidecar: bytes | Non
         column = str(i + 1)
         kind = _TYPES.get(row["type"].upper())
         if row["type"].upper() == "LATENCY":
+            if time is not None:
+                raise _ambiguous(name, "time", time[0], column)
             time = (column, row["units"])
         if kind is None or row["component"].lower() not in _AXES:
             continue
-        points.setdefault(row["tracked_point"], {}).setdefault(kind, {})[row["component"].lower()] = column
+        axes = points.setdefault(row["tracked_point"], {}).setdefault(kind, {})
+        taken = axes.setdefault(row["component"].lower(), column)
+        if taken != column:
+            what = f"{row['type']} {row['component']} of '{row['tracked_point']}'"
+            raise _ambiguous(name, what, taken, column)
         if units.setdefault(kind, row["units"]) != row["units"] and kind != "mag":
             raise FormatError(
                 "unknown_unit", f"{name}: its channels of type {row['type']} have several units."
@@ -108,6 +115,14 @@ def describe_table(name: str, head: bytes, channels: bytes, sidecar: bytes | Non
             columns=columns,
         ),
         {p: s for p in columns if (s := segment_named(p) or segment_named(placed[p])) is not None},
+    )
+
+
+def _ambiguous(name: str, what: str, first: str, second: str) -> FormatError:
+    return FormatError(
+        "ambiguous_column",
+        f"{name}: expected one column for {what}, but its channels.tsv names columns {first} and {second}. "
+        "Give them different tracked points, or export one of them.",
     )
 
 

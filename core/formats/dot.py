@@ -46,7 +46,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
 
     Raises
     ------
-    FormatError `empty`, `bad_table`, `gravity_removed`, `missing_acc`.
+    FormatError `empty`, `bad_table`, `ambiguous_column`, `gravity_removed`, `missing_acc`.
     """
     lines = text.head_lines(data, _HEAD)
     separator = text.read_separator(lines[0]) or b","

@@ -135,8 +135,9 @@ def _with_rate(d: Draft, all_of_take: Sequence[Draft]) -> Draft:
     """Fill a rate the file does not name: from its clock, from the other sensors of the take, else say so."""
     if d.rate_hz is not None:
         return d
-    if d.clock == "device" and len(d.ticks) > 1:
-        step = float(np.median(np.diff(d.ticks)))
+    ticks = d.ticks[np.isfinite(d.ticks)]
+    if d.clock == "device" and len(ticks) > 1:
+        step = float(np.median(np.diff(ticks)))
         if step > 0 and np.isfinite(1.0 / step):
             return replace(d, rate_hz=1.0 / step)
     known = {o.rate_hz for o in all_of_take if o.clock == d.clock and o.rate_hz is not None}

@@ -60,7 +60,7 @@ def read_orientation_table(data: bytes, source: str) -> OrientationTable:
 
     Raises
     ------
-    FormatError `empty`, `bad_table`, `no_quaternions`, `no_time`, `not_unit`.
+    FormatError `empty`, `bad_table`, `ambiguous_column`, `no_quaternions`, `no_time`, `not_unit`.
     """
     data = text.to_utf8(data)
     if not data.strip():
@@ -73,7 +73,12 @@ def read_orientation_table(data: bytes, source: str) -> OrientationTable:
     times = [name for name in names if _TIME.fullmatch(name)]
     if not times:
         raise FormatError("no_time", f"{source} has no column of time; found {_few(names)}. {HOW}")
-    groups = _group(names)
+    if len(set(times)) > 1:
+        raise FormatError(
+            "ambiguous_column",
+            f"{source}: expected one column of time, found {_few(times)}. Remove all but one.",
+        )
+    groups = _group(names, source)
     if not groups:
         raise FormatError("no_quaternions", f"{source} has no quaternions; found {_few(names)}. {HOW}")
     wanted = [times[0], *(column for columns in groups.values() for column in columns)]
@@ -105,7 +110,7 @@ def _open_sto(data: bytes, head: list[bytes], source: str) -> tuple[list[str], m
     first, *others = text.split(head[end + 1], b"\t")
     names = [first, *(f"{name}_{part}" for name in others for part in _ORDERS[0])]
     body = bytes(text.after_lines(data, end + 2)).replace(b",", b"\t")
-    return text.make_names_unique(names), memoryview(body), b"\t"
+    return names, memoryview(body), b"\t"
 
 
 def _open_csv(data: bytes, head: list[bytes], source: str) -> tuple[list[str], memoryview, bytes]:
@@ -114,16 +119,23 @@ def _open_csv(data: bytes, head: list[bytes], source: str) -> tuple[list[str], m
     separator = text.guess_separator([line for line in head[first : first + 3] if line.strip()])
     if separator is None:
         raise FormatError("bad_table", f"{source} is not a table with one header row. {HOW}")
-    names = text.make_names_unique(text.split(head[first], separator))
+    names = text.split(head[first], separator)
     return names, text.after_lines(data, first + 1), separator
 
 
-def _group(names: list[str]) -> dict[str, tuple[str, ...]]:
+def _group(names: list[str], source: str) -> dict[str, tuple[str, ...]]:
     """Name → its four columns, scalar first; what is not complete is left out."""
     parts: dict[str, dict[str, str]] = {}
     for column in names:
         if (found := _PART.fullmatch(column)) is not None:
-            parts.setdefault(found["name"], {})[found["part"].lower()] = column
+            name, part = found["name"], found["part"].lower()
+            other = parts.setdefault(name, {}).setdefault(part, column)
+            if other != column:
+                raise FormatError(
+                    "ambiguous_column",
+                    f"{source}: expected one column for {part} of '{name}', found '{other}' and '{column}'. "
+                    "Remove or rename one of them.",
+                )
     return {
         name: tuple(columns[part] for part in order)
         for name, columns in parts.items()

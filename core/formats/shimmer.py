@@ -46,7 +46,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
 
     Raises
     ------
-    FormatError `missing_acc`, `unknown_unit`, `no_time`, `empty`, `bad_table`.
+    FormatError `missing_acc`, `unknown_unit`, `no_time`, `empty`, `bad_table`, `ambiguous_column`.
     """
     separator = _separator(data)
     lines = text.head_lines(data, _HEAD)

@@ -34,7 +34,7 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
     Raises
     ------
     ManifestError
-        unit_missing, rate_missing, unknown_column.
+        unit_missing, rate_missing, unknown_column, ambiguous_column.
     FormatError
         empty, bad_table.
     """
@@ -42,7 +42,7 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
     body = text.after_lines(data, spec.skip_rows + spec.header_rows)
     if layout.separator == b" ":
         body = memoryview(squeeze_blanks(bytes(body)))
-    table = layout.read(body, source)
+    table = _without_blank_end(layout.read(body, source), spec)
     ticks, clock = _time(table, spec, source)
     return [
         _sensor(device, channels, table, spec, source, ticks, clock)
@@ -50,19 +50,27 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
     ]
 
 
+def _without_blank_end(table: text.Columns, spec: SourceSpec) -> text.Columns:
+    """Drop the rows at the end in which no sensor has a value, as where an EMG was recorded for longer."""
+    names = [name for channels in spec.columns.values() for _, name in _asked(channels)]
+    known = np.flatnonzero(np.isfinite(table.stack(names)).any(axis=1))
+    end = known[-1] + 1 if len(known) else None
+    return text.Columns({name: values[:end] for name, values in table.values.items()}, table.notices)
+
+
 @dataclass(frozen=True)
 class _Layout:
-    """How the rows of one table are cut. wanted : columns that are read."""
+    """How the rows of one table are cut. titles : of all columns. wanted : columns that are read."""
 
     separator: bytes
-    names: list[str]
+    titles: list[str]
     wanted: list[str]
     comma: bool
 
     def read(self, body: memoryview, source: str) -> text.Columns:
         """Rows without a header as columns."""
         return text.read_columns(
-            body, source, self.separator, self.names, self.wanted, decimal_comma=self.comma
+            body, source, self.separator, self.titles, self.wanted, decimal_comma=self.comma
         )
 
 
@@ -80,8 +88,10 @@ def _lay_out(data: bytes, source: str, spec: SourceSpec) -> _Layout:
     separator = chosen or b","
     if separator == b" ":
         header, rows = [squeeze_blanks(h) for h in header], [squeeze_blanks(r) for r in rows]
-    names = name_columns(header, rows[0], separator, spec)
-    return _Layout(separator, names, _wanted(spec, names, source), text.has_decimal_comma(rows[0], separator))
+    titles = find_titles(header, rows[0], separator, spec)
+    return _Layout(
+        separator, titles, _wanted(spec, titles, source), text.has_decimal_comma(rows[0], separator)
+    )
 
 
 def estimate_rows(head: bytes, size: int) -> float:
@@ -204,8 +214,8 @@ def _check(spec: SourceSpec, source: str) -> None:
         raise ManifestError("manifest_bad_value", f"{where}: quat columns need quat_order, 'wxyz' or 'xyzw'.")
 
 
-def name_columns(header: list[bytes], row: bytes, separator: bytes, spec: SourceSpec) -> list[str]:
-    """Column names; several header rows are joined by "/", a table without a header counts 1, 2, 3 …"""
+def find_titles(header: list[bytes], row: bytes, separator: bytes, spec: SourceSpec) -> list[str]:
+    """Column titles; several header rows are joined by "/", a table without a header counts 1, 2, 3 …"""
     cells = row.count(separator) + 1
     parts = [text.split(line, separator) for line in header]
     parts = [[*p, *[""] * (cells - len(p))][:cells] if len(p) >= cells else p for p in parts]
@@ -215,11 +225,11 @@ def name_columns(header: list[bytes], row: bytes, separator: bytes, spec: Source
     names = ["/".join(p[i] for p in parts if i < len(p) and p[i]) for i in range(width)]
     if spec.index_column and width == cells - 1:
         names = ["", *names]
-    names += [""] * (cells - len(names))
-    return text.make_names_unique(names)
+    return [*names, *[""] * (cells - len(names))]
 
 
-def _wanted(spec: SourceSpec, names: list[str], source: str) -> list[str]:
+def _wanted(spec: SourceSpec, titles: list[str], source: str) -> list[str]:
+    names = text.number_columns(titles)
     there = names[1:] if spec.index_column else names
     wanted: list[str] = []
     asked = [(f"columns.{d}.{kind}", n) for d, c in spec.columns.items() for kind, n in _asked(c)]
@@ -228,6 +238,12 @@ def _wanted(spec: SourceSpec, names: list[str], source: str) -> list[str]:
             asked.append((path, clock))
             there = names
     for path, name in asked:
+        if name not in names and name in titles:
+            raise ManifestError(
+                "ambiguous_column",
+                f"{path}: expected the name of one column, but {titles.count(name)} columns of {source} are "
+                f"called '{name}'. Give one of these names: {text.describe_columns(titles, name)}.",
+            )
         if name not in there:
             near = difflib.get_close_matches(name, there, 1, 0.4)
             hint = f"did you mean '{near[0]}'?" if near else f"columns found: {', '.join(there[:20])}."

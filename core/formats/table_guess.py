@@ -6,6 +6,7 @@ Only its beginning is read, whatever its length.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -35,6 +36,8 @@ _CELL: Final = 40
 """Characters of a cell that a preview shows."""
 
 _AXIS: Final = re.compile(r"^(?P<rest>.*?)[\s_./\-:]*(?P<axis>[xyzwXYZW]|[0-3])$")
+_CHANNEL: Final = re.compile(r"(?<=[.:_][xyzwXYZW]) \d{1,2}$")
+"""Number of a channel behind its axis ("ACC.X 1")."""
 _UNIT: Final = re.compile(r"[\[(](?P<unit>[^\])]{1,12})[\])]\s*$")
 _KINDS: Final = (
     ("free", re.compile(r"free[\s_]*acc|lin(?:ear)?[\s_]*acc|user[\s_]*acc", re.IGNORECASE)),
@@ -123,7 +126,8 @@ def look_into_table(file: SourceFile) -> TableLook | None:
     squeeze = table.squeeze_blanks if separator == b" " else bytes
     spec = SourceSpec(file=file.name, skip_rows=skip, header_rows=header, index_column=index_column)
     first = squeeze(lines[rows_from])
-    names = table.name_columns([squeeze(x) for x in lines[skip:rows_from]], first, separator, spec)
+    titles = table.find_titles([squeeze(x) for x in lines[skip:rows_from]], first, separator, spec)
+    names = text.number_columns(titles)
     shown = [
         text.split(squeeze(line), separator) for line in lines[rows_from : rows_from + SHOWN] if line.strip()
     ]
@@ -131,8 +135,10 @@ def look_into_table(file: SourceFile) -> TableLook | None:
     source: dict[str, Any] = {"skip_rows": skip, "header_rows": header, "separator": separator.decode()}
     if index_column:
         source["index_column"] = True
-    source |= _clock(names, values, b"\n".join(lines[:skip]).decode("utf-8", "replace"))
-    source |= _signals(names, values)
+    # several columns of time: only a person knows which one belongs to the sensors
+    unique = [name for name in names if name in titles]
+    source |= _clock(unique, values, b"\n".join(lines[:skip]).decode("utf-8", "replace"))
+    source |= _signals(names, titles, values)
     return TableLook(tuple(names), tuple(tuple(c[:_CELL] for c in row) for row in shown), source)
 
 
@@ -245,15 +251,19 @@ def _clock(names: Sequence[str], values: Mapping[str, Floats], before: str) -> d
     return found
 
 
-def _signals(names: Sequence[str], values: Mapping[str, Floats]) -> dict[str, Any]:
-    """Columns of every sensor with an acceleration, and their units."""
+def _signals(names: Sequence[str], titles: Sequence[str], values: Mapping[str, Floats]) -> dict[str, Any]:
+    """Columns of every sensor with an acceleration, and their units; equal titles are of several sensors."""
     groups: dict[str, dict[str, dict[str, str]]] = {}
     units: dict[str, set[str]] = {"acc": set(), "gyr": set()}
-    for name in names:
-        found = _read_name(name)
+    seen: Counter[str] = Counter()
+    for name, title in zip(names, titles, strict=True):
+        found = _read_name(title)
         if found is None:
             continue
         sensor, kind, axis, unit = found
+        if name != title:
+            seen[title] += 1
+            sensor = f"{sensor or 'sensor'} {seen[title]}"
         groups.setdefault(sensor, {}).setdefault(kind, {}).setdefault(axis, name)
         if unit and kind in units:
             units[kind].add(unit)
@@ -285,6 +295,7 @@ def _read_name(name: str) -> tuple[str, str, str, str] | None:
     plain = name.strip()
     if said := _UNIT.search(plain):
         unit, plain = _SAID.get(said["unit"].strip(), ""), plain[: said.start()].strip()
+    plain = _CHANNEL.sub("", plain)
     if (axis := _AXIS.match(plain)) is None:
         return None
     rest = axis["rest"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, cast
@@ -19,6 +20,8 @@ SEPARATORS: Final = (b"\t", b";", b",", b"|", b" ")
 MISSING: Final = ["", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "null", "NULL", "-", "None"]
 LARGEST: Final = 1e30
 """Larger numbers are damage; they would not fit float32."""
+MOST_LISTED: Final = 20
+"""Columns that a message lists."""
 _LONGEST_LINE: Final = 1_000_000
 _HEAD: Final = 1 << 16
 
@@ -100,7 +103,7 @@ def fit_names(names: Sequence[str], body: memoryview, separator: bytes) -> list[
     named = list(names)
     while len(named) > cells and not named[-1].strip():
         named.pop()
-    return make_names_unique([*named, *[""] * (cells - len(named))])
+    return [*named, *[""] * (cells - len(named))]
 
 
 def has_decimal_comma(line: bytes, separator: bytes) -> bool:
@@ -121,13 +124,24 @@ def read_columns(
 
     Parameters
     ----------
-    body : rows, starting at a line start. names : all columns in order, unique. wanted : some of them.
+    body : rows, starting at a line start. names : titles of all columns in order. wanted : some of them, or
+        names that `number_columns` gives them.
 
     Raises
     ------
     FormatError
-        bad_table when most rows do not have the columns of the header.
+        bad_table when most rows do not have the columns of the header, ambiguous_column when several columns
+        have a wanted title.
     """
+    titles, names = names, number_columns(names)
+    for name in wanted:
+        if name not in names and name in titles:
+            raise FormatError(
+                "ambiguous_column",
+                f"{source}: expected one column '{name}', found {titles.count(name)}: "
+                f"{describe_columns(titles, name)}. Export it again with each column once, "
+                "or name the right columns in a manifest.",
+            )
     if not bytes(body[:_HEAD]).strip():
         raise FormatError("empty", f"{source} has a header but no samples; record or export it again.")
     body = _as_utf8(body)
@@ -137,7 +151,7 @@ def read_columns(
         broken.append(row.actual_columns)
         return "skip"
 
-    read = pc.ReadOptions(column_names=list(names), use_threads=False, block_size=1 << 22)
+    read = pc.ReadOptions(column_names=names, use_threads=False, block_size=1 << 22)
     parse = pc.ParseOptions(delimiter=separator.decode(), invalid_row_handler=skip, ignore_empty_lines=True)
     point = "," if decimal_comma else "."
 
@@ -239,12 +253,38 @@ def guess_separator(lines: Sequence[bytes]) -> bytes | None:
     return best
 
 
-def make_names_unique(names: Sequence[str]) -> list[str]:
-    """Make column names unique: a second "acc_x" becomes "acc_x#2"; a blank one gets its position."""
-    seen: dict[str, int] = {}
-    out = []
-    for i, name in enumerate(names):
-        name = name or f"column {i + 1}"
-        seen[name] = seen.get(name, 0) + 1
-        out.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
-    return out
+def number_columns(titles: Sequence[str]) -> list[str]:
+    """Return one unique name per column.
+
+    A title that several columns share is numbered: "X [s]#1", "X [s]#2", … A blank title becomes "column 3",
+    by its position.
+    """
+    titles = [title or f"column {i}" for i, title in enumerate(titles, 1)]
+    counts, used = Counter(titles), set(titles)
+    seen: Counter[str] = Counter()
+    names = []
+    for title in titles:
+        name = title
+        if counts[title] > 1:
+            seen[title] += 1
+            name = f"{title}#{seen[title]}"
+            while name in used:  # some other column has this as its own title
+                name += "#"
+            used.add(name)
+        names.append(name)
+    return names
+
+
+def describe_columns(titles: Sequence[str], title: str) -> str:
+    """List the columns that share a title: unique name, position and neighbours of each."""
+    names = number_columns(titles)
+    listed = []
+    for i in [i for i, t in enumerate(titles) if t == title]:
+        before, after = names[i - 1] if i else None, names[i + 1] if i + 1 < len(names) else None
+        if before and after:
+            where = f", between '{before}' and '{after}'"
+        else:
+            where = f", before '{after}'" if after else f", after '{before}'" if before else ""
+        listed.append(f"'{names[i]}' (column {i + 1}{where})")
+    more = f" and {len(listed) - MOST_LISTED} more" if len(listed) > MOST_LISTED else ""
+    return ", ".join(listed[:MOST_LISTED]) + more

@@ -78,7 +78,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> Draft:
     Raises
     ------
     FormatError
-        empty, missing_acc, gravity_removed, collapsed_columns, bad_table.
+        empty, missing_acc, gravity_removed, collapsed_columns, bad_table, ambiguous_column.
     """
     layout = _layout(data)
     if layout is None:
@@ -94,7 +94,6 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> Draft:
         )
     body, names = _row_names(body, lines[0], layout, source, device)
     body, cut = _without_cut_end(body, layout.separator)
-    names = text.make_names_unique(names)
     groups = [g for g in _GROUPS if set(g) <= set(names)]
     if _ACC not in groups:
         raise _no_acc(source, device, names)

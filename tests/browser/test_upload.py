@@ -317,3 +317,30 @@ def test_a_large_file_goes_on_after_a_lost_connection_and_after_a_reload(
     assert stored == large.read_bytes()
     network.close()
     context.close()
+
+
+def test_two_columns_cannot_both_be_the_time(opened: Opener, running: RunningServer, tmp_path: Path) -> None:
+    channels = [
+        f"L FOOT: {kind}.{axis} 1 [{unit}]"
+        for kind, unit in (("ACC", "g"), ("GYRO", "dps"))
+        for axis in "XYZ"
+    ]
+    file = tmp_path / "run.csv"
+    rows = [",".join(f"{0.01 * i:.2f},{v}" for v in (0.0, 0.0, 1.0, 3.0, 0.0, 1.0)) for i in range(600)]
+    file.write_text("\n".join([",".join(f"X [s],{c}" for c in channels), *rows]) + "\n")
+    with running.client() as client:
+        patient = add(client, "/patients", code="COLUMNS-1", height_m=1.75)["id"]
+        session = add_session(client, patient, "Walk, 10 m overground")
+    page = opened(f"/sessions/{session}/upload", stays=True)
+    page.locator("[data-files]").set_input_files(file)
+    columns = page.locator("column-map")
+    expect(columns.locator("[data-check=bad]")).to_contain_text("which column is the time", timeout=60_000)
+    columns.get_by_label("What column X [s]#1 is").select_option("time")
+    expect(columns.locator("[data-check=bad]")).to_have_count(0, timeout=20_000)
+    columns.get_by_label("What column X [s]#3 is").select_option("time")
+    expect(columns.locator("[data-check=bad]")).to_have_text(
+        "Time: chosen for the columns X [s]#1 and X [s]#3. Choose one of them."
+    )
+    expect(columns.get_by_role("button", name="Read the files so")).to_be_disabled()
+    columns.get_by_label("What column X [s]#1 is").select_option("")
+    expect(columns.get_by_role("button", name="Read the files so")).to_be_enabled(timeout=20_000)

@@ -7,6 +7,8 @@ import pytest
 
 from core.errors import FormatError, ManifestError
 from core.formats import manifest_of, read_recording
+from core.formats.table import open_long_table
+from core.formats.text import describe_columns, number_columns
 from core.recording import Recording
 from tests.core.formats.making import signals, source
 
@@ -220,3 +222,93 @@ def test_words_in_the_table_count_as_missing() -> None:
     stream = read("\n".join(lines)).streams["shank_l"]
     assert np.isnan(stream.acc).sum() == 2
     assert [n.code for n in stream.notices] == ["bad_cells"]
+
+
+DELSYS = "X [s],EMG,X [s],ax,X [s],ay,az,gx,gy,gz,m,m"
+
+
+def delsys() -> str:
+    """A clock before several channels; the first one, at another rate, is that of the EMG."""
+    emg, imu = 0.004 * np.arange(300), 0.01 * np.arange(300)
+    columns = [emg, ACC[:, 0], imu, ACC[:, 0], imu, *ACC[:, 1:].T, *GYR.T, imu, -imu]
+    rows = [",".join(f"{v:.9g}" for v in row) for row in np.stack(columns, axis=1)]
+    return "\n".join([DELSYS, *rows]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("spec", "path"),
+    [
+        ({"time_column": "X [s]"}, "time_column"),
+        ({"counter": {"column": "X [s]"}}, "counter.column"),
+        ({"columns": {"shank_l": {**CHANNELS, "acc": ["ax", "X [s]", "az"]}}}, "columns.shank_l.acc"),
+        ({"columns": {"shank_l": {**CHANNELS, "gyr": ["X [s]", "gy", "gz"]}}}, "columns.shank_l.gyr"),
+        ({"columns": {"shank_l": {**CHANNELS, "mag": ["ax", "ay", "X [s]"]}}}, "columns.shank_l.mag"),
+        (
+            {"columns": {"shank_l": {**CHANNELS, "quat": ["ax", "ay", "az", "X [s]"]}}, "quat_order": "wxyz"},
+            "columns.shank_l.quat",
+        ),
+    ],
+)
+def test_a_title_of_several_columns_is_refused_with_the_list(spec: dict[str, object], path: str) -> None:
+    with pytest.raises(ManifestError) as caught:
+        read(delsys(), **spec)
+    assert caught.value.code == "ambiguous_column"
+    assert caught.value.message == (
+        f"{path}: expected the name of one column, but 3 columns of t.csv are called 'X [s]'. Give one of "
+        "these names: 'X [s]#1' (column 1, before 'EMG'), 'X [s]#2' (column 3, between 'EMG' and 'ax'), "
+        "'X [s]#3' (column 5, between 'ax' and 'ay')."
+    )
+
+
+@pytest.mark.parametrize(("column", "rate"), [("X [s]#1", 250.0), ("X [s]#2", 100.0), ("X [s]#3", 100.0)])
+def test_a_numbered_name_chooses_one_of_them(column: str, rate: float) -> None:
+    stream = read(delsys(), rate_hz=None, time_column=column).streams["shank_l"]
+    assert stream.rate_hz == pytest.approx(rate)
+    np.testing.assert_allclose(stream.acc, ACC, rtol=1e-8)
+
+
+@pytest.mark.parametrize("spec", [{"time_column": "X [s]#2", "rate_hz": None}, {}])
+def test_sensors_that_end_before_the_file_have_no_hole_at_the_end(spec: dict[str, object]) -> None:
+    longer = "".join(f"{1.2 + 0.004 * i:.3f},{i},,,,,,,,,,\n" for i in range(200))
+    stream = read(delsys() + longer, **spec).streams["shank_l"]
+    assert stream.rate_hz == pytest.approx(100.0)
+    assert len(stream.t_s) == 300
+    assert not stream.notices
+
+
+def test_a_row_without_time_leaves_the_rate_known() -> None:
+    lines = delsys().splitlines()
+    lines[50] = ",".join("" if i == 2 else cell for i, cell in enumerate(lines[50].split(",")))
+    stream = read("\n".join(lines), rate_hz=None, time_column="X [s]#2").streams["shank_l"]
+    assert stream.rate_hz == pytest.approx(100.0)
+    assert [n.code for n in stream.notices] == ["out_of_order"]
+
+
+def test_titles_that_nobody_asks_for_may_repeat() -> None:
+    stream = read(delsys()).streams["shank_l"]
+    np.testing.assert_allclose(stream.acc, ACC, rtol=1e-8)
+
+
+def test_a_long_table_refuses_a_repeated_title_as_well() -> None:
+    spec = manifest_of({"sources": [{**SPEC, "rate_hz": None, "time_column": "X [s]"}]}).sources[0]
+    with pytest.raises(ManifestError, match=r"3 columns of t\.csv are called"):
+        open_long_table(source("t.csv", delsys()), spec)
+
+
+@pytest.mark.parametrize(
+    ("titles", "names"),
+    [
+        (["a", "b"], ["a", "b"]),
+        (["a", "", "a"], ["a#1", "column 2", "a#2"]),
+        (["a", "a", "a#1"], ["a#1#", "a#2", "a#1"]),
+        (["", "column 1"], ["column 1#1", "column 1#2"]),
+    ],
+)
+def test_every_column_has_a_name_of_its_own(titles: list[str], names: list[str]) -> None:
+    assert number_columns(titles) == names
+
+
+def test_of_many_columns_some_are_listed() -> None:
+    listed = describe_columns(["t"] * 30, "t")
+    assert listed.count("'t#") > 20
+    assert listed.endswith("and 10 more")

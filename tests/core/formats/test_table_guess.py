@@ -131,3 +131,27 @@ def test_tables_of_laboratories_are_understood(
     recording = read_recording([file], manifest_of({"sources": [entry]}))
     for stream in recording.streams.values():
         assert np.nanmedian(np.linalg.norm(stream.acc, axis=1)) == pytest.approx(GRAVITY, rel=0.2)
+
+
+def test_equal_titles_are_of_several_sensors_and_equal_clocks_are_left_open() -> None:
+    t_s = 0.01 * np.arange(len(ACC))
+    head = "time,acc_x,acc_y,acc_z,time,acc_x,acc_y,acc_z\n"
+    found = look(written(head, t_s, ACC, 2.5 * t_s, -ACC))
+    assert found.names == (*(f"{n}#1" for n in head.split(",")[:4]), *(f"{n}#2" for n in head.split(",")[:4]))
+    assert found.source["columns"] == {
+        f"sensor {k}": {"acc": [f"acc_{a}#{k}" for a in "xyz"]} for k in (1, 2)
+    }
+    assert "time_column" not in found.source
+
+
+def test_the_number_of_a_channel_is_not_its_axis() -> None:
+    t_s = 0.01 * np.arange(len(ACC))
+    titles = [
+        f"L FOOT: {kind}.{axis} 1 [{unit}]"
+        for kind, unit in (("ACC", "g"), ("GYRO", "dps"))
+        for axis in "XYZ"
+    ]
+    columns = [c for k in range(6) for c in (t_s, np.c_[ACC / GRAVITY, np.degrees(GYR)][:, k])]
+    source = look(written(",".join(f"X [s],{t}" for t in titles) + "\n", *columns)).source
+    assert source["columns"] == {"L FOOT": {"acc": titles[:3], "gyr": titles[3:]}}
+    assert (source["acc_unit"], source["gyr_unit"]) == ("g", "deg/s")

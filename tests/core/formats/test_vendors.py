@@ -19,6 +19,7 @@ from core.formats import SourceFile, _sniff, parse_manifest, read_recording, tex
 from core.formats.vendors import VENDOR_FORMATS, find_vendor
 from core.frames import GRAVITY
 from core.recording import ImuStream, Recording
+from tests.core.formats import making
 from tests.core.formats import vendor_files as made
 from tests.core.formats.vendor_files import VENDOR_SAMPLES
 from tests.data import data_folder
@@ -61,6 +62,31 @@ def test_a_file_is_told_by_its_content_and_read_in_si_units(label: str) -> None:
             # the vendor's orientation turns what is measured upright
             np.testing.assert_allclose(rotation.rotate(stream.quat, stream.acc)[:, 2], GRAVITY, atol=1e-3)
     assert not [n for n in recording.notices if n.severity != "info"]
+
+
+XSENS = making.mt_text(made.ACC, made.GYR).encode()
+
+
+@pytest.mark.parametrize(
+    ("data", "title", "other"),
+    [
+        (XSENS, "Acc_X", "SampleTimeFine"),
+        (made.dot(), "Acc_X", "Quat_W"),
+        (made.shimmer(), "Shimmer_952D_Accel_LN_X_CAL", "Shimmer_952D_Accel_WR_X_CAL"),
+        (made.apdm_lab(), "Left Foot/Acceleration/X", "Right Foot/Acceleration/X"),
+    ],
+)
+def test_a_column_that_is_there_twice_is_refused_with_both_places(
+    data: bytes, title: str, other: str
+) -> None:
+    with pytest.raises(FormatError) as refused:
+        read(data.replace(other.encode(), title.encode(), 1))
+    assert refused.value.code == "ambiguous_column"
+    assert f"expected one column '{title}', found 2: '{title}#1' (column " in refused.value.message
+
+
+def test_two_monitors_of_one_label_are_refused() -> None:
+    assert code_of(made.apdm_studio().replace(b"Left Ankle", b"Lumbar")) == "ambiguous_column"
 
 
 def test_labels_of_sensors_become_segments() -> None:
@@ -187,6 +213,14 @@ def test_bids_tables_are_read_by_the_files_beside_them() -> None:
                 for n, d in made.bids_parts().items()
             },
             "bad_table",
+        ),
+        (
+            {n: d.replace(b"Lumbar\t", b"LeftFoot\t") for n, d in made.bids_parts().items()},
+            "ambiguous_column",
+        ),
+        (
+            {n: re.sub(rb"\t[yz]\tGYRO", b"\tn/a\tLATENCY", d) for n, d in made.bids_parts().items()},
+            "ambiguous_column",
         ),
     ):
         with pytest.raises(FormatError) as refused:

@@ -80,6 +80,18 @@ class Shape {
       h("div", { role: "status" }, this.checks));
   }
 
+  // Says which two columns were given the same role; "" where each role has one column.
+  conflict() {
+    const taken = new Map();
+    for (const { name, what, whose } of this.rows) {
+      if (!what.value) continue;
+      const role = what.value.includes(" ") ? JSON.stringify([what.value, whose.value.trim()]) : what.value;
+      if (taken.has(role)) return speak`${what.selectedOptions[0].text}: chosen for the columns ${taken.get(role)} and ${name}. Choose one of them.`;
+      taken.set(role, name);
+    }
+    return "";
+  }
+
   // The entry of the manifest, without the file.
   source() {
     const source = { ...this.found.source, columns: {} };
@@ -145,6 +157,12 @@ class ColumnMap extends HTMLElement {
     clearTimeout(shape.timer);
     shape.fits = false;
     this.able();
+    const conflict = shape.conflict();
+    if (conflict) {
+      shape.asked = null; // an answer that is still on its way is for another choice
+      shape.refuse({ detail: conflict });
+      return;
+    }
     shape.timer = setTimeout(async () => {
       const asked = (shape.asked = {});
       try {
