@@ -23,7 +23,7 @@ from web.language import (
 from web.language import script_texts as script_catalogue
 from web.shown import Shown
 from web.template_texts import list_texts, speak_template
-from web.words import Verbatim
+from web.user_text import UserText, quote
 
 OTHERS: Final = [language for language in LANGUAGES if language != SOURCE]
 
@@ -184,9 +184,23 @@ def test_an_unknown_sentence_stays_english_and_says_so() -> None:
 
 def test_what_a_person_typed_stays_as_it_is() -> None:
     shown = Shown(DE)
-    assert shown.say(Verbatim("Left")) == "Left"
-    assert shown.say("Left") == "Links"
-    assert "(patient.code) | verbatim" in speak_template("<p>Type {{ patient.code }} to confirm</p>")
+    for typed in ("Left", "Sensor 2.csv", "Pain, left knee", "Training 2.5"):
+        assert shown.say(typed) != typed
+        assert shown.say(UserText(typed)) == shown.say_plain(UserText(typed)) == typed
+        assert str(shown.say_message("Edit {code}", code=UserText(typed))) == f"{typed} bearbeiten"
+    assert str(shown.say_message("Edit {code}", code=UserText("<b>"))) == "&lt;b&gt; bearbeiten"
+
+
+@pytest.mark.parametrize("typed", ["Left", "Sensor 2.csv", "Pain, left knee", "Training 2.5", "2.5"])
+def test_what_a_sentence_quotes_stays_as_it_is(typed: str) -> None:
+    said = DE.translate(f"The code '{typed}' belongs to another patient; choose a new one.")
+    assert said == f"Das Kürzel „{typed}“ gehört einem anderen Patienten; wählen Sie ein neues."
+    stride = DE.translate(f"left stride, 1.50 to 2.25 s, left out: {quote(UserText(typed))}")
+    assert stride == f"Doppelschritt links, 1,50 bis 2,25 s, ausgelassen: „{typed}“"
+    figure = f"<title>left stride, 1.50 to 2.25 s, left out: {quote(UserText(typed))}</title>"
+    assert Shown(DE).say_figure(figure) == f"<title>{stride}</title>"
+    low = f"Sensor {typed} has no sample with both acceleration and angular rate; export it again."
+    assert f"Sensor {typed} " in DE.translate(low)
 
 
 def test_a_long_text_costs_no_more_than_its_sentences() -> None:

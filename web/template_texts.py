@@ -2,7 +2,7 @@
 
 Templates are written in English without marks. For another language `speak_template` puts a call around every
 text and every value shown there; `list_texts` gives the same messages to the catalogue. What a person typed
-carries `| verbatim` and is shown as it is.
+or uploaded is `UserText` and is shown as it is.
 """
 
 from __future__ import annotations
@@ -16,9 +16,6 @@ from jinja2 import Environment, nodes
 from web.language import PLACEHOLDER
 
 READ_ATTRIBUTES: Final = frozenset({"alt", "aria-label", "aria-description", "label", "placeholder", "title"})
-
-TYPED: Final = re.compile(r"(patient\.(code|note)|session\.(title|note))\b(?!.*~)", re.DOTALL)
-"""Values that a person typed, wherever they are shown; others carry `| verbatim`."""
 
 _TOKEN: Final = re.compile(
     r"(\{#.*?#\}|\{%.*?%\}|\{\{.*?\}\}|<!.*?>|<(?:[^<>{]|\{\{.*?\}\}|\{%.*?%\}|\{)*>)", re.DOTALL
@@ -114,7 +111,7 @@ def _speak(text: str, how: str) -> str:
         # the white space of values alone stays as it is written
         return re.sub(
             r"\{\{(-?)(.*?)(-?)\}\}",
-            lambda m: f"{{{{{m[1]} {how}({_value(m[2].strip())}) {m[3]}}}}}",
+            lambda m: f"{{{{{m[1]} {how}({m[2].strip()}) {m[3]}}}}}",
             text,
             flags=re.DOTALL,
         )
@@ -126,12 +123,8 @@ def _speak(text: str, how: str) -> str:
 
 
 def _call(message: str, call: tuple[str, dict[str, str]], how: str) -> str:
-    values = "".join(f", {name}=({_value(value)})" for name, value in call[1].items())
+    values = "".join(f", {name}=({value})" for name, value in call[1].items())
     return f"{how}_message({_quote(message)}{values})"
-
-
-def _value(expression: str) -> str:
-    return f"({expression}) | verbatim" if TYPED.match(expression) else expression
 
 
 def _quote(text: str) -> str:

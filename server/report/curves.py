@@ -24,6 +24,7 @@ from server.report.svg import (
     stretch,
 )
 from server.report.wording import explain_exclusion, format_number
+from web.user_text import quote
 
 X_TICKS: Final = (0, 20, 40, 60, 80, 100)
 
@@ -146,7 +147,7 @@ def _stride_mark(s: Stride, duration_s: float) -> str:
     said, cross = "", ""
     if s.excluded_reason is not None:
         title = f"{s.side} stride, {s.start_s:.2f} to {s.end_s:.2f} s, left out: "
-        said = f"<title>{escape(title + explain_exclusion(s.excluded_reason))}</title>"
+        said = f"<title>{escape(title + quote(explain_exclusion(s.excluded_reason)))}</title>"
         across = end - start
         cross = f'<path class="xx" d="M{start} {top + 60}l{across} 300M{start} {top + 360}l{across}-300"/>'
     faded = " x" if out else ""
