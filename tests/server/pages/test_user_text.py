@@ -139,7 +139,7 @@ class Hostile:
             c.execute(update(table).where(*mine).values({k.name: self.make(name_column(k)) for k in columns}))
 
 
-def add_missing(c: Connection, known: dict[str, str], others: Mapping[str, Mapping[str, Any]]) -> None:
+def add_missing(c: Connection, known: dict[str, str], others: Mapping[str, dict[str, Any]]) -> None:
     """Add a row to every table with user text that has none."""
     for table in metadata.sorted_tables:
         if not any(column in ENTERED for column in table.c) or c.execute(select(table)).first() is not None:
@@ -207,7 +207,7 @@ async def fill(clinic: Clinic, hostile: Hostile) -> Mapping[str, str]:
         known = {
             "patient": pid, "session": sid, "recording": recording_id, "user": clinic.users["admin"],
             "signed_report": report_id,
-            "job": c.execute(select(job.c.id)).scalars().first(),
+            "job": c.execute(select(job.c.id)).scalars().all()[0],
         }  # fmt: skip
         # a run without files is no page: it belongs to the other visit
         other_one = select(analysis.c.id).where(analysis.c.recording_id != recording_id)

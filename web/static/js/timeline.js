@@ -13,7 +13,7 @@ import { editRows, strideBox, strideRows } from "./timeline/panel.js";
 import { Review } from "./timeline/review.js";
 import { StrideBlocks } from "./timeline/strides.js";
 import { TimeWindow } from "./timeline/window.js";
-import { speak } from "./common/words.js";
+import { speak, translate } from "./common/words.js";
 
 const FIRST_SPAN_S = 6;
 const FIRST_LANES = ["foot_pitch", "foot_rate", "knee_flexion"];
@@ -239,11 +239,11 @@ class TakeTimeline extends HTMLElement {
   }
 
   leaveOut(stride, reason) {
-    return this.change({ kind: "exclude_stride", side: stride.side, time_s: middle(stride), reason }, speak`The ${stride.side} stride is left out.`);
+    return this.change({ kind: "exclude_stride", side: stride.side, time_s: middle(stride), reason }, speak`The ${translate(stride.side)} stride is left out.`);
   }
 
   count(stride) {
-    this.change({ kind: "include_stride", side: stride.side, time_s: middle(stride) }, speak`The ${stride.side} stride counts.`);
+    this.change({ kind: "include_stride", side: stride.side, time_s: middle(stride) }, speak`The ${translate(stride.side)} stride counts.`);
   }
 
   askEvent(side = clock.stride?.side ?? "left", time = clock.t) {
@@ -254,11 +254,11 @@ class TakeTimeline extends HTMLElement {
   }
 
   move(event, to) {
-    return this.change({ kind: "move_event", side: event.side, event: event.kind, time_s: event.time_s, to_s: to }, speak`${event.side} ${WORD[event.kind]} moved to ${seconds(to, 3)} s.`);
+    return this.change({ kind: "move_event", side: event.side, event: event.kind, time_s: event.time_s, to_s: to }, speak`${translate(event.side)} ${WORD[event.kind]} moved to ${seconds(to, 3)} s.`);
   }
 
   remove(event) {
-    this.change({ kind: "delete_event", side: event.side, event: event.kind, time_s: event.time_s }, speak`${event.side} ${WORD[event.kind]} deleted.`);
+    this.change({ kind: "delete_event", side: event.side, event: event.kind, time_s: event.time_s }, speak`${translate(event.side)} ${WORD[event.kind]} deleted.`);
   }
 
   // What is held is not changed yet: it goes back where it was.
