@@ -7,8 +7,8 @@ waits at the first statement, and finds it done.
 
 from alembic import context
 
-from server.storage.db import engine_of
 from server.storage.columns import UserJson, UserString
+from server.storage.db import engine_of
 from server.storage.tables import Utc, metadata
 
 

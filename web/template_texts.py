@@ -22,6 +22,7 @@ _TOKEN: Final = re.compile(
 )
 _ATTRIBUTE: Final = re.compile(r'(?<=\s)([\w-]+)="((?:[^"{]|\{\{.*?\}\}|\{%.*?%\}|\{)*)"', re.DOTALL)
 _EITHER: Final = re.compile(r"'([^']*)' if (.+?)(?: else '([^']*)')?", re.DOTALL)
+_PLURAL: Final = re.compile(r"plural\((.+), '([^']*)', '([^']*)'\)", re.DOTALL)
 _ENTITY: Final = re.compile(r"&\w+;")
 _PARSER: Final = Environment()  # noqa: S701 - only reads expressions
 
@@ -42,13 +43,20 @@ def list_texts(source: str) -> Iterator[str]:
     for _ in _walk(source, keep):
         pass
     yield from (m for m in found if has_words(m))
-    for node in _PARSER.parse(source).find_all((nodes.Const, nodes.Concat)):
-        yield from _strings(node)
+    tree = _PARSER.parse(source)
+    counted = {id(word) for call in tree.find_all(nodes.Call) if _is_plural(call) for word in call.args}
+    for node in tree.find_all((nodes.Const, nodes.Concat)):
+        if id(node) not in counted:
+            yield from _strings(node)
 
 
 def has_words(message: str) -> bool:
     """Whether something of a message is to be translated."""
     return re.search(r"[^\W\d_]{2}", PLACEHOLDER.sub(" ", _ENTITY.sub(" ", message))) is not None
+
+
+def _is_plural(call: nodes.Call) -> bool:
+    return isinstance(call.node, nodes.Name) and call.node.name == "plural"
 
 
 class _Run:
@@ -102,7 +110,9 @@ def _attribute(found: re.Match[str], speak: Callable[[str, str], str]) -> str:
 def _is_markup(expression: str) -> bool:
     """Whether an expression is a macro's call, or HTML made elsewhere: no part of a sentence."""
     inner = expression[2:-2].strip("-").strip()
-    return re.match(r"\w+\(", inner) is not None or re.search(r"\|\s*(safe|tojson)\s*$", inner) is not None
+    called = re.match(r"(\w+)\(", inner)
+    is_macro = called is not None and called[1] != "plural"
+    return is_macro or re.search(r"\|\s*(safe|tojson)\s*$", inner) is not None
 
 
 def _speak(text: str, how: str) -> str:
@@ -142,10 +152,10 @@ def _variants(run: _Run) -> list[tuple[str, tuple[str, dict[str, str]]]]:
         if i % 2 == 0:
             found = [(message + piece, conditions, values) for message, conditions, values in found]
             continue
-        either = _EITHER.fullmatch(piece)
+        choice = _read_choice(piece)
         grown = []
-        if either:
-            true, condition, false = either[1], either[2], either[3] or ""
+        if choice:
+            true, condition, false = choice
             for message, conditions, values in found:
                 grown.append((message + false, [*conditions, f"not ({condition})"], values))
             for message, conditions, values in found:
@@ -156,6 +166,14 @@ def _variants(run: _Run) -> list[tuple[str, tuple[str, dict[str, str]]]]:
                 grown.append((f"{message}{{{name}}}", conditions, {**values, name: piece}))
         found = grown
     return [(" ".join(m.split()), (" and ".join(f"({c})" for c in cs), vs)) for m, cs, vs in found]
+
+
+def _read_choice(expression: str) -> tuple[str, str, str] | None:
+    """The words where a condition holds, the condition, and the words where it does not."""
+    if counted := _PLURAL.fullmatch(expression):
+        return counted[2], f"({counted[1]}) == 1", counted[3]
+    either = _EITHER.fullmatch(expression)
+    return (either[1], either[2], either[3] or "") if either else None
 
 
 def _name(expression: str, taken: Container[str]) -> str:

@@ -13,6 +13,7 @@ from starlette.responses import Response
 
 from core.anthropometry import LIMITS
 from core.frames import SEGMENTS
+from core.plurals import plural
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -317,7 +318,7 @@ def _facts(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> li
     worst = max((d["lost_pct"] for d in own), default=0.0)
     gap = max((d["longest_gap_s"] for d in own), default=0.0)
     return [
-        ("Sensors", str(len(own)), f"and {copies} {'copy' if copies == 1 else 'copies'}" if copies else ""),
+        ("Sensors", str(len(own)), f"and {copies} {plural(copies, 'copy', 'copies')}" if copies else ""),
         ("Rate", ", ".join(f"{r:g}" for r in rates) + " Hz", ""),
         ("Length", seconds(found["duration_s"]), ""),
         ("Lost samples", f"{number(worst, 1)} %", f"longest gap {gap * 1000:.0f} ms" if gap else ""),

@@ -12,6 +12,7 @@ import numpy as np
 
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Side
+from core.plurals import plural
 from core.rest import find_runs
 from server.report.panels import CurvePanel, SideCurve
 from server.report.svg import (
@@ -96,9 +97,11 @@ def cycle_svg(
     plot.x_axis(over.unit if x_unit else None)
     plot.words(v.up, v.down)
     n = ", ".join(f"{side} mean of {c.n}" for side, c in panel.sides.items())
+    last = [c.n for c in panel.sides.values()][-1:] or [0]
+    counted = plural(last[0], over.counted.removesuffix("s"), over.counted)
     return plot.draw(
         "chart cycle x-unit" if x_unit else "chart cycle",
-        f"{panel.title} over {over.over}: {n} {over.counted}",
+        f"{panel.title} over {over.over}: {n} {counted}",
         f' data-variable="{v.name}"',
     )
 

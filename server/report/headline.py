@@ -20,6 +20,7 @@ from core.frames import SIDES, Side
 from core.norms.lookup import Norms
 from core.parameters.flats import OTHER
 from core.parameters.variability import NORMAL_95
+from core.plurals import plural
 from server.report.change_words import change_words, find_term
 from server.report.headline_phrases import (
     BOTH_STEPS,
@@ -172,7 +173,7 @@ def say_badge(kind: str, strides: Strides, notices: Sequence[Notice]) -> str:
     """
     left, right = (len(strides.select_used(side)) for side in SIDES)
     count = left + right
-    counted = f"{count} stride{'' if count == 1 else 's'} used, {left} left and {right} right"
+    counted = f"{count} {plural(count, 'stride', 'strides')} used, {left} left and {right} right"
     if kind == "bad":
         stopped = next((n.message for n in notices if n.severity == "error"), None)
         return stopped or "Numbers are withheld or in doubt; the notices below say why."

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final, cast
 
 from core.parameters.result import Parameter
+from core.plurals import plural
 from core.quality import concern_paths_alone, find_shown_level
 from core.quality.assessment import Verdict
 from core.squat.repetitions import FOOT_LIFTED
@@ -236,7 +237,7 @@ def _calibration(
     if judged:
         passed = judged.count("pass")
         kind = None if passed == len(judged) else "warn"
-        value = f"{passed} of {len(judged)} checks"
+        value = f"{passed} of {len(judged)} {plural(len(judged), 'check', 'checks')}"
         items = [QualityItem("Calibration", value, method, kind=kind, page="calibration")]
     else:
         items = [QualityItem("Calibration", method)]

@@ -13,7 +13,7 @@ import { editRows, strideBox, strideRows } from "./timeline/panel.js";
 import { Review } from "./timeline/review.js";
 import { StrideBlocks } from "./timeline/strides.js";
 import { TimeWindow } from "./timeline/window.js";
-import { speak, translate } from "./common/words.js";
+import { plural, speak, translate } from "./common/words.js";
 
 const FIRST_SPAN_S = 6;
 const FIRST_LANES = ["foot_pitch", "foot_rate", "knee_flexion"];
@@ -278,7 +278,7 @@ class TakeTimeline extends HTMLElement {
     await this.attempt(() => this.numbers());
     this.dataset.took = String(Math.round(performance.now() - began));
     const used = this.review.strides.filter((s) => s.used).length;
-    this.find("said").textContent = speak`${said} ${used} of ${this.review.strides.length} strides count.`;
+    this.find("said").textContent = plural(used, speak`${said} ${used} of ${this.review.strides.length} strides counts.`, speak`${said} ${used} of ${this.review.strides.length} strides count.`);
   }
 
   // The numbers are written by the server, as on the other pages. An answer to what was asked before the last change

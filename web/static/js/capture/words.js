@@ -1,6 +1,6 @@
 // What the page says: what to do now, and one sentence for what is wrong.
 import { STAND_S } from "../common/standing.js";
-import { fixed, speak, translate } from "../common/words.js";
+import { fixed, plural, speak, translate } from "../common/words.js";
 
 // By the stage the server is at (its "state" messages); before the first one, by the time since the start.
 // toDo: what the person of a guided test does now, in the server's words.
@@ -117,4 +117,4 @@ export function hours(value) {
 }
 
 /** @param {number} n */
-export const asBefore = (n) => n === 1 ? speak`As last time: 1 sensor` : speak`As last time: ${n} sensors`;
+export const asBefore = (n) => plural(n, speak`As last time: 1 sensor`, speak`As last time: ${n} sensors`);

@@ -126,6 +126,16 @@ export function speak(strings, ...values) {
   return message.replace(inner, () => fill(CATALOGUE[inner] ?? inner, Object.fromEntries(shown.map((value, i) => [String(i), value]))));
 }
 
+const RULES = new Intl.PluralRules(LANGUAGE);
+
+/**
+ * The wording of one thing, or of any other number of them.
+ * @param {number} count
+ * @param {string} one
+ * @param {string} many
+ */
+export const plural = (count, one, many) => (RULES.select(count) === "one" ? one : many);
+
 /**
  * The name of a value inside a sentence: small in English, as it is where nouns are written with a capital.
  * @param {string} name
