@@ -7,12 +7,15 @@ waits at the first statement, and finds it done.
 
 from alembic import context
 
+from server.storage.columns import UserJson, UserString
 from server.storage.db import engine_of
 from server.storage.tables import Utc, metadata
 
 
 def render(kind: str, item: object, _: object) -> str | bool:
     # a revision is history: it names plain types, not classes that may change
+    if kind == "type" and isinstance(item, UserString | UserJson):
+        return f"sa.{item.impl_instance!r}"
     return "sa.DateTime(timezone=True)" if kind == "type" and isinstance(item, Utc) else False
 
 

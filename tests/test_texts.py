@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from typing import Final
 
 import pytest
@@ -23,9 +24,11 @@ from web.language import (
 from web.language import script_texts as script_catalogue
 from web.shown import Shown
 from web.template_texts import list_texts, speak_template
-from web.words import Verbatim
+from web.user_text import UserText, quote
 
 OTHERS: Final = [language for language in LANGUAGES if language != SOURCE]
+
+DE: Final = load_catalogue("de")
 
 MOST_OF_HEADLINE: Final = 95
 """Characters of a sentence that a person reads first."""
@@ -86,6 +89,119 @@ def test_headline_sentences_are_read_at_a_glance(language: str) -> None:
     assert [text for text in said if len(text) > MOST_OF_HEADLINE] == []
 
 
+COUNTABLE: Final = (
+    "batches|bows|bytes|changes|characters|checks|conditions|contacts|controls|copies|cues|days|detectors|files"
+    "|filters|hours|keys|leans|links|minutes|months|notices|packets|parts|patients|people|points|repetitions|rises"
+    "|rows|samples|sensors|squats|steps|stretches|strides|swings|takes|tests|times|tokens|trainings|values|visits"
+    "|weeks|years"
+)
+"""Nouns that messages count."""
+
+ADJECTIVES: Final = "fewer|more|other|possible|real|straight"
+COUNT: Final = re.compile(
+    r"(?<!to )(?<!at most )(?<!at least )(?<!At most )(?<!At least )"
+    rf"\{{(?!of\}}|side\}})(\w+)\}}[ \u2009\u202f](?:(?:{ADJECTIVES}) )?({COUNTABLE})\b"
+)
+"""A count and its noun. Of a range and of a limit the noun is always in the plural, of a constant too."""
+
+SINGULAR: Final = {
+    "are": "is", "batches": "batch", "copies": "copy", "count": "counts", "do": "does",
+    "follow": "follows", "have": "has", "lack": "lacks", "say": "says", "stand": "stands", "stay": "stays",
+    "stretches": "stretch", "were": "was",
+}  # fmt: skip
+
+MORE_THAN_ONE: Final = (
+    # constants of the product and settings with a least value
+    "{film_minutes} minutes", "{gyro_noise} times", "{filters} filters", "{hours} hours", "{window} strides",
+    "{strides_per_share} strides", "Expected {0} samples a second", "{1} steps, {2} s",
+    "{0} steps", "A decision on the level needs {0} strides", "{steps} straight steps are needed",
+    # groups of people that norms and limits are made of
+    "{norm_n} people", "{people} people", "{controls} people", "{first} years",
+    # differences beyond measurement error, in steps a minute or in percent of a stride
+    "{d} more steps", "{d} fewer steps", "{d} points", "{value} times its usual",
+    # shown or refused because there are several
+    "{takes} takes", "in {still} parts", "{segments} sensors are there", "{chosen} visits fit",
+    "{t_s} days; at most", "{days} days, expected", "{value} samples at {rate} Hz", "{value} samples of {id}",
+    "The file has {size} bytes", "announced with {size} bytes", "{offset} of {size} bytes",
+    # "4 left and 1 right strides"
+    "{counted} strides",
+    # the wording for one does without the number
+    "{n} more times after this test", "{copies} sensors are copies",
+    "passes all {judged} checks",
+)  # fmt: skip
+"""Parts of messages whose count is never one, or is not given where it is one."""
+
+LOOSE_PLURAL: Final = re.compile(r"\w\((s|es|n|e|en|er|r)\)")
+
+
+def reduce_number(message: str) -> str:
+    """A message in the singular, its counts left out: both wordings of a message become the same."""
+    words = re.sub(r"\{\w+\}|\b1\b|\bone\b", "#", message).split(" ")
+    kept = []
+    for word in words:
+        bare = re.sub(r"[^a-zA-Z]", "", word)
+        one = SINGULAR.get(bare) or (bare[:-1] if re.fullmatch(COUNTABLE, bare) else bare)
+        kept.append(word.replace(bare, one) if bare else word)
+    return " ".join(kept)
+
+
+def find_uncounted(messages: Collection[str]) -> list[str]:
+    """Messages that count a noun in the plural only."""
+    wordings: dict[str, set[str]] = {}
+    for message in messages:
+        wordings.setdefault(reduce_number(message), set()).add(message)
+    counting = [m for m in messages if any(not found[1].isupper() for found in COUNT.finditer(m))]
+    return [m for m in counting if len(wordings[reduce_number(m)]) == 1]
+
+
+def test_a_count_has_a_message_for_one() -> None:
+    formats = [
+        message
+        for path in sorted((ROOT / "core" / "formats").glob("*.py"))
+        for message in python_texts(path.read_text("utf-8"), whole=False)
+    ]
+    found = find_uncounted([*list_messages(), *formats])
+    assert [m for m in found if not any(part in m for part in MORE_THAN_ONE)] == []
+    assert [part for part in MORE_THAN_ONE if not any(part in m for m in found)] == []
+
+
+def test_the_check_of_counts_can_fail() -> None:
+    assert find_uncounted(["{n} rows were left out", "{n} other files"]) == [
+        "{n} rows were left out",
+        "{n} other files",
+    ]
+    assert (
+        find_uncounted(["{n} rows were left out", "{n} row was left out", "{MOST} rows", "1 to {n} rows"])
+        == []
+    )
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_no_text_has_an_ending_in_brackets(language: str) -> None:
+    texts = {text for pair in entries(language).items() for text in pair}
+    assert [text for text in texts if LOOSE_PLURAL.search(text)] == []
+
+
+@pytest.mark.parametrize(
+    ("english", "german"),
+    [
+        ("1 more stands out", "1 weitere Auffälligkeit"),
+        ("2 more stand out", "2 weitere Auffälligkeiten"),
+        ("1 more change", "1 weitere Veränderung"),
+        (
+            "0.62\u202fm, mean ± SD of 1 stride",
+            "0,62\u202fm, Mittel ± SD (Doppelschritt: 1)",
+        ),
+        (
+            "0.62 ± 0.03\u202fm, mean ± SD of 12 strides",
+            "0,62 ± 0,03\u202fm, Mittel ± SD (Doppelschritte: 12)",
+        ),
+    ],
+)
+def test_one_thing_is_in_the_singular(english: str, german: str) -> None:
+    assert DE.translate(english) == german
+
+
 def test_what_stays_english_is_there() -> None:
     assert [place for place in STAYS_ENGLISH if not (ROOT / place).exists()] == []
 
@@ -119,9 +235,6 @@ def test_messages_are_found_in_scripts() -> None:
     assert list(script_texts("a = speak`Sensor ${n + 1} is ready`; b = `not this ${one}`;")) == [
         "Sensor {0} is ready"
     ]
-
-
-DE: Final = load_catalogue("de")
 
 
 @pytest.mark.parametrize(
@@ -186,9 +299,23 @@ def test_an_unknown_sentence_stays_english_and_says_so() -> None:
 
 def test_what_a_person_typed_stays_as_it_is() -> None:
     shown = Shown(DE)
-    assert shown.say(Verbatim("Left")) == "Left"
-    assert shown.say("Left") == "Links"
-    assert "(patient.code) | verbatim" in speak_template("<p>Type {{ patient.code }} to confirm</p>")
+    for typed in ("Left", "Sensor 2.csv", "Pain, left knee", "Training 2.5"):
+        assert shown.say(typed) != typed
+        assert shown.say(UserText(typed)) == shown.say_plain(UserText(typed)) == typed
+        assert str(shown.say_message("Edit {code}", code=UserText(typed))) == f"{typed} bearbeiten"
+    assert str(shown.say_message("Edit {code}", code=UserText("<b>"))) == "&lt;b&gt; bearbeiten"
+
+
+@pytest.mark.parametrize("typed", ["Left", "Sensor 2.csv", "Pain, left knee", "Training 2.5", "2.5"])
+def test_what_a_sentence_quotes_stays_as_it_is(typed: str) -> None:
+    said = DE.translate(f"The code '{typed}' belongs to another patient; choose a new one.")
+    assert said == f"Das Kürzel „{typed}“ gehört einem anderen Patienten; wählen Sie ein neues."
+    stride = DE.translate(f"left stride, 1.50 to 2.25 s, left out: {quote(UserText(typed))}")
+    assert stride == f"Doppelschritt links, 1,50 bis 2,25 s, ausgelassen: „{typed}“"
+    figure = f"<title>left stride, 1.50 to 2.25 s, left out: {quote(UserText(typed))}</title>"
+    assert Shown(DE).say_figure(figure) == f"<title>{stride}</title>"
+    low = f"Sensor {typed} has no sample with both acceleration and angular rate; export it again."
+    assert f"Sensor {typed} " in DE.translate(low)
 
 
 def test_a_long_text_costs_no_more_than_its_sentences() -> None:

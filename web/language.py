@@ -12,7 +12,7 @@ import functools
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -30,10 +30,25 @@ MONTHS: Final = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", 
 
 PLACEHOLDER: Final = re.compile(r"\{(\w*)\}")
 
+QUOTED: Final = re.compile(r"“([^“”]*)”")
+"""A quotation: nothing in it is translated, unless a message itself has these words in quotation marks."""
+
+QUOTATION_MARKS: Final[Mapping[str, str]] = {"de": "„{}“"}
+
+IDENTIFIERS: Final = re.compile(r"(device|device_id|duplicate_of|file|file_name|column)\d*")
+"""Placeholders of messages that hold what a person typed or uploaded, quoted or not."""
+
+OWN_WORDS: Final = frozenset({"kind", "label", "protocol"})
+"""Placeholders that hold words of the product even in quotation marks."""
+
 LONGEST: Final = 500
 """Characters up to which a text is looked for as a whole; a longer one by its sentences."""
 
 MOST_PARTS: Final = 12
+
+FIRST_MASK: Final = 0xE000
+MOST_MASKS: Final = 1000
+"""Signs of the private use area that stand for quotations and values while a sentence is translated."""
 
 STRONG: Final = 12
 """Letters of its own from which on a message is not mistaken for another."""
@@ -93,16 +108,38 @@ class Catalogue:
         self._patterns = [_Pattern(text, said) for text, said in messages.items() if PLACEHOLDER.search(text)]
         # of two that fit, the one with more words of its own
         self._patterns.sort(key=lambda p: -p.literal)
+        self._own_quotations = {quoted for text in messages for quoted in QUOTED.findall(text)}
         self._known = functools.lru_cache(maxsize=20_000)(self._find)
 
     def fill(self, message: str, values: Mapping[str, str]) -> str:
         """The text of a message with values that are said already; English where the catalogue has none."""
-        return _fill(self.messages.get(message, message), values)
+        return fill_placeholders(self.messages.get(message, message), values)
 
     def find(self, text: str) -> str | None:
         """A text in this language; None where no part of it is made from a message."""
-        known = self._known(text)
-        return self._loosely(text.strip()) if known is None else known
+        masked, quotations = self._mask(text)
+        known = self._known(masked)
+        said = self._loosely(masked.strip()) if known is None else known
+        return None if said is None else self._unmask(said, quotations)
+
+    def _mask(self, text: str) -> tuple[str, list[str]]:
+        """Put a sign for each quotation, which no message has and no number is part of."""
+        quotations: list[str] = []
+
+        def mask(found: re.Match[str]) -> str:
+            if found[1] in self._own_quotations or len(quotations) == MOST_MASKS:
+                return found[0]
+            quotations.append(found[1])
+            return f"“{chr(FIRST_MASK + len(quotations) - 1)}”"
+
+        return QUOTED.sub(mask, text), quotations
+
+    def _unmask(self, said: str, quotations: Sequence[str]) -> str:
+        marks = QUOTATION_MARKS.get(self.language, "“{}”")
+        for i, quoted in enumerate(quotations):
+            mask = chr(FIRST_MASK + i)
+            said = said.replace(f"“{mask}”", marks.format(mask)).replace(mask, quoted)
+        return said
 
     def translate(self, text: str) -> str:
         """A text in this language, English where it is made from no message."""
@@ -188,12 +225,25 @@ class Catalogue:
             if pattern.is_strong != strong:
                 continue
             for values in pattern.match(text):
-                spoken = values.values()
+                spoken = [value for name, value in values.items() if name not in pattern.verbatim]
                 if all(map(self._stands_alone, spoken)) or (loose and not any(map(_SENTENCE.search, spoken))):
-                    said = {key: self._value(value) for key, value in values.items()}
-                    # a number may stand in two placeholders side by side
-                    return _with_case(text, self._localise(_fill(pattern.said, said)))
+                    return _with_case(text, self._fill_pattern(pattern, values))
         return None
+
+    def _fill_pattern(self, pattern: _Pattern, values: Mapping[str, str]) -> str:
+        """The text of a message whose values are not said yet; numbers are localised, except in user text."""
+        said: dict[str, str] = {}
+        settled: dict[str, str] = {}
+        for n, (name, value) in enumerate(values.items()):
+            known = value if name in pattern.verbatim else self._known(value)
+            if known is not None and (name in pattern.verbatim or re.search(r"[^\W\d_]", known)):
+                mask = chr(FIRST_MASK + MOST_MASKS + n)
+                said[name], settled[mask] = mask, known
+            else:
+                # a number may stand in two placeholders side by side
+                said[name] = value if known is None else known
+        filled = self._localise(fill_placeholders(pattern.said, said))
+        return re.sub("|".join(settled) or "(?!)", lambda found: settled[found[0]], filled)
 
     def _stands_alone(self, value: str) -> bool:
         """Whether a value is a word or a message by itself, not a piece of another sentence."""
@@ -202,10 +252,6 @@ class Catalogue:
             or self._known(value) is not None
             or (not _SENTENCE.search(value) and CITED.search(value) is not None)
         )
-
-    def _value(self, text: str) -> str:
-        known = self._known(text)
-        return self._localise(text) if known is None else known
 
     def _by_parts(self, text: str) -> str | None:
         """A text of parts that are messages."""
@@ -273,11 +319,23 @@ class Catalogue:
         return str(format_date(value, "medium", locale=self._locale))
 
 
+def find_verbatim(message: str) -> frozenset[str]:
+    """Placeholders of a message that hold user text: those in quotation marks, and `IDENTIFIERS`.
+
+    >>> sorted(find_verbatim("Sensor {device}: {value} Hz in '{name}' and “{title}”."))
+    ['device', 'name', 'title']
+    """
+    quoted = re.findall(r"'\{(\w+)\}'|“\{(\w+)\}”", message)
+    names = [name for name in PLACEHOLDER.findall(message) if IDENTIFIERS.fullmatch(name)]
+    return frozenset([*names, *(one or other for one, other in quoted)]) - OWN_WORDS
+
+
 class _Pattern:
     """How the sentences of one message look."""
 
     def __init__(self, text: str, said: str) -> None:
         self.said = said
+        self.verbatim = find_verbatim(text)
         pieces = PLACEHOLDER.split(text)
         self.names = pieces[1::2]
         literals = pieces[::2]
@@ -310,7 +368,8 @@ class _Pattern:
                 yield dict(zip(self.names, before, strict=True))
 
 
-def _fill(said: str, values: Mapping[str, str]) -> str:
+def fill_placeholders(said: str, values: Mapping[str, str]) -> str:
+    """A text with values in the place of its `{placeholders}`; one without a value stays."""
     return PLACEHOLDER.sub(lambda m: values.get(m[1], m[0]), said)
 
 

@@ -58,6 +58,7 @@ class Shown:
             "moment": self._moment,
             "number": lambda value, digits=0: Verbatim(self._catalogue.translate(number(value, digits))),
             "safe": lambda value: Markup(self.say_figure(str(value))),  # noqa: S704 - drawn by us
+            "filled": self.say_message,
             "spoken": self.say_members,
             "said": self.say_plain,
             "meant": lambda text, meaning: Verbatim(self._catalogue.translate(f"{text} ({meaning})")),

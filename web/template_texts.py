@@ -2,7 +2,7 @@
 
 Templates are written in English without marks. For another language `speak_template` puts a call around every
 text and every value shown there; `list_texts` gives the same messages to the catalogue. What a person typed
-carries `| verbatim` and is shown as it is.
+or uploaded is `UserText` and is shown as it is.
 """
 
 from __future__ import annotations
@@ -17,14 +17,12 @@ from web.language import PLACEHOLDER
 
 READ_ATTRIBUTES: Final = frozenset({"alt", "aria-label", "aria-description", "label", "placeholder", "title"})
 
-TYPED: Final = re.compile(r"(patient\.(code|note)|session\.(title|note))\b(?!.*~)", re.DOTALL)
-"""Values that a person typed, wherever they are shown; others carry `| verbatim`."""
-
 _TOKEN: Final = re.compile(
     r"(\{#.*?#\}|\{%.*?%\}|\{\{.*?\}\}|<!.*?>|<(?:[^<>{]|\{\{.*?\}\}|\{%.*?%\}|\{)*>)", re.DOTALL
 )
 _ATTRIBUTE: Final = re.compile(r'(?<=\s)([\w-]+)="((?:[^"{]|\{\{.*?\}\}|\{%.*?%\}|\{)*)"', re.DOTALL)
 _EITHER: Final = re.compile(r"'([^']*)' if (.+?)(?: else '([^']*)')?", re.DOTALL)
+_PLURAL: Final = re.compile(r"plural\((.+), '([^']*)', '([^']*)'\)", re.DOTALL)
 _ENTITY: Final = re.compile(r"&\w+;")
 _PARSER: Final = Environment()  # noqa: S701 - only reads expressions
 
@@ -45,13 +43,20 @@ def list_texts(source: str) -> Iterator[str]:
     for _ in _walk(source, keep):
         pass
     yield from (m for m in found if has_words(m))
-    for node in _PARSER.parse(source).find_all((nodes.Const, nodes.Concat)):
-        yield from _strings(node)
+    tree = _PARSER.parse(source)
+    counted = {id(word) for call in tree.find_all(nodes.Call) if _is_plural(call) for word in call.args}
+    for node in tree.find_all((nodes.Const, nodes.Concat)):
+        if id(node) not in counted:
+            yield from _strings(node)
 
 
 def has_words(message: str) -> bool:
     """Whether something of a message is to be translated."""
     return re.search(r"[^\W\d_]{2}", PLACEHOLDER.sub(" ", _ENTITY.sub(" ", message))) is not None
+
+
+def _is_plural(call: nodes.Call) -> bool:
+    return isinstance(call.node, nodes.Name) and call.node.name == "plural"
 
 
 class _Run:
@@ -105,7 +110,9 @@ def _attribute(found: re.Match[str], speak: Callable[[str, str], str]) -> str:
 def _is_markup(expression: str) -> bool:
     """Whether an expression is a macro's call, or HTML made elsewhere: no part of a sentence."""
     inner = expression[2:-2].strip("-").strip()
-    return re.match(r"\w+\(", inner) is not None or re.search(r"\|\s*(safe|tojson)\s*$", inner) is not None
+    called = re.match(r"(\w+)\(", inner)
+    is_macro = called is not None and called[1] != "plural"
+    return is_macro or re.search(r"\|\s*(safe|tojson)\s*$", inner) is not None
 
 
 def _speak(text: str, how: str) -> str:
@@ -114,7 +121,7 @@ def _speak(text: str, how: str) -> str:
         # the white space of values alone stays as it is written
         return re.sub(
             r"\{\{(-?)(.*?)(-?)\}\}",
-            lambda m: f"{{{{{m[1]} {how}({_value(m[2].strip())}) {m[3]}}}}}",
+            lambda m: f"{{{{{m[1]} {how}({m[2].strip()}) {m[3]}}}}}",
             text,
             flags=re.DOTALL,
         )
@@ -126,12 +133,8 @@ def _speak(text: str, how: str) -> str:
 
 
 def _call(message: str, call: tuple[str, dict[str, str]], how: str) -> str:
-    values = "".join(f", {name}=({_value(value)})" for name, value in call[1].items())
+    values = "".join(f", {name}=({value})" for name, value in call[1].items())
     return f"{how}_message({_quote(message)}{values})"
-
-
-def _value(expression: str) -> str:
-    return f"({expression}) | verbatim" if TYPED.match(expression) else expression
 
 
 def _quote(text: str) -> str:
@@ -149,10 +152,10 @@ def _variants(run: _Run) -> list[tuple[str, tuple[str, dict[str, str]]]]:
         if i % 2 == 0:
             found = [(message + piece, conditions, values) for message, conditions, values in found]
             continue
-        either = _EITHER.fullmatch(piece)
+        choice = _read_choice(piece)
         grown = []
-        if either:
-            true, condition, false = either[1], either[2], either[3] or ""
+        if choice:
+            true, condition, false = choice
             for message, conditions, values in found:
                 grown.append((message + false, [*conditions, f"not ({condition})"], values))
             for message, conditions, values in found:
@@ -163,6 +166,14 @@ def _variants(run: _Run) -> list[tuple[str, tuple[str, dict[str, str]]]]:
                 grown.append((f"{message}{{{name}}}", conditions, {**values, name: piece}))
         found = grown
     return [(" ".join(m.split()), (" and ".join(f"({c})" for c in cs), vs)) for m, cs, vs in found]
+
+
+def _read_choice(expression: str) -> tuple[str, str, str] | None:
+    """The words where a condition holds, the condition, and the words where it does not."""
+    if counted := _PLURAL.fullmatch(expression):
+        return counted[2], f"({counted[1]}) == 1", counted[3]
+    either = _EITHER.fullmatch(expression)
+    return (either[1], either[2], either[3] or "") if either else None
 
 
 def _name(expression: str, taken: Container[str]) -> str:

@@ -9,13 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
-from web.language import MONTHS
+from web.language import MONTHS, fill_placeholders
 
 
 class Verbatim(str):
-    """What a person typed: shown as it is in every language."""
+    """What is in the language of the page already, or in none: a date, the name of a file of ours, a hash."""
 
     __slots__ = ()
 
@@ -84,6 +84,12 @@ def used_icons(page: str) -> Markup:
     return Markup(fewer + rest)  # noqa: S704
 
 
+def fill_message(message: str, **values: object) -> Markup:
+    """A message of a template with values, which are escaped; the filter `filled`."""
+    said = {name: str(escape(value)) for name, value in values.items()}
+    return Markup(fill_placeholders(message, said))  # noqa: S704 - templates are ours, values escaped
+
+
 def as_it_is(value: Any) -> Any:
     """Return the value: nothing is translated into the language of the sources."""
     return value
@@ -97,6 +103,7 @@ FILTERS: dict[str, Callable[..., Any]] = {
     "seconds": seconds,
     "used_icons": used_icons,
     "pattern": pattern,
+    "filled": fill_message,
     "verbatim": as_it_is,
     "spoken": as_it_is,
     "said": as_it_is,

@@ -28,6 +28,7 @@ from core.errors import Notice, SignalError
 from core.events.bouts import Bout, walking_bouts
 from core.events.turns import Turn
 from core.frames import Floats, Segment
+from core.plurals import plural
 from core.rest import Window
 from core.sample_blocks import LongStream
 
@@ -92,11 +93,12 @@ def calibrate_on_walks(
     def measure(kind: StepKind) -> tuple[Floats, Floats]:
         start_s, end_s = walks[kind]
         own = (steps >= start_s) & (steps <= end_s) & np.isfinite(rocks)
-        if np.count_nonzero(own) < LEAST_STEPS:
+        count = int(np.count_nonzero(own))
+        if count < LEAST_STEPS:
             raise SignalError(
                 "walk_too_short",
-                f"From {start_s:g} to {end_s:g} s only {np.count_nonzero(own)} steps can be judged for "
-                f"'{kind}'; expected {LEAST_STEPS}. Record 20 steps of each without stopping.",
+                f"From {start_s:g} to {end_s:g} s only {count} {plural(count, 'step', 'steps')} can be "
+                f"judged for '{kind}'; expected {LEAST_STEPS}. Record 20 steps of each without stopping.",
                 sensor=stream.device_id,
                 t_s=start_s,
             )

@@ -46,6 +46,7 @@ from core.errors import CalibrationError, Notice, SignalError
 from core.frames import R_NEUTRAL, Bools, Floats, Segment
 from core.fusion.attitude import AttitudeParams, estimate_orientation
 from core.held_samples import HeldSeries
+from core.plurals import plural
 from core.recording import UniformRecording
 from core.rest import RestParams, Window
 from core.rotation import find_vertical, from_matrix, rotate
@@ -190,8 +191,8 @@ def _calibrate_at(
     steps = _straight_steps(found, standing, q, walk)
     if steps is not None and steps < FEW_STEPS:
         message = (
-            f"Calibration saw about {steps} straight steps, {FEW_STEPS} or more are good; walk further "
-            "straight."
+            f"Calibration saw about {steps} straight {plural(steps, 'step', 'steps')}, {FEW_STEPS} or more "
+            "are good; walk further straight."
         )
         notices.append(Notice("few_steps", message))
     if facing:

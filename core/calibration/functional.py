@@ -28,6 +28,7 @@ from core.calibration.standing import SensorAtRest, vertical_frame
 from core.calibration.walking import TRUNK
 from core.errors import CalibrationError, Notice
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from core.plurals import plural
 from core.recording import UniformRecording
 from core.rest import find_runs
 from core.rotation import find_lengths, find_vertical
@@ -182,7 +183,11 @@ def _tell(
     what, further = ("swings", "swing") if how == "hip_swing" else ("bows", "bow")
     told = []
     if done < asked:
-        message = f"{segment}: calibration saw {done} {what}, {asked} or more are good."
+        message = (
+            f"{segment}: calibration saw {done} {plural(done, 'swing', 'swings')}, {asked} or more are good."
+            if how == "hip_swing"
+            else f"{segment}: calibration saw {done} {plural(done, 'bow', 'bows')}, {asked} or more are good."
+        )
         told.append(Notice("few_repetitions", message, sensor=segment))
     if rho < GOOD_AXIS:
         message = (

@@ -22,6 +22,7 @@ from core.events.foot_pitch import FootPitchParams
 from core.events.gyro_peaks import LIMB, GyroPeakPresets, gyro_peak_events
 from core.events.result import EventKind, GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES, Side
+from core.plurals import plural
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
@@ -268,8 +269,13 @@ def _led_by_other(side: Side, leads: str, voters: Mapping[str, _Sorted]) -> Noti
 def _disagree(side: Side, dropped: int, n: int) -> Notice:
     return Notice(
         "detectors_disagree",
-        f"{dropped} possible contacts of the {side} foot were seen by too few of {n} detectors and are left"
-        " out.",
+        plural(
+            dropped,
+            f"{dropped} possible contact of the {side} foot was seen by too few of {n} detectors and is left"
+            " out.",
+            f"{dropped} possible contacts of the {side} foot were seen by too few of {n} detectors and are"
+            " left out.",
+        ),
         FOOT[side],
         severity="info",
     )

@@ -26,6 +26,7 @@ from core.filtering import low_pass
 from core.frames import FOOT, SHANK, SIDES, Bools, Floats, Oriented, Segment, Side
 from core.held_samples import compare_neighbours
 from core.peaks import find_peaks
+from core.plurals import plural
 from core.rotation import conjugate, log, multiply
 
 
@@ -256,11 +257,16 @@ def _unclear(rate: Floats, rate_hz: float, params: GyroPeakParams) -> tuple[int,
 
 
 def _say_unclear(side: Side, segment: Segment, found: tuple[int, int], params: GyroPeakParams) -> Notice:
+    limit = f"{np.degrees(params.swing_rad_s):.0f}"
     return Notice(
         "swing_unclear",
-        f"{found[0]} swings of the {side} {params.segment} stay just below"
-        f" {np.degrees(params.swing_rad_s):.0f}°/s and {found[1]} exceed it: {params.name} would miss many"
-        " contacts, so it reports none.",
+        plural(
+            found[0],
+            f"{found[0]} swing of the {side} {params.segment} stays just below {limit}°/s and {found[1]}"
+            f" exceed it: {params.name} would miss many contacts, so it reports none.",
+            f"{found[0]} swings of the {side} {params.segment} stay just below {limit}°/s and {found[1]}"
+            f" exceed it: {params.name} would miss many contacts, so it reports none.",
+        ),
         segment,
     )
 

@@ -26,6 +26,7 @@ from core.events.steps import Step, Steps
 from core.filtering import low_pass, smooth_gaussian
 from core.frames import Bools, Floats, Segment, Side
 from core.peaks import find_peaks
+from core.plurals import plural
 from core.recording import SensorSignals, UniformRecording
 from core.rest import STANDING, find_rest_windows, find_runs
 from core.rotation import find_lengths
@@ -148,8 +149,9 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
         return _nothing(
             segment,
             "few_steps",
-            f"{len(times)} steps were found, nowhere {params.bouts.min_strides + 2} without a break: no"
-            " walking bout is reported. Record a longer walk.",
+            f"{len(times)} {plural(len(times), 'step was', 'steps were')} found, nowhere "
+            f"{params.bouts.min_strides + 2} without a break: no walking bout is reported. "
+            "Record a longer walk.",
         )
     steps: list[Step] = []
     for bout in bouts:

@@ -16,6 +16,7 @@ from core.errors import Notice
 from core.events.flags import StrideParams, decide_exclusions, flag_cycles
 from core.events.result import COMPARED, GaitEvents, Stride, StrideFlag, Strides, list_known
 from core.frames import FOOT, SIDES, Bools, Floats, Oriented, Side
+from core.plurals import plural
 from core.rotation import wrap_angle, yaw
 
 NOTICES: Final = ("short_walk", "no_strides")
@@ -125,7 +126,7 @@ def _short_walk(strides: Sequence[Stride], near_turns: bool) -> list[Notice]:
     said = []
     if few:
         counts = " and ".join(f"{left[side]} {side}" for side in few)
-        word = "stride counts" if sum(left[s] for s in few) == 1 else "strides count"
+        word = plural(sum(left[s] for s in few), "stride counts", "strides count")
         said.append(
             f"Only {counts} {word}; fewer than {COMPARED} of a side are compared with nothing. Walk further "
             "straight ahead."
@@ -143,9 +144,12 @@ def _unused(strides: Sequence[Stride]) -> list[Notice]:
         if own and all(s.excluded_reason for s in own):
             reasons = Counter(s.excluded_reason for s in own)
             words = ", ".join(f"{n} {reason}" for reason, n in reasons.most_common())
-            said = (
+            said = plural(
+                len(own),
+                f"The only {side} stride does not count: {words}. How a walk starts, turns and stops is left "
+                "out: walk further straight ahead.",
                 f"None of the {len(own)} {side} strides counts: {words}. How a walk starts, turns and stops "
-                "is left out: walk further straight ahead."
+                "is left out: walk further straight ahead.",
             )
             notices.append(Notice("no_strides", said, FOOT[side]))
     return notices

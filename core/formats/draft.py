@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from core.errors import FormatError, Notice, Severity
 from core.frames import Floats, Segment
 from core.held_samples import cut_blocks, is_complete
+from core.plurals import plural
 from core.recording import ImuStream
 
 WRAP_16: Final = 1 << 16
@@ -219,7 +220,8 @@ def _in_order(d: Draft) -> Draft:
             *notices,
             Notice(
                 "out_of_order",
-                f"{d.source}: {back + lost} rows with a repeated, reversed or missing counter were left out.",
+                f"{d.source}: {back + lost} {plural(back + lost, 'row', 'rows')} with a repeated, reversed "
+                f"or missing counter {plural(back + lost, 'was', 'were')} left out.",
                 d.device_id,
                 severity=grade_loss(back + lost, len(d.ticks)),
             ),

@@ -28,6 +28,7 @@ from core.formats.live_log import (
     view_samples,
 )
 from core.frames import Floats
+from core.plurals import plural
 from core.recording import ImuStream, Recording
 
 
@@ -70,8 +71,8 @@ def read_live_log(data: bytes, source: str) -> Recording:
         taken.notices.append(
             Notice(
                 "live_log_torn",
-                f"The last {len(data) - length} bytes of {source} are incomplete or damaged and were left "
-                f"out; {len(taken.batches)} batches before them are whole.",
+                f"The end of {source} ({len(data) - length} B) is incomplete or damaged and was left out; "
+                f"batches before it that are whole: {len(taken.batches)}.",
             )
         )
     if not taken.batches:
@@ -143,11 +144,11 @@ def _compare_finish(taken: _Taken, source: str) -> None:
     if taken.finish is None:
         message = (
             f"{source} ends without a finish: the sender never said that this is all. "
-            f"{len(taken.batches)} batches were received."
+            f"Batches received: {len(taken.batches)}."
         )
         taken.notices.append(Notice("live_unfinished", message))
     elif taken.finish.count != len(taken.batches):
-        message = f"The sender counted {taken.finish.count} batches, {source} holds {len(taken.batches)}."
+        message = f"Number of batches by the sender: {taken.finish.count}, in {source}: {len(taken.batches)}."
         taken.notices.append(Notice("live_count_mismatch", message))
     elif taken.finish.sha256 != taken.digest:
         message = (
@@ -214,8 +215,9 @@ def _in_order(
         return t_us, samples, []
     severity = grade_loss(lost, len(t_us)) if lost <= MOST_OUT_OF_ORDER * len(t_us) else "error"
     message = (
-        f"{lost} of {len(t_us)} samples of stream {info.stream} repeat or run backwards in time and were "
-        "left out; the sensor's clock jumped."
+        f"{lost} of {len(t_us)} samples of stream {info.stream} "
+        f"{plural(lost, 'repeats or runs', 'repeat or run')} backwards in time and "
+        f"{plural(lost, 'was', 'were')} left out; the sensor's clock jumped."
     )
     notice = Notice("out_of_order", message, info.sensors[0].id, severity=severity)
     return t_us[rising], samples[rising], [notice]
@@ -232,10 +234,15 @@ def _stream(info: StreamInfo, sensor: SensorInfo, t_s: Floats, x: Floats, source
         return None
     notices = []
     if infinite:
-        message = f"{infinite} samples of {sensor.id} were sent as infinite and count as lost."
+        message = plural(
+            infinite,
+            f"{infinite} sample of {sensor.id} was sent as infinite and counts as lost.",
+            f"{infinite} samples of {sensor.id} were sent as infinite and count as lost.",
+        )
         notices.append(Notice("not_finite", message, sensor.id))
     if has_gyr and missing > 0:
-        message = f"{missing} of {len(x)} samples of {sensor.id} were sent as not measured."
+        were = plural(missing, "was", "were")
+        message = f"{missing} of {len(x)} samples of {sensor.id} {were} sent as not measured."
         notices.append(Notice("samples_missing", message, sensor.id, severity="info"))
     if not has_gyr:
         message = f"{sensor.id} sent no angular rate; it cannot be used for orientations."

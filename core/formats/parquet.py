@@ -24,6 +24,7 @@ from core.formats.draft import has_whole_row, signal_digest
 from core.formats.json_tree import read_json
 from core.formats.source import SourceFile
 from core.frames import Floats, Protocol, Segment
+from core.plurals import plural
 from core.recording import ImuStream, Recording, Subject
 from core.sample_blocks import LongStream, SampleBlock
 from core.shoe import Shoe
@@ -371,7 +372,11 @@ def _clear_infinite(device: str, signals: Mapping[str, Floats | None]) -> list[N
             if wrong.any():
                 count += int(np.count_nonzero(wrong.any(axis=1)))
                 signal[wrong] = np.nan
-    message = f"{count} samples of {device} are infinite and count as lost."
+    message = plural(
+        count,
+        f"{count} sample of {device} is infinite and counts as lost.",
+        f"{count} samples of {device} are infinite and count as lost.",
+    )
     return [Notice("not_finite", message, device)] if count else []
 
 

@@ -20,6 +20,7 @@ from core.formats.source import SourceFile, digest_file, sha256
 from core.formats.source_spec import SourceSpec
 from core.formats.vendors import find_vendor, list_formats
 from core.frames import Segment
+from core.plurals import plural
 from core.recording import ImuStream, Recording
 from core.sample_blocks import LongStream
 
@@ -267,7 +268,7 @@ def _tell_alike(errors: Sequence[InputError]) -> str:
     others = len(errors) - 1
     if not others:
         return errors[0].message
-    return f"{errors[0].message} The same holds of {others} other file{'' if others == 1 else 's'}."
+    return f"{errors[0].message} The same holds of {others} other {plural(others, 'file', 'files')}."
 
 
 def _stored(upload: _Upload) -> Recording:

@@ -15,6 +15,7 @@ import pyarrow.csv as pc
 from core.errors import FormatError, Notice
 from core.formats.draft import grade_loss
 from core.frames import Floats
+from core.plurals import plural
 
 SEPARATORS: Final = (b"\t", b";", b",", b"|", b" ")
 MISSING: Final = ["", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "null", "NULL", "-", "None"]
@@ -187,15 +188,18 @@ def read_columns(
     if rows == 0 or len(broken) > max(2, rows // 2):
         raise FormatError(
             "bad_table",
-            f"{source}: {len(broken)} of {rows + len(broken)} rows do not have the {len(names)} columns "
-            f"of the header (found {broken[0] if broken else 0}); export it again with one separator.",
+            f"{source}: {len(broken)} of {rows + len(broken)} rows "
+            f"{plural(len(broken), 'does', 'do')} not have the {len(names)} columns of the header "
+            f"(found {broken[0] if broken else 0}); export it again with one separator.",
         )
     if broken:
         notices.append(
             Notice(
                 "truncated_line",
-                f"{source}: {len(broken)} of {rows + len(broken)} lines do not have {len(names)} columns "
-                "and were left out; the file may have been cut off while it was written.",
+                f"{source}: {len(broken)} of {rows + len(broken)} lines "
+                f"{plural(len(broken), 'does', 'do')} not have {len(names)} columns and "
+                f"{plural(len(broken), 'was', 'were')} left out; the file may have been cut off "
+                "while it was written.",
                 severity=grade_loss(len(broken), rows + len(broken)),
             )
         )

@@ -13,6 +13,7 @@ from core.functional_tests.rising import SIT_TO_STAND, STAND_TO_SIT, PostureChan
 from core.functional_tests.trunk import TrunkMotion
 from core.parameters.catalogue import list_names
 from core.parameters.catalogue.entry import CHAIR
+from core.plurals import plural
 from core.recording import GivenLimits
 
 RISES: Final = 5
@@ -70,7 +71,13 @@ def measure_chair_rises(
     values["chair_sit_down_s"] = float(np.mean(sitting)) if sitting else None
     more = len(_row([c for c in changes if c.kind == SIT_TO_STAND])) - RISES
     told = (
-        (Notice("more_rises", f"{more} more rises follow; the first five are measured.", severity="info"),)
+        (
+            Notice(
+                "more_rises",
+                f"{more} more {plural(more, 'rise follows', 'rises follow')}; the first five are measured.",
+                severity="info",
+            ),
+        )
         if more > 0
         else ()
     )

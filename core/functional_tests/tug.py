@@ -12,6 +12,7 @@ from core.functional_tests.rising import SIT_TO_STAND, STAND_TO_SIT, PostureChan
 from core.functional_tests.trunk import TrunkMotion
 from core.parameters.catalogue import list_names
 from core.parameters.catalogue.entry import TUG
+from core.plurals import plural
 from core.recording import GivenLimits
 
 HALF_TURN: Final = radians(120.0)
@@ -19,6 +20,7 @@ HALF_TURN: Final = radians(120.0)
 
 NAMES: Final = list_names(TUG, "take")
 
+ONCE_MORE: Final = "The person rises once more after this test; only the first is measured."
 AGAIN: Final = "The person rises {n} more times after this test; only the first is measured."
 
 
@@ -71,7 +73,8 @@ def measure_tug(
             "tug_final_turn_velocity_dps": degrees(last.peak_rad_s),
         }
     more = sum(c.kind == SIT_TO_STAND and c.start_s >= end for c in changes)
-    told = (Notice("more_tests", AGAIN.format(n=more), severity="info"),) if more else ()
+    again = plural(more, ONCE_MORE, AGAIN.format(n=more))
+    told = (Notice("more_tests", again, severity="info"),) if more else ()
     rows = state_figures(values, NAMES, "turn_missing" if len(between) < 2 else "no_rise")
     return FunctionalTest(start, end, segments, rows, trunk.segment, corrected, told)
 

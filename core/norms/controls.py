@@ -23,6 +23,7 @@ from core.norms.values import NormValue, Sex
 from core.parameters.kinematic import MEAN_ZERO, mean_curve
 from core.parameters.result import CycleCurves, Parameter
 from core.parameters.variability import has_enough_values
+from core.plurals import plural
 
 FEWEST: Final = 5
 """People below which there is no group (our choice; percentiles allow for small groups, see `place`)."""
@@ -119,7 +120,7 @@ def control_group(
         )
         if part
     )
-    source = f"{n} controls of this clinic, same sensors and method"
+    source = f"{n} {plural(n, 'control', 'controls')} of this clinic, same sensors and method"
     if n < FEWEST:
         return ControlGroup(n, who, source, reason="few_controls")
     values = [_mean_values(s) for s in people.values()]

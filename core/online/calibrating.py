@@ -25,6 +25,7 @@ from core.errors import Notice, SagittalError, SignalError
 from core.frames import Bools, Floats, Segment
 from core.online.calibrated import LiveCalibration, MountingParams, finish_calibration
 from core.online.frame import CalibrationView, SegmentCheck, Stage
+from core.plurals import plural
 from core.recording import UniformRecording
 from core.timeline.live import UniformBlock
 
@@ -272,7 +273,8 @@ def _why(found: Calibration, steps: int, params: CalibratingParams) -> Notice:
     if (told := next(unknown, None)) is not None:
         return told
     message = (
-        f"{params.walk_s:.0f} s of movement held about {steps} straight steps, {params.least_steps} are "
+        f"{params.walk_s:.0f} s of movement held about {steps} straight "
+        f"{plural(steps, 'step', 'steps')}, {params.least_steps} are "
         "needed. Stand still again, then walk straight ahead."
     )
     return Notice("few_steps", message)

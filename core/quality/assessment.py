@@ -11,6 +11,7 @@ import numpy as np
 
 from core.errors import Notice
 from core.frames import GRAVITY, Segment
+from core.plurals import plural
 from core.quality.inspection import measure_losses
 from core.quality.signals import magnetic_share, measure_stream, saturation
 from core.quality.suspicion import list_suspicions
@@ -271,8 +272,9 @@ def _gap_notice(
     return [
         Notice(
             "gap",
-            f"{segment} has no data in {len(holes)} stretch(es) of {GAP_S:g} s and more, {100 * invalid:.1f} "
-            f"% of the take; the longest is {(end - start) / uniform.rate_hz:.2f} s. Angles there are "
+            f"{segment} has no data in {len(holes)} {plural(len(holes), 'stretch', 'stretches')} of "
+            f"{GAP_S:g} s and more, {100 * invalid:.1f} % of the take; the longest is "
+            f"{(end - start) / uniform.rate_hz:.2f} s. Angles there are "
             "missing and strides that touch them are left out; heading is relearnt from the straight walking "
             "after.",
             segment,

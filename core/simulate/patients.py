@@ -228,10 +228,12 @@ SEVERE_SHUFFLE: Final = replace(
     ),
 )
 
-STEP_ASYMMETRY: Final = Walker(sides=_sides(
+STEP_ASYMMETRY: Final = Walker(
+    sides=_sides(
         SideGait(length_factor=0.85, heel_off=0.26, knee_swing_rad=deg(65.0)),
         SideGait(length_factor=1.15),
-    ))
+    )
+)
 
 ELDERLY: Final = Walker(
     variability=ELDERLY_SPREAD,

@@ -28,6 +28,7 @@ from server.services import analyses, edit_log, reviews, signals
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
 from server.trail import AuditTrail
+from web.user_text import encode_user_text
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}", tags=["review"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -175,4 +176,6 @@ def _review(
         ],
         "parameters": [parameter_row(p) for p in bundle.parameters],
     }
-    return Response(msgspec.json.encode(content), status, media_type="application/json")
+    return Response(
+        msgspec.json.encode(content, enc_hook=encode_user_text), status, media_type="application/json"
+    )

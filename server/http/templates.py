@@ -21,6 +21,7 @@ from starlette.templating import Jinja2Templates
 import web
 from core.body.model import NOMINAL_HEIGHT_M
 from core.condition import CHOICES
+from core.plurals import plural
 from server.storage.compile_cache import VARIABLE
 from web.language import LANGUAGES, SOURCE, choose_language, load_catalogue, script_texts
 from web.shown import Shown
@@ -115,6 +116,7 @@ def load_templates(language: str) -> Jinja2Templates:
         templates.env.globals.update(shown.functions)
         templates.env.globals["script_texts"] = f"/texts/{language}/{script_texts(language)[0]}.json"
     templates.env.globals["conditions"] = CHOICES
+    templates.env.globals["plural"] = plural
     templates.env.globals["languages"] = LANGUAGES
     templates.env.globals["language"] = language
     templates.env.globals["ASSUMED_HEIGHT"] = f"{NOMINAL_HEIGHT_M:.2f} m"

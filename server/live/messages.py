@@ -5,9 +5,12 @@ The samples are not among it: the estimator reads them from the take's log, whos
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, Final, Literal
 
 import msgspec
+
+from web.user_text import encode_user_text
 
 STALE_S: Final = 0.5
 """Data older than this are not fed back (docs/feedback.md, "Which strides get a cue")."""
@@ -141,6 +144,6 @@ class EstimateFailed(msgspec.Struct, frozen=True, tag=True):
 Order = FollowTake | LogGrown | Command | Charge | ForgetTake
 Report = EstimatorReady | Picture | FeedItem | FeedbackStatus | LogProcessed | EstimateFailed
 
-encode = msgspec.msgpack.encode
+encode = partial(msgspec.msgpack.encode, enc_hook=encode_user_text)
 decode_order = msgspec.msgpack.Decoder(Order).decode
 decode_report = msgspec.msgpack.Decoder(Report).decode

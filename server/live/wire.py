@@ -6,6 +6,7 @@ Runs in the estimator process; the web process passes the bytes on.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 from math import isfinite, pi
 from typing import Any, Final
 
@@ -25,6 +26,7 @@ from server.report.calibration_checks import say_verdict
 from server.report.functional import segment_label
 from server.report.guided_words import tell_person
 from server.report.wording import place_words, reason_words, speak_places
+from web.user_text import encode_user_text
 
 LOST_WARN, LOST_BAD = 0.01, 0.20
 """Shares of lost samples, as the report judges a whole take (core/quality/assessment.py)."""
@@ -49,7 +51,7 @@ CURVE_POINTS: Final = 51
 _SEVERITY: Final = {"info": "info", "warning": "warn", "error": "bad"}
 _DEGREES: Final = 180.0 / pi
 
-encode = msgspec.json.encode
+encode = partial(msgspec.json.encode, enc_hook=encode_user_text)
 
 
 def frame(

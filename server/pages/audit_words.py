@@ -10,6 +10,7 @@ from sqlalchemy import Connection, Row, select
 
 from server.storage.care_tables import emergency_access
 from server.storage.tables import patient, session
+from web.user_text import UserText
 from web.words import day
 
 DEEDS: Final[Mapping[str, str]] = {
@@ -225,5 +226,5 @@ def describe_deed(action: str, detail: Mapping[str, Any] | None = None) -> str:
 
 def _name(row: Row[Any]) -> str:
     if row.user_name:
-        return str(row.user_name)
+        return UserText(row.user_name)
     return STRANGER if row.action in BY_STRANGERS else NOBODY

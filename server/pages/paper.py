@@ -20,6 +20,7 @@ from server.pages.assets import STATIC
 from server.pages.words import PROTOCOL_NAMES
 from server.services import pdfs
 from server.settings import Settings
+from web.user_text import UserText
 
 SHEETS: Final = ("base", "pages", "visits", "daily", "paper")
 """Style sheets of paper, in their order."""
@@ -42,6 +43,7 @@ def write_document(language: str, template: str, context: Mapping[str, Any]) -> 
 def hide_person(context: Mapping[str, Any], number: str) -> dict[str, Any]:
     """What a report shows without what leads to the person: a number stands for the patient's code."""
     patient, session, report = context["patient"], context["session"], context["report"]
+    number = UserText(number)
     title = PROTOCOL_NAMES.get(session.protocol, session.protocol)
     identity = [(k, number if v == patient.code else v) for k, v in report["identity"]]
     return {

@@ -25,6 +25,7 @@ from server.services import analyses, care_teams, edit_log, live, patients, prog
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.tables import now
+from web.user_text import UserText
 from web.words import number
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -56,7 +57,7 @@ def show_patients(
     record_listing(request, who, "patient")
     return render_page(
         request, db, who, "patients.html", "patients", found.active_jobs,
-        patients=rows, query=q, total=found.total,
+        patients=rows, query=UserText(q), total=found.total,
         filters=[(key, words, sum(not key or key in r["kinds"] for r in rows)) for key, words in FILTERS],
         results=who.may(Action.READ_RESULT), in_teams=found.teams_on and not who.is_admin,
         hours=care_teams.EMERGENCY // HOUR,

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
+from core.plurals import plural
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -60,7 +61,8 @@ def view_programme(programme: Programme, today: dt.date) -> dict[str, Any]:
     now_week = (today - programme.starts_on).days // 7 + 1
     weeks = range(min(v.week for v in programme.visits), max(v.week for v in programme.visits) + 1)
     upcoming = programme.next
-    said = [f"{programme.count('done')} of {len(programme.visits)} visits done"]
+    visits = len(programme.visits)
+    said = [f"{programme.count('done')} of {visits} {plural(visits, 'visit', 'visits')} done"]
     if missing := programme.count("missing"):
         said.append(f"{missing} missing")
     if upcoming is not None:
@@ -80,7 +82,9 @@ def _week(programme: Programme, week: int, *, now: bool) -> dict[str, Any]:
     trainings = [v for v in mine if v.kind == "training"]
     done = sum(v.state == "done" for v in trainings)
     missing = sum(v.state == "missing" for v in trainings)
-    said = f"{done} of {len(trainings)} trainings done" + (f", {missing} missing" if missing else "")
+    said = f"{done} of {len(trainings)} {plural(len(trainings), 'training', 'trainings')} done"
+    if missing:
+        said += f", {missing} missing"
     # the course counts weeks without a week 0: the one before the first training is −1
     return {
         "name": "now" if now else f"wk {format_number(week if week > 0 else week - 1)}",

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from core.parameters.catalogue import require_entries
 from core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
+from core.plurals import plural
 from server.report import level
 from server.report.model import ReportModel
 from server.report.table import BEYOND_SD, ParameterRow
@@ -78,7 +79,7 @@ def _count_beyond(rows: Sequence[ParameterRow]) -> str:
         any(c is not None and c.z is not None and abs(c.z) > BEYOND_SD for c in (r.both, r.left, r.right))
         for r in rows
     )
-    values = f"{len(rows)} value{'' if len(rows) == 1 else 's'}"
+    values = f"{len(rows)} {plural(len(rows), 'value', 'values')}"
     return f"{values}, {beyond} beyond {BEYOND_SD:g} SD" if beyond else values
 
 

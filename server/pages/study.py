@@ -16,6 +16,7 @@ from server.context import Db, StudyVisits
 from server.pages.shell import record_listing, render_page
 from server.pages.words import PROTOCOL_NAMES
 from server.services import studies
+from web.user_text import UserText
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -31,7 +32,7 @@ def show_study(
     with db.read() as c:
         found = studies.list_visits(c, who, choice)
     asked = {
-        "q": choice.search,
+        "q": UserText(choice.search),
         "protocol": choice.protocol or "",
         "since": choice.since.isoformat() if choice.since else "",
         "until": choice.until.isoformat() if choice.until else "",

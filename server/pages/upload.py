@@ -13,6 +13,7 @@ from starlette.responses import Response
 
 from core.anthropometry import LIMITS
 from core.frames import SEGMENTS
+from core.plurals import plural
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -26,6 +27,8 @@ from server.services.devices import NO_PLACES, LastPlaces, recall_places
 from server.services.patients import Patient
 from server.services.recordings import StoredRecording
 from server.services.sessions import Session
+from web.user_text import UserText
+from web.user_text import quote as quote_text
 from web.words import number, seconds
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -275,7 +278,7 @@ def _segment(
 def _sensor(device: Mapping[str, Any], segment: str | None) -> dict[str, Any]:
     severities = {n["severity"] for n in device["notices"]}
     if device["duplicate_of"]:
-        state = ("none", f"copy of {device['duplicate_of']}")
+        state = ("none", f"copy of {quote_id(device['duplicate_of'])}")
     elif not device["has_gyro"]:
         state = ("bad", "no gyroscope")
     elif "error" in severities:
@@ -285,11 +288,16 @@ def _sensor(device: Mapping[str, Any], segment: str | None) -> dict[str, Any]:
     else:
         state = ("ok", f"{device['rate_hz']:g} Hz")
     return {
-        "id": device["device_id"],
+        "id": UserText(device["device_id"]),
         "segment": segment,
         "state": {"kind": state[0], "text": state[1]},
         "lost": f"{number(device['lost_pct'], 1)} %",
     }
+
+
+def quote_id(sensor: str) -> str:
+    """The id of a sensor, which may be the name of a file, in a sentence; a segment by its name."""
+    return SEGMENT_NAMES.get(sensor) or quote_text(UserText(sensor))
 
 
 def _facts(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
@@ -310,7 +318,7 @@ def _facts(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> li
     worst = max((d["lost_pct"] for d in own), default=0.0)
     gap = max((d["longest_gap_s"] for d in own), default=0.0)
     return [
-        ("Sensors", str(len(own)), f"and {copies} {'copy' if copies == 1 else 'copies'}" if copies else ""),
+        ("Sensors", str(len(own)), f"and {copies} {plural(copies, 'copy', 'copies')}" if copies else ""),
         ("Rate", ", ".join(f"{r:g}" for r in rates) + " Hz", ""),
         ("Length", seconds(found["duration_s"]), ""),
         ("Lost samples", f"{number(worst, 1)} %", f"longest gap {gap * 1000:.0f} ms" if gap else ""),
@@ -329,7 +337,7 @@ def _notices(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> 
     copies = [d for d in devices if d["duplicate_of"]]
     notices = []
     if copies:
-        pairs = ", ".join(f"{d['device_id']} of {d['duplicate_of']}" for d in copies)
+        pairs = ", ".join(f"{quote_id(d['device_id'])} of {quote_id(d['duplicate_of'])}" for d in copies)
         title = (
             "One sensor is a copy of another"
             if len(copies) == 1
@@ -343,7 +351,7 @@ def _notices(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> 
     for n in everything:
         if n["code"] == DUPLICATE or n["code"] in ABOUT_FILES:
             continue
-        where = f", {n['sensor']}" if n["sensor"] else ""
+        where = f", {quote_id(n['sensor'])}" if n["sensor"] else ""
         title = n["code"].replace("_", " ").capitalize() + where
         notice = {"kind": KINDS[n["severity"]], "title": title, "message": n["message"]}
         if notice not in notices:

@@ -16,6 +16,7 @@ from server.report.level import define_parameter
 from server.report.svg import KEY, find_round_ticks, make_label, make_time_labels
 from server.report.table import ParameterRow
 from server.report.wording import explain_exclusion, format_number
+from web.user_text import quote
 
 HEIGHT: Final = 220
 TOP, BOTTOM = 12, 24
@@ -130,7 +131,7 @@ def _mark(s: StrideValue, y: float, duration_s: float) -> str:
     css, radius = CSS[s.side]
     x = 100 * 0.5 * (s.start_s + s.end_s) / duration_s
     said = f"{s.side} stride at {s.start_s:.2f} s: {s.text}" + (
-        f", left out: {s.excluded}" if s.excluded else ""
+        f", left out: {quote(s.excluded)}" if s.excluded else ""
     )
     faded = "" if s.counted else " out"
     return (

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from core.errors import Notice
 from core.frames import SEGMENTS
+from core.plurals import plural
 from server.report.quality_box import CALIBRATION_METHODS
 from server.report.wording import format_number, place_words, speak_places
 
@@ -101,14 +102,18 @@ def say_verdict(verdict: str, checks: Sequence[Mapping[str, Any]]) -> str:
     """The overall verdict in one sentence."""
     judged = [c for c in checks if c["verdict"] != "not_judged"]
     if verdict == "pass":
-        return f"The calibration passes all {len(judged)} checks that could be judged."
+        return plural(
+            len(judged),
+            "The calibration passes the one check that could be judged.",
+            f"The calibration passes all {len(judged)} checks that could be judged.",
+        )
     if verdict == "not_judged":
         return "This take allows no check of its calibration."
     failed = [c for c in checks if c["verdict"] == "redo"]
     places = list(dict.fromkeys(place_words(c["segment"]) if c["segment"] else "walk" for c in failed))
     shown = places if len(places) <= 3 else [*places[:2], f"{len(places) - 2} more"]
     listed = " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))
-    which = "checks fails" if len(failed) == 1 else "checks fail"
+    which = plural(len(failed), "checks fails", "checks fail")
     return f"Calibrate again: {len(failed)} of {len(judged)} {which}, at the {listed}."
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Side
+from core.plurals import plural
 from core.rest import find_runs
 from server.report.panels import CurvePanel, SideCurve
 from server.report.svg import (
@@ -24,6 +25,7 @@ from server.report.svg import (
     stretch,
 )
 from server.report.wording import explain_exclusion, format_number
+from web.user_text import quote
 
 X_TICKS: Final = (0, 20, 40, 60, 80, 100)
 
@@ -95,9 +97,11 @@ def cycle_svg(
     plot.x_axis(over.unit if x_unit else None)
     plot.words(v.up, v.down)
     n = ", ".join(f"{side} mean of {c.n}" for side, c in panel.sides.items())
+    last = [c.n for c in panel.sides.values()][-1:] or [0]
+    counted = plural(last[0], over.counted.removesuffix("s"), over.counted)
     return plot.draw(
         "chart cycle x-unit" if x_unit else "chart cycle",
-        f"{panel.title} over {over.over}: {n} {over.counted}",
+        f"{panel.title} over {over.over}: {n} {counted}",
         f' data-variable="{v.name}"',
     )
 
@@ -146,7 +150,7 @@ def _stride_mark(s: Stride, duration_s: float) -> str:
     said, cross = "", ""
     if s.excluded_reason is not None:
         title = f"{s.side} stride, {s.start_s:.2f} to {s.end_s:.2f} s, left out: "
-        said = f"<title>{escape(title + explain_exclusion(s.excluded_reason))}</title>"
+        said = f"<title>{escape(title + quote(explain_exclusion(s.excluded_reason)))}</title>"
         across = end - start
         cross = f'<path class="xx" d="M{start} {top + 60}l{across} 300M{start} {top + 360}l{across}-300"/>'
     faded = " x" if out else ""

@@ -27,6 +27,7 @@ from core.activity.result import (
     TransitionRefusal,
 )
 from core.frames import Floats
+from core.plurals import plural
 from server.report.wording import format_number
 
 DAY_S: Final = 86400.0
@@ -353,7 +354,7 @@ def _average(days: Sequence[ActivityDay]) -> DayTotals | None:
     n = len(own)
     longest = [d.longest_bout_s for d in own if d.longest_bout_s is not None]
     return DayTotals(
-        label=f"Mean of {n} day{'' if n == 1 else 's'}",
+        label=f"Mean of {n} {plural(n, 'day', 'days')}",
         part="",
         midnight_s=0.0,
         start_s=0.0,

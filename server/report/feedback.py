@@ -12,6 +12,7 @@ from core.feedback.cue import Summary
 from core.feedback.guard import FIRST, LAST
 from core.feedback.summary import Kind
 from core.parameters.rows import Column
+from core.plurals import plural
 from server.report.columns import reduce_to_plain
 from server.report.feedback_beside import (
     PreviousTraining,
@@ -173,6 +174,6 @@ def _notes(split: FeedbackSplit, term: Term) -> tuple[str, ...]:
         )
     for n, what in ((split.unmatched, "no stride"), (split.left_out, "a stride that does not count")):
         if n:
-            cues = "1 cue, left out, has" if n == 1 else f"{n} cues, left out, have"
+            cues = plural(n, "1 cue, left out, has", f"{n} cues, left out, have")
             said.append(f"{cues} {what} in the analysis.")
     return tuple(said)

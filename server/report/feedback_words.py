@@ -7,6 +7,7 @@ from typing import Final
 from core.feedback import Prescription
 from core.frames import Side
 from core.parameters.catalogue import CATALOGUE
+from core.plurals import plural
 from server.report.wording import Term, format_number, parameter_term
 
 SOURCE_WORDS: Final = {
@@ -115,7 +116,7 @@ def _ends(content: Prescription) -> str:
     if r.max_minutes is not None:
         said.append(f"after {r.max_minutes:g} min")
     if r.max_strides is not None:
-        said.append(f"after {r.max_strides} strides")
+        said.append(f"after {r.max_strides} {plural(r.max_strides, 'stride', 'strides')}")
     if r.gps_rise_deg is not None:
         said.append(f"when the sagittal profile score rises by {r.gps_rise_deg:g}°")
     return ", ".join(said) or "when the therapist ends it"

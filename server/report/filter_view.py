@@ -12,6 +12,7 @@ import numpy as np
 
 from core.frames import SEGMENTS, SIDES, SUFFIX, Floats, Side
 from core.fusion.algorithms.listed import ENGINES
+from core.plurals import plural
 from server.report.filter_charts import Over, draw_agreement, draw_spread
 from server.report.filter_list import GRADES_IN_WORDS
 from server.report.wording import VARIABLES, format_number, place_words
@@ -147,7 +148,7 @@ def view_comparison(
 def _headline(spreads: Mapping[str, Any], ran: int, sensors: int) -> str:
     """What the choice of a filter changes, in one sentence."""
     filters, worn = (
-        f"{n} {word}{'' if n == 1 else 's'}" for n, word in ((ran, "filter"), (sensors, "sensor"))
+        f"{n} {plural(n, word, f'{word}s')}" for n, word in ((ran, "filter"), (sensors, "sensor"))
     )
     for name, ending, words in HEADLINE:
         found = _sides(spreads, name, ending)

@@ -20,6 +20,7 @@ from core.norms.lookup import Norms
 from core.parameters.catalogue import find_entry
 from core.parameters.flats import OTHER
 from core.parameters.variability import NORMAL_95
+from core.plurals import plural
 from server.report.change_words import change_words, find_term
 from server.report.headline_phrases import (
     BOTH_STEPS,
@@ -184,7 +185,7 @@ def say_badge(kind: str, strides: Strides) -> str:
         return ""
     left, right = (len(strides.select_used(side)) for side in SIDES)
     count = left + right
-    counted = f"{count} stride{'' if count == 1 else 's'} used, {left} left and {right} right"
+    counted = f"{count} {plural(count, 'stride', 'strides')} used, {left} left and {right} right"
     if min(left, right) < COMPARED and strides.strides:
         return f"{counted}: fewer than {COMPARED} of a side are compared with nobody."
     if not strides.strides:

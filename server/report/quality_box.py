@@ -8,6 +8,7 @@ from typing import Any, Final, cast
 
 from core.activity.parameters import WORN_H
 from core.parameters.result import Parameter
+from core.plurals import plural
 from core.quality import concern_paths_alone, find_shown_level
 from core.quality.assessment import Verdict
 from core.squat.repetitions import FOOT_LIFTED
@@ -275,7 +276,7 @@ def _calibration(
     if judged:
         passed = judged.count("pass")
         kind = None if passed == len(judged) else "warn"
-        value = f"{passed} of {len(judged)} checks"
+        value = f"{passed} of {len(judged)} {plural(len(judged), 'check', 'checks')}"
         items = [QualityItem("Calibration", value, method, kind=kind, page="calibration")]
     else:
         items = [QualityItem("Calibration", method)]

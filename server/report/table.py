@@ -16,6 +16,7 @@ from core.parameters.catalogue import CATALOGUE, name_counted
 from core.parameters.result import Parameter
 from core.parameters.symmetry import Symmetry, compare_sides
 from core.parameters.variability import NORMAL_95, has_enough_values
+from core.plurals import plural
 from server.report.change_words import ChangeWords
 from server.report.curves import range_svg
 from server.report.wording import (
@@ -295,7 +296,8 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
     digits = max(term.digits, 1)
     spread = "" if p.sd is None else f" ± {format_number(p.sd, _sd_digits(term))}"
     what = name_counted(p.name)
-    told = [f"{format_number(p.mean, digits)}{spread}\u202f{term.unit}, mean ± SD of {p.n} {what}"]
+    counted = plural(p.n, what.removesuffix("s"), what)
+    told = [f"{format_number(p.mean, digits)}{spread}\u202f{term.unit}, mean ± SD of {p.n} {counted}"]
     ci = None if p.ci_low is None or p.ci_high is None else (p.ci_low, p.ci_high)
     if ci is not None:
         told.append(f"95 % CI {format_number(ci[0], digits)} to {format_number(ci[1], digits)}")
@@ -319,7 +321,7 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
         p.cv_pct,
         place.z,
         place.percentile,
-        "" if enough else f"{p.n} {what if p.n != 1 else what.removesuffix('s')}",
+        "" if enough else f"{p.n} {counted}",
         p.uncertainty,
         "" if p.uncertainty is None else format_uncertainty(p.uncertainty, term.digits),
         _known_by(p, term),

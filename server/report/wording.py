@@ -10,6 +10,7 @@ from typing import Final, Literal
 from core.parameters.catalogue import Comparison, find_entry
 from core.parameters.kinematic import is_level
 from core.parameters.symmetry import Symmetry
+from web.user_text import UserText
 
 Plane = Literal["sagittal", "frontal", "transverse"]
 
@@ -235,7 +236,9 @@ def explain_repetition(code: str) -> str:
 
 def explain_exclusion(code: str) -> str:
     """Words for a stride left out; a therapist's own reason is shown as typed."""
-    return code.removeprefix("manual:").strip() if code.startswith("manual:") else EXCLUDED.get(code, code)
+    if code.startswith("manual:"):
+        return UserText(code.removeprefix("manual:").strip())
+    return EXCLUDED.get(code, code)
 
 
 def format_number(value: float, digits: int = 0) -> str:

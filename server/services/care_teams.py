@@ -13,6 +13,7 @@ from unicodedata import normalize
 
 from sqlalchemy import Connection, Row, Select, case, delete, exists, insert, select, union, update
 
+from core.plurals import plural
 from server import audit
 from server.auth.identity import Identity
 from server.auth.roles import Role
@@ -176,7 +177,9 @@ def open_in_emergency(c: Connection, who: Identity, code: str, reason: str) -> E
     why = " ".join(reason.split())
     if not REASON[0] <= len(why) <= REASON[1]:
         raise ServiceError(
-            "bad_value", f"The reason has {len(why)} characters. Expected {REASON[0]} to {REASON[1]}."
+            "bad_value",
+            f"The reason has {len(why)} {plural(len(why), 'character', 'characters')}. "
+            f"Expected {REASON[0]} to {REASON[1]}.",
         )
     wanted = normalize("NFKC", code).strip()
     found = c.execute(select(patient.c.id).where(patient.c.code == wanted)).scalar()

@@ -32,6 +32,7 @@ from server.storage.field_cipher import (
 )
 from server.storage.person_tables import identity_key, patient_identity
 from server.storage.tables import now
+from web.user_text import UserText
 
 FIELDS: Final = ("name", "born_on", "record_number", "insurance_number", "contact")
 MOST: Final[Mapping[str, int]] = {
@@ -262,7 +263,7 @@ def _read_sealing(c: Connection, key_file: Path) -> FieldKeys:
 
 def _open(keys: FieldKeys, row: Mapping[Any, Any]) -> PatientIdentity:
     texts = {
-        name: None if row[name] is None else keys.open(bytes(row[name]), row["patient_id"], name)
+        name: None if row[name] is None else UserText(keys.open(bytes(row[name]), row["patient_id"], name))
         for name in FIELDS
     }
     born = texts.pop("born_on")

@@ -12,6 +12,7 @@ import msgspec
 from core.errors import SagittalError
 from server.processes.child import enter_child
 from server.report.pdf import render_pdf
+from web.user_text import encode_user_text
 
 
 class PaperReply(msgspec.Struct, frozen=True):
@@ -32,7 +33,7 @@ def main() -> None:
     except Exception:
         logging.getLogger(__name__).exception("a PDF could not be made")
         reply = PaperReply(code="internal_error", message="The PDF could not be made; the log says why.")
-    line.send(msgspec.msgpack.encode(reply))
+    line.send(msgspec.msgpack.encode(reply, enc_hook=encode_user_text))
 
 
 if __name__ == "__main__":

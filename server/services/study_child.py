@@ -20,6 +20,7 @@ from server.services.studies import StudyChoice, make_study
 from server.settings import Settings
 from server.storage.blob_opening import open_blobs
 from server.storage.db import Database
+from web.user_text import encode_user_text
 
 
 class StudyReply(msgspec.Struct, frozen=True):
@@ -41,7 +42,7 @@ def main() -> None:
     except Exception:
         logging.getLogger(__name__).exception("a study could not be made")
         reply = StudyReply(code="internal_error", message="The tables could not be made; the log says why.")
-    line.send(msgspec.msgpack.encode(reply))
+    line.send(msgspec.msgpack.encode(reply, enc_hook=encode_user_text))
 
 
 def _make(settings: Settings, who: Identity, choice: StudyChoice) -> StudyReply:

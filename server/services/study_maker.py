@@ -14,6 +14,7 @@ from server.services.studies import StudyChoice, check_size, list_visits
 from server.services.study_child import StudyReply
 from server.settings import Settings
 from server.storage.db import Database
+from web.user_text import encode_user_text
 
 LONGEST_S: Final = 300.0
 """Longest one may take; the most visits that are allowed take some ten seconds of computing."""
@@ -39,7 +40,7 @@ def fetch_study(
     """
     with db.read() as c:
         check_size(list_visits(c, who, choice))
-    order = msgspec.msgpack.encode((who, choice))
+    order = msgspec.msgpack.encode((who, choice), enc_hook=encode_user_text)
     try:
         with _turn.take():
             answer = run_errand("server.services.study_child", settings, order, LONGEST_S, FAR_BEHIND)

@@ -17,6 +17,7 @@ from core.norms import Norms, NormValue
 from core.norms.values import is_angle
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.result import Parameter
+from core.plurals import plural
 from server.report.numbers import Numbers
 from server.report.wording import GROUPS, NO_NORM
 from server.services import comparisons, controls, histories
@@ -182,10 +183,11 @@ def _own(walk: AnalysedWalk, parameter: str, side: Side | None) -> Offer:
         n = 0 if found is None else found.n
         return Offer(
             None,
-            f"The {where} has {n} strides with this parameter on {day(walk.session.performed_on)}; expected "
-            f"at least {FEWEST} that differ. Choose another source, or enter a target.",
+            f"The {where} has {n} {plural(n, 'stride', 'strides')} with this parameter on "
+            f"{day(walk.session.performed_on)}; expected at least {FEWEST} that differ. Choose another "
+            "source, or enter a target.",
         )
-    words = f"{where}, {found.n} strides on {day(walk.session.performed_on)}"
+    words = f"{where}, {found.n} {plural(found.n, 'stride', 'strides')} on {day(walk.session.performed_on)}"
     source: TargetSource = "own_baseline"
     return Offer(Target(source, found.mean, found.sd, words, walk.session.id))
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from sqlalchemy import CheckConstraint, Column, String, Table, Text
+from sqlalchemy import CheckConstraint, Column, String, Table
 
-from server.storage.columns import Utc, id_column, metadata, owner, reference
+from server.storage.columns import UserLines, Utc, id_column, metadata, owner, reference
 
 clinic_option = Table(
     "clinic_option",  # what the clinic has switched on; an option without a row is off
@@ -27,7 +27,7 @@ emergency_access = Table(
     id_column(),
     reference("patient_id", "patient"),
     reference("user_id", "user"),
-    Column("reason", Text, nullable=False),
+    Column("reason", UserLines, nullable=False),
     Column("opened_at", Utc, nullable=False),
     Column("ends_at", Utc, nullable=False),
     Column("ended_at", Utc),  # before that, by somebody: for good, whatever the clock does

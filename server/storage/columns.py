@@ -19,8 +19,11 @@ from sqlalchemy import (
     MetaData,
     Result,
     String,
+    Text,
     TypeDecorator,
 )
+
+from web.user_text import UserText, mark_user_text
 
 Made = TypeVar("Made")
 
@@ -35,6 +38,42 @@ metadata = MetaData(
 )
 
 Json = JSON(none_as_null=True)
+
+
+class UserString(TypeDecorator[str]):
+    """Text that a person entered or uploaded: rows give it as `UserText`, which no page translates."""
+
+    impl = String
+    cache_ok = True
+
+    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
+        """Hand the driver a plain string."""
+        return None if value is None else str(value)
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> UserText | None:
+        """Give back user text."""
+        return None if value is None else UserText(value)
+
+
+class UserLines(UserString):
+    """The same without a limit of its length."""
+
+    impl = Text
+    cache_ok = True
+
+
+class UserJson(TypeDecorator[Any]):
+    """JSON whose texts were entered or uploaded, or are codes that no page shows: all of them `UserText`."""
+
+    impl = JSON
+    cache_ok = True
+
+    def __init__(self) -> None:
+        super().__init__(none_as_null=True)
+
+    def process_result_value(self, value: Any, dialect: Dialect) -> Any:
+        """Give back the value with every text marked."""
+        return mark_user_text(value)
 
 
 def new_id() -> str:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from sqlalchemy import CheckConstraint, Column, Index, Integer, String, Table, Text
 
-from server.storage.columns import Utc, id_column, metadata
+from server.storage.columns import UserString, Utc, id_column, metadata
 
 web_node = Table(
     "web_node",
     metadata,
-    Column("name", String(32), primary_key=True),
-    Column("address", String(300), nullable=False),  # where the other nodes reach it
+    Column("name", UserString(32), primary_key=True),
+    Column("address", UserString(300), nullable=False),  # where the other nodes reach it
     Column("key_sha256", String(64), nullable=False),  # of the key in the data folder: all of them share that
     Column("run", Integer, nullable=False),  # which of its starts; an earlier one is fenced off
     Column("started_at", Utc, nullable=False),

@@ -18,7 +18,7 @@ from sqlalchemy import (
     false,
 )
 
-from server.storage.columns import Json, Utc, id_column, metadata, one_of, owner, reference
+from server.storage.columns import Json, UserString, Utc, id_column, metadata, one_of, owner, reference
 
 CONSENT_PURPOSES = ("recording", "research", "teaching", "sharing")
 
@@ -29,7 +29,7 @@ consent = Table(
     reference("patient_id", "patient"),
     Column("purpose", String(16), nullable=False),
     Column("given_on", Date, nullable=False),
-    Column("evidence", String(200), nullable=False),  # where it is written: "signed form, file 12"
+    Column("evidence", UserString(200), nullable=False),  # where it is written: "signed form, file 12"
     Column("withdrawn_on", Date),
     Column("created_at", Utc, nullable=False),
     reference("created_by", "user", nullable=True, index=False),
@@ -63,7 +63,7 @@ api_token = Table(
     metadata,
     id_column(),
     reference("user_id", "user"),
-    Column("name", String(40), nullable=False),
+    Column("name", UserString(40), nullable=False),
     Column("token_sha256", String(64), nullable=False, unique=True),  # the token itself was shown once
     Column("scopes", Json, nullable=False),
     Column("created_at", Utc, nullable=False),
@@ -87,8 +87,8 @@ security_key = Table(
     metadata,
     id_column(),
     reference("user_id", "user"),
-    Column("name", String(40), nullable=False),
-    Column("host", String(255), nullable=False),  # name and port where the key was set up
+    Column("name", UserString(40), nullable=False),
+    Column("host", UserString(255), nullable=False),  # name and port where the key was set up
     Column("credential_id", LargeBinary, nullable=False, unique=True),
     Column("public_key", LargeBinary, nullable=False),
     Column("sign_count", Integer().with_variant(BigInteger(), "postgresql"), nullable=False),

@@ -5,15 +5,24 @@ By the rules of storage/tables.py.
 
 from __future__ import annotations
 
-from sqlalchemy import CheckConstraint, Column, Integer, String, Table, Text, UniqueConstraint
+from sqlalchemy import CheckConstraint, Column, Integer, String, Table, UniqueConstraint
 
-from server.storage.columns import Utc, describe_file, id_column, metadata, owner, reference
+from server.storage.columns import (
+    UserLines,
+    UserString,
+    Utc,
+    describe_file,
+    id_column,
+    metadata,
+    owner,
+    reference,
+)
 
 assessment = Table(
     "assessment",
     metadata,
     owner("session_id", "session"),
-    Column("content", Text, nullable=False),  # of the therapist, on the report
+    Column("content", UserLines, nullable=False),  # of the therapist, on the report
     Column("changed_at", Utc, nullable=False),
 )
 
@@ -25,11 +34,11 @@ signed_report = Table(
     Column("number", Integer, nullable=False),  # version of the session's report, from 1
     Column("analysis_id", String(32), nullable=False),  # what it was made from; no key: it stands by itself
     Column("language", String(8), nullable=False),
-    Column("signed_by", String(200)),  # the name it bears; no key, as accounts may go
+    Column("signed_by", UserString(200)),  # the name it bears; no key, as accounts may go
     Column("signed_at", Utc, nullable=False),
-    Column("reopened_by", String(200)),
+    Column("reopened_by", UserString(200)),
     Column("reopened_at", Utc),  # None: in force
-    Column("reopened_because", Text),
+    Column("reopened_because", UserLines),
     UniqueConstraint("session_id", "number"),
     CheckConstraint("(reopened_at IS NULL) = (reopened_because IS NULL)", name="reopened"),
 )
@@ -48,7 +57,7 @@ report_link = Table(
     id_column(),
     reference("report_id", "signed_report"),
     Column("token_sha256", String(64), nullable=False, unique=True),  # the token is only in the address
-    Column("made_by", String(200)),
+    Column("made_by", UserString(200)),
     reference("maker_id", "user", nullable=True, index=False),  # its account; made_by is the name it had
     Column("made_at", Utc, nullable=False),
     Column("expires_at", Utc, nullable=False),

@@ -47,7 +47,7 @@ class Damage:
     def sentence(self) -> str:
         """For the people of the session."""
         return (
-            f"{self.lost} bytes of the live recording were damaged on the server's disk and are left out. "
+            f"Damaged on the server's disk and left out: {self.lost} B of the live recording. "
             "The original is kept; ask your administrator."
         )
 

@@ -47,7 +47,7 @@ from server.storage import (  # noqa: F401 - `metadata` has all tables
     report_tables,
 )
 from server.storage.append_only import make_append_only
-from server.storage.columns import Json, Utc
+from server.storage.columns import Json, UserJson, UserLines, UserString, Utc
 from server.storage.columns import describe_file as _describe_file
 from server.storage.columns import id_column as _id
 from server.storage.columns import metadata as metadata
@@ -71,13 +71,13 @@ patient = Table(
     "patient",
     metadata,
     _id(),
-    Column("code", String(64), nullable=False, unique=True),  # the clinic's pseudonym, shown everywhere
+    Column("code", UserString(64), nullable=False, unique=True),  # the clinic's pseudonym, shown everywhere
     Column("sex", String(8)),
     Column("birth_year", Integer),
     Column("height_m", Float),
     Column("affected_side", String(8)),
     Column("is_control", Boolean, nullable=False, server_default=false()),
-    Column("note", Text, nullable=False),
+    Column("note", UserLines, nullable=False),
     Column("created_at", Utc, nullable=False),
     _one_of("sex", SEXES),
     _one_of("affected_side", SIDES),
@@ -91,7 +91,7 @@ patient_note = Table(
     _id(),
     _ref("patient_id", "patient"),
     Column("written_on", Date, nullable=False),
-    Column("content", Text, nullable=False),
+    Column("content", UserLines, nullable=False),
     Column("created_at", Utc, nullable=False),
     _ref("created_by", "user", nullable=True, index=False),
 )
@@ -101,7 +101,7 @@ session = Table(
     metadata,
     _id(),
     _ref("patient_id", "patient"),
-    Column("title", String(200), nullable=False),
+    Column("title", UserString(200), nullable=False),
     Column("performed_on", Date, nullable=False),
     Column("protocol", String(32), nullable=False),
     Column("height_m", Float),
@@ -111,7 +111,7 @@ session = Table(
     Column("orthosis", String(32)),
     Column("shoes", String(32)),
     Column("feedback", Boolean, nullable=False, server_default=false()),
-    Column("note", Text, nullable=False),
+    Column("note", UserLines, nullable=False),
     Column("created_at", Utc, nullable=False),
     CheckConstraint("height_m BETWEEN 0.5 AND 2.5", name="height_m"),
 )
@@ -121,7 +121,7 @@ recording = Table(
     metadata,
     _id(),
     _ref("session_id", "session"),
-    Column("manifest", Json),  # the mapping as last confirmed; every analysis keeps its own copy
+    Column("manifest", UserJson),  # the mapping as last confirmed; every analysis keeps its own copy
     Column("inspection", Json),  # what was found in the files, before any mapping
     Column("wanted_key", String(300)),  # key of the analysis that was asked for last
     Column("created_at", Utc, nullable=False),
@@ -131,7 +131,7 @@ recording_file = Table(
     "recording_file",
     metadata,
     _owner("recording_id", "recording"),
-    Column("name", String(500), primary_key=True),  # as uploaded, with its folders; any Unicode
+    Column("name", UserString(500), primary_key=True),  # as uploaded, with its folders; any Unicode
     *_describe_file(),
     Column("added_at", Utc, nullable=False),
 )
@@ -141,7 +141,7 @@ file_upload = Table(
     metadata,
     _id(),
     _ref("session_id", "session"),
-    Column("name", String(500), nullable=False),
+    Column("name", UserString(500), nullable=False),
     Column("size", Integer, nullable=False),  # of the whole file, as announced
     Column("finished_sha256", String(64)),  # None: it is still coming
     Column("created_at", Utc, nullable=False),
@@ -152,8 +152,8 @@ user = Table(
     "user",
     metadata,
     _id(),
-    Column("name", String(64), nullable=False, unique=True),  # sign-in name, lower case
-    Column("display_name", String(200), nullable=False),
+    Column("name", UserString(64), nullable=False, unique=True),  # sign-in name, lower case
+    Column("display_name", UserString(200), nullable=False),
     Column("role", String(16), nullable=False),
     Column("password_hash", String(255)),  # None until the set-up link was used
     Column("active", Boolean, nullable=False),
@@ -234,7 +234,7 @@ analysis = Table(
     Column("input_sha256", String(64), nullable=False),
     Column("config_sha256", String(64), nullable=False),
     Column("code_version", String(64), nullable=False),
-    Column("manifest", Json),
+    Column("manifest", UserJson),
     Column("config", Json, nullable=False),
     Column("created_at", Utc, nullable=False),
     UniqueConstraint("job_id"),  # one job, one visible result
@@ -252,7 +252,7 @@ device_check = Table(
     "device_check",
     metadata,
     _owner("recording_id", "recording"),
-    Column("device_id", String(32), primary_key=True, index=True),  # serial numbers only, never a file's name
+    Column("device_id", UserString(32), primary_key=True, index=True),  # a serial number, never a file's name
     Column("segment", String(16), nullable=False),  # where the analysis took it to be
     Column("exchanged", Boolean, nullable=False),  # its place was said wrongly: it is not offered again
     Column("content", Json, nullable=False),  # core.quality.devices.DeviceCheck
@@ -263,7 +263,7 @@ reference_file = Table(
     "reference_file",
     metadata,
     _owner("session_id", "session"),
-    Column("name", String(500), primary_key=True),  # as uploaded; orientations of another system
+    Column("name", UserString(500), primary_key=True),  # as uploaded; orientations of another system
     *_describe_file(),
     Column("added_at", Utc, nullable=False),
 )
@@ -272,11 +272,11 @@ session_video = Table(
     "session_video",
     metadata,
     _owner("session_id", "session"),
-    Column("name", String(500), nullable=False),
+    Column("name", UserString(500), nullable=False),
     Column("media_type", String(32), nullable=False),
     *_describe_file(),
     Column("offset_s", Float),  # time in the video at the take's time 0; None: nobody has aligned it
-    Column("consent_by", String(64)),  # who said that the person agreed; no key, as accounts may go
+    Column("consent_by", UserString(64)),  # who said that the person agreed; no key, as accounts may go
     Column("consent_at", Utc, nullable=False),
 )
 
@@ -287,7 +287,7 @@ filter_run = Table(
     _ref("analysis_id", "analysis"),
     Column("job_id", ForeignKey("job.id", ondelete="RESTRICT"), nullable=False),
     Column("settings", Json, nullable=False),  # core.filter_comparison.FilterRequest
-    Column("reference_name", String(500)),  # None: compared with each other only
+    Column("reference_name", UserString(500)),  # None: compared with each other only
     Column("reference_sha256", String(64)),
     Column("code_version", String(64), nullable=False),
     Column("created_at", Utc, nullable=False),
@@ -371,7 +371,7 @@ audit = Table(
     Column("seq", Integer, primary_key=True, autoincrement=True),
     Column("at", Utc, nullable=False),
     Column("user_id", String(32)),  # no foreign key: the trail outlives everything it speaks of
-    Column("user_name", String(64)),
+    Column("user_name", UserString(64)),
     Column("action", String(64), nullable=False),
     Column("resource", String(32), nullable=False),
     Column("resource_id", String(64)),

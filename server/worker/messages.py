@@ -5,9 +5,12 @@ Not pickle: the child reads files from outside, and who got hold of it must not 
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import msgspec
+
+from web.user_text import encode_user_text
 
 
 class Input(msgspec.Struct, frozen=True, tag=True):
@@ -62,6 +65,6 @@ class Failure(msgspec.Struct, frozen=True, tag=True):
 
 Reply = ChildReady | Stage | Checkpoint | Result | Failure
 
-encode = msgspec.msgpack.encode
+encode = partial(msgspec.msgpack.encode, enc_hook=encode_user_text)
 decode_order = msgspec.msgpack.Decoder(Order).decode
 decode_reply = msgspec.msgpack.Decoder(Reply).decode

@@ -72,12 +72,29 @@ def test_scripts_speak_german_and_write_decimal_commas(opened: Opener) -> None:
     page.get_by_role("button", name="Code eingeben").wait_for()
     said = page.evaluate(
         """async () => {
-          const { speak, translate } = await import("/static/js/common/words.js");
-          const rest = speak`${(1.25).toFixed(2)} s are still on this tablet only.`;
+          const { fixed, speak, translate } = await import("/static/js/common/words.js");
+          const rest = speak`${fixed(1.25, 2)} s are still on this tablet only.`;
           return [rest, translate("Stand still."), speak`Stop`];
         }"""
     )
     assert said == ["1,25 s sind noch allein auf diesem Tablet.", "Stehen Sie still.", "Stopp"]
+
+
+@pytest.mark.parametrize("typed", ["Sensor 2.csv", "Pain, left knee", "Training 2.5", "2.5", "Stop"])
+def test_scripts_show_what_people_typed_as_it_is(typed: str, opened: Opener) -> None:
+    page = opened("/capture", signed_in=False, locale="de-DE")
+    page.get_by_role("button", name="Code eingeben").wait_for()
+    said = page.evaluate(
+        """async (typed) => {
+          const { speak, translate } = await import("/static/js/common/words.js");
+          const refused = `The code '${typed}' belongs to another patient; choose a new one.`;
+          return [speak`Uploading ${typed}…`, translate(refused), translate(`Left out, “${typed}”`)];
+        }""",
+        typed,
+    )
+    assert said[0] == f"{typed} wird hochgeladen …"
+    assert said[1] == f"Das Kürzel „{typed}“ gehört einem anderen Patienten; wählen Sie ein neues."
+    assert f"„{typed}“" in said[2]
 
 
 @pytest.mark.journey

@@ -189,7 +189,7 @@ def test_the_end_that_a_late_clock_leaves_empty_is_told_from_a_tenth_of_a_second
     report = assess(recording, replace(uniform, sensors={"foot_l": late}))
     messages = [n.message for n in report.notices if n.code == "gap"]
     assert len(messages) == told
-    assert all("1 stretch(es) of 0.1 s and more" in m and f"{lost_s:.2f} s" in m for m in messages)
+    assert all("1 stretch of 0.1 s and more" in m and f"{lost_s:.2f} s" in m for m in messages)
 
 
 def test_errors_of_the_reader_stop_the_analysis_only_for_worn_sensors() -> None:

@@ -274,6 +274,8 @@ def _no_texts(tree: ast.AST) -> Iterator[int]:
                 parts = [node.value]
             case ast.Assign(targets=[ast.Name(id="__all__")]):
                 parts = [*ast.walk(node.value)]
+            case ast.FormattedValue(value=ast.Call(func=func, args=args)) if _name(func) == "plural":
+                parts = [*args]
             case ast.Call() if _name(node.func) in _CODE:
                 parts = [*ast.walk(node)]
             case ast.Raise(exc=ast.Call(func=func)) if SAID.match(_name(func)):
@@ -316,8 +318,8 @@ def _parts(node: ast.AST, names: list[str]) -> list[tuple[str, ...]]:
             return parts(node.value)
         case ast.BinOp(op=ast.Add()):
             return [*parts(node.left), *parts(node.right)]
-        case ast.IfExp():
-            branches = [[*itertools.product(*parts(branch))] for branch in (node.body, node.orelse)]
+        case ast.IfExp(body=one, orelse=other) | ast.Call(func=ast.Name(id="plural"), args=[_, one, other]):
+            branches = [[*itertools.product(*parts(branch))] for branch in (one, other)]
             return [tuple(dict.fromkeys("".join(choice) for branch in branches for choice in branch))]
         case ast.Call(args=[ast.Name() | ast.Attribute() as first, *_]):
             found = re.findall(r"[A-Za-z]\w+", ast.unparse(first))

@@ -27,7 +27,7 @@ from core.simulate.human import move
 from core.simulate.script import plan
 from core.simulate.truth import WalkTruth, truth_of
 from core.simulate.walker import REFERENCE_HEIGHT_M
-from tests.true_walks import true_tracks
+from tests.helpers.true_walks import true_tracks
 
 MOST_SD = 1.5
 

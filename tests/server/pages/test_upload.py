@@ -132,7 +132,7 @@ def test_copies_are_said_in_one_sentence_and_not_used() -> None:
     assert chosen(view)["A2"] is None
     (notice,) = view["notices"]
     assert notice["title"] == "2 sensors are copies of others"
-    assert "A2 of A, B2 of B" in notice["message"]
+    assert "“A2” of “A”, “B2” of “B”" in notice["message"]
     assert ("Sensors", "4", "and 2 copies") in view["facts"]
 
 

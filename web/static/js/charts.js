@@ -1,6 +1,6 @@
 // <cycle-charts>: one cursor in all charts inside it, tied to the clock; values of both means beside each title.
 import { clock } from "./clock.js";
-import { localise, speak } from "./common/words.js";
+import { fixed, speak, translate } from "./common/words.js";
 
 const degrees = (v) => (v === null || v === undefined ? "–" : `${Math.round(v) === 0 ? 0 : String(Math.round(v)).replace("-", "−")}°`);
 
@@ -54,7 +54,7 @@ class StrideStrip extends HTMLElement {
       const stride = clock.strides[index];
       if (!mark.querySelector("title")) {
         const title = document.createElementNS("http://www.w3.org/2000/svg", "title");
-        title.textContent = speak`${stride.side} stride, ${stride.start_s.toFixed(2)} to ${stride.end_s.toFixed(2)} s`;
+        title.textContent = speak`${translate(stride.side)} stride, ${fixed(stride.start_s, 2)} to ${fixed(stride.end_s, 2)} s`;
         mark.prepend(title);
       }
       mark.addEventListener("click", () => clock.pick(stride));
@@ -75,7 +75,7 @@ class StrideStrip extends HTMLElement {
     const link = this.querySelector("[data-timeline]");
     if (link) link.hash = `t=${clock.t.toFixed(2)}`;
     const words = this.querySelector("[data-words]");
-    if (words && now >= 0) words.textContent = `${clock.stride.side === "left" ? speak`Left` : speak`Right`}, ${localise(clock.stride.start_s.toFixed(1))} s`;
+    if (words && now >= 0) words.textContent = `${clock.stride.side === "left" ? speak`Left` : speak`Right`}, ${fixed(clock.stride.start_s, 1)} s`;
   }
 }
 

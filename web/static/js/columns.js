@@ -1,7 +1,7 @@
 // <column-map>: which columns of a table are what. The server guesses and reads the beginning as said here; a person corrects and confirms.
 import { request, showProblem } from "./common/api.js";
 import { h, icon } from "./common/elements.js";
-import { localise, speak, translate } from "./common/words.js";
+import { fixed, localise, speak, translate } from "./common/words.js";
 import { letGo } from "./forms.js";
 
 const WAIT_MS = 300;
@@ -114,10 +114,10 @@ class Shape {
 
   show(checks) {
     const said = (c) => [
-      `${c.sensor}: ${c.rate_hz} Hz`,
-      c.at_rest_mps2 === null ? speak`never at rest` : speak`at rest ${c.at_rest_mps2.toFixed(2)} m/s²`,
-      c.fastest_radps === null ? "" : speak`turns up to ${(c.fastest_radps * DEG).toFixed(0)} °/s`,
-    ].filter(Boolean).map(localise).join(" · ");
+      `${c.sensor}: ${localise(String(c.rate_hz))} Hz`,
+      c.at_rest_mps2 === null ? speak`never at rest` : speak`at rest ${fixed(c.at_rest_mps2, 2)} m/s²`,
+      c.fastest_radps === null ? "" : speak`turns up to ${Math.round(c.fastest_radps * DEG)} °/s`,
+    ].filter(Boolean).join(" · ");
     this.checks.replaceChildren(...checks.map((c) => h("li", { "data-check": c.problems.length ? "warn" : "ok" },
       icon(c.problems.length ? "warn" : "check"), " ", said(c), ...c.problems.map((p) => h("p", { class: "small" }, translate(p))))));
   }

@@ -2,7 +2,7 @@
 import { request, showProblem } from "./common/api.js";
 import { s } from "./common/elements.js";
 import { letGo } from "./forms.js";
-import { SIDE_KEY, SIDE_LETTER, sideOf, speak } from "./common/words.js";
+import { SIDE_KEY, SIDE_LETTER, plural, sideOf, speak } from "./common/words.js";
 
 const PLACES = {
   pelvis: [150, 236], thigh_r: [121, 312], thigh_l: [179, 312], shank_r: [123, 412], shank_l: [177, 412],
@@ -165,7 +165,7 @@ class SensorMap extends HTMLElement {
     const lacks = worn.size ? this.lacks(worn) : "";
     const sum = this.querySelector("[data-sum]");
     const asked = this.ask && !this.ask.hidden;
-    sum.textContent = asked ? speak`First say which foot is the left one` : speak`${worn.size} of ${this.rows.length} sensors placed${lacks}`;
+    sum.textContent = asked ? speak`First say which foot is the left one` : plural(this.rows.length, speak`${worn.size} of ${this.rows.length} sensor placed${lacks}`, speak`${worn.size} of ${this.rows.length} sensors placed${lacks}`);
     const button = this.querySelector("[data-analyse]");
     if (button) button.disabled = worn.size === 0 || clashes.size > 0 || Boolean(asked);
   }

@@ -1,6 +1,6 @@
 // <gait-view> shows the 3D figure (an iframe) and sends it the time; <time-bar> plays, pauses and seeks.
 import { clock } from "./clock.js";
-import { localise, speak, translate } from "./common/words.js";
+import { fixed, localise, speak, translate } from "./common/words.js";
 
 const RATE_MS = 33; // the figure is posed at most 30 times a second (docs/data-flow.md, "The 3D figure")
 const RETRY_MS = [500, 1000, 2000, 5000];
@@ -240,8 +240,8 @@ class TimeBar extends HTMLElement {
     this.range.style.setProperty("--at", clock.duration ? clock.t / clock.duration : 0);
     this.out.textContent = localise(`${clock.t.toFixed(clock.duration < 100 ? 1 : 0)} s`);
     const p = clock.percent;
-    const where = p === null ? "" : speak`, ${Math.round(p)} percent of a ${clock.stride.side} ${clock.called}`;
-    this.range.setAttribute("aria-valuetext", speak`${clock.t.toFixed(1)} seconds${where}`);
+    const where = p === null ? "" : speak`, ${Math.round(p)} percent of a ${translate(clock.stride.side)} ${translate(clock.called)}`;
+    this.range.setAttribute("aria-valuetext", speak`${fixed(clock.t, 1)} seconds${where}`);
     if (this.button.dataset.on === String(clock.playing)) return;
     this.button.dataset.on = clock.playing;
     this.button.setAttribute("aria-label", clock.playing ? speak`Pause` : speak`Play`);

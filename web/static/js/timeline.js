@@ -13,7 +13,7 @@ import { editRows, strideBox, strideRows } from "./timeline/panel.js";
 import { Review } from "./timeline/review.js";
 import { StrideBlocks } from "./timeline/strides.js";
 import { TimeWindow } from "./timeline/window.js";
-import { speak } from "./common/words.js";
+import { plural, speak, translate } from "./common/words.js";
 
 const FIRST_SPAN_S = 6;
 const FIRST_LANES = ["foot_pitch", "foot_rate", "knee_flexion"];
@@ -241,11 +241,11 @@ class TakeTimeline extends HTMLElement {
   }
 
   leaveOut(stride, reason) {
-    return this.change({ kind: "exclude_stride", side: stride.side, time_s: middle(stride), reason }, speak`The ${stride.side} stride is left out.`);
+    return this.change({ kind: "exclude_stride", side: stride.side, time_s: middle(stride), reason }, speak`The ${translate(stride.side)} stride is left out.`);
   }
 
   count(stride) {
-    this.change({ kind: "include_stride", side: stride.side, time_s: middle(stride) }, speak`The ${stride.side} stride counts.`);
+    this.change({ kind: "include_stride", side: stride.side, time_s: middle(stride) }, speak`The ${translate(stride.side)} stride counts.`);
   }
 
   askEvent(side = clock.stride?.side ?? "left", time = clock.t) {
@@ -256,11 +256,11 @@ class TakeTimeline extends HTMLElement {
   }
 
   move(event, to) {
-    return this.change({ kind: "move_event", side: event.side, event: event.kind, time_s: event.time_s, to_s: to }, speak`${event.side} ${WORD[event.kind]} moved to ${seconds(to, 3)} s.`);
+    return this.change({ kind: "move_event", side: event.side, event: event.kind, time_s: event.time_s, to_s: to }, speak`${translate(event.side)} ${WORD[event.kind]} moved to ${seconds(to, 3)} s.`);
   }
 
   remove(event) {
-    this.change({ kind: "delete_event", side: event.side, event: event.kind, time_s: event.time_s }, speak`${event.side} ${WORD[event.kind]} deleted.`);
+    this.change({ kind: "delete_event", side: event.side, event: event.kind, time_s: event.time_s }, speak`${translate(event.side)} ${WORD[event.kind]} deleted.`);
   }
 
   // Key presses that are not a change yet are undone, and redone, as one: the event goes back where it was.
@@ -300,7 +300,7 @@ class TakeTimeline extends HTMLElement {
     await this.attempt(() => this.numbers());
     this.dataset.took = String(Math.round(performance.now() - began));
     const used = this.review.strides.filter((s) => s.used).length;
-    this.find("said").textContent = speak`${said} ${used} of ${this.review.strides.length} strides count.`;
+    this.find("said").textContent = plural(used, speak`${said} ${used} of ${this.review.strides.length} strides counts.`, speak`${said} ${used} of ${this.review.strides.length} strides count.`);
   }
 
   // The numbers are written by the server, as on the other pages. An answer to what was asked before the last change

@@ -1,6 +1,6 @@
 // <upload-area>: files, folders and zips to the session, two at a time, each with its own progress; then the inspection.
 import { request, showProblem, Problem } from "./common/api.js";
-import { localise, speak } from "./common/words.js";
+import { localise, plural, speak } from "./common/words.js";
 import { sendInParts } from "./upload-parts.js";
 
 const PARALLEL = 2;
@@ -81,9 +81,10 @@ class UploadArea extends HTMLElement {
     while (this.active < PARALLEL && this.waiting.length) this.send(this.waiting.shift());
     const total = this.querySelector("[data-total]");
     const left = this.waiting.length + this.active;
-    total.hidden = !(left || this.sent || this.failed);
+    const all = this.sent + left + this.failed;
+    total.hidden = !all;
     this.querySelector("[data-anyway]").hidden = left > 0 || !this.failed || !this.sent;
-    total.textContent = left ? speak`${this.sent} of ${this.sent + left + this.failed} files uploaded` : this.failed ? speak`${this.sent} files uploaded, ${this.failed} not` : speak`${this.sent} files uploaded`;
+    total.textContent = left ? plural(all, speak`${this.sent} of ${all} file uploaded`, speak`${this.sent} of ${all} files uploaded`) : this.failed ? plural(this.sent, speak`${this.sent} file uploaded, ${this.failed} not`, speak`${this.sent} files uploaded, ${this.failed} not`) : plural(this.sent, speak`${this.sent} file uploaded`, speak`${this.sent} files uploaded`);
     if (!left && this.sent && !this.failed) this.inspect(true);
   }
 

@@ -1,7 +1,7 @@
 // <take-video>: a film of the walk in step with curves and figure. Aligned by one moment that both show.
 import { request, showProblem } from "./common/api.js";
 import { clock } from "./clock.js";
-import { speak } from "./common/words.js";
+import { fixed, speak, translate } from "./common/words.js";
 
 const FRAME_S = 1 / 30;
 const APART_S = { playing: 0.08, still: 0.01 }; // a playing film is put right only when it is seen to be off
@@ -69,7 +69,7 @@ class TakeVideo extends HTMLElement {
   follow() {
     if (this.aligning) {
       const s = clock.stride, button = this.querySelector("[data-same]");
-      if (button && s) button.textContent = speak`Same moment as the ${s.side} contact at ${s.start_s.toFixed(2)} s`;
+      if (button && s) button.textContent = speak`Same moment as the ${translate(s.side)} contact at ${fixed(s.start_s, 2)} s`;
       return;
     }
     const want = clock.t + this.offset, inside = want >= 0 && want <= this.length();

@@ -1,6 +1,6 @@
 // The tablet's camera beside the take: asked for, shown, recorded. Nothing of it may disturb the take, so whatever
 // fails is said in the camera's own card.
-import { formatClock, speak } from "../common/words.js";
+import { fixed, formatClock, speak } from "../common/words.js";
 import { FilmOutbox } from "./film.js";
 
 const PIECE_MS = 1000;
@@ -174,7 +174,7 @@ export class Camera {
 
   onTheWay() {
     const { held, left } = this.outbox ?? {};
-    if (held) return speak`${(held / 1e6).toFixed(1)} MB of the film are on their way. Leave this page open.`;
+    if (held) return speak`${fixed(held / 1e6, 1)} MB of the film are on their way. Leave this page open.`;
     if (!left) return null;
     return this.state === "running" ? speak`Filming has ended. What was filmed is kept with the take.` : speak`The film is being set beside the take.`;
   }

@@ -1,7 +1,7 @@
 // The tablet's socket (docs/live-protocol.md): says hello, sends what the outbox holds from where the server stands,
 // lets go of what is acknowledged, and connects again with growing pauses until the take is finished.
 import { PROTOCOL } from "../common/wire.js";
-import { speak } from "../common/words.js";
+import { fixed, plural, speak } from "../common/words.js";
 
 const PAUSES_S = [0.25, 0.5, 1, 2, 4, 8];
 const SILENCE_MS = 4000; // a network that is gone is noticed by missing acknowledgements, long before the browser says so
@@ -117,7 +117,7 @@ export class Link {
   }
 
   lose(next) {
-    this.problem = { code: "lost", detail: speak`It had acknowledged ${this.outbox.acked} batches and holds ${next}.` };
+    this.problem = { code: "lost", detail: plural(this.outbox.acked, speak`It had acknowledged 1 batch and holds ${next}.`, speak`It had acknowledged ${this.outbox.acked} batches and holds ${next}.`) };
     this.end("refused");
   }
 
@@ -188,7 +188,7 @@ export class Link {
   words() {
     const held = this.outbox.heldS;
     const away = this.offlineSince === null ? 0 : (performance.now() - this.offlineSince) / 1000;
-    const seconds = `${held < 10 ? held.toFixed(1) : Math.round(held)} s`;
+    const seconds = `${held < 10 ? fixed(held, 1) : Math.round(held)} s`;
     if (this.state === "finished") return { kind: "ok", text: speak`On the server` };
     if (this.state === "refused") return { kind: "bad", text: speak`Not connected` };
     if (away > 10) return { kind: "bad", text: speak`No connection, ${seconds} kept here` };

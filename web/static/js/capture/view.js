@@ -4,7 +4,7 @@ import { POSES } from "./sources/axes.js";
 import { SensorList } from "./sensors.js";
 import { STAND_S } from "../common/standing.js";
 import { h } from "../common/elements.js";
-import { capitalise, formatClock, lowered, speak } from "../common/words.js";
+import { capitalise, formatClock, lowered, plural, speak } from "../common/words.js";
 import * as words from "./words.js";
 
 const VERDICTS = { pass: "ok", redo: "bad", not_judged: "" }; // the look of a note
@@ -77,7 +77,7 @@ export class View {
     set(this.part("add-word"), ADD[kind] ?? "");
     const worn = rows.filter(({ sensor }) => sensor.segment).length;
     const n = source?.copies?.length ?? 0;
-    const copies = n === 1 ? speak`, 1 copy left out` : n ? speak`, ${n} copies left out` : "";
+    const copies = n ? plural(n, speak`, 1 copy left out`, speak`, ${n} copies left out`) : "";
     const counted = speak`${ready.length} of ${rows.length} ready${copies}`;
     const recorded = paused ? speak`${rows.length} of ${wanted(record)} connected` : speak`${worn} recorded`;
     set(this.part("sum"), !source ? speak`Where do they come from?` : prepare ? counted : recorded);
@@ -157,7 +157,7 @@ export class View {
     const go = this.part("go");
     const n = ready.length;
     const missing = !source ? speak`Choose where sensors come from` : rows.length ? this.reason(source) : speak`Add a sensor`;
-    const start = n === 1 ? speak`Start with 1 sensor` : n ? speak`Start with ${n} sensors` : missing;
+    const start = n ? plural(n, speak`Start with 1 sensor`, speak`Start with ${n} sensors`) : missing;
     const word = {
       loading: speak`One moment`, stuck: speak`Save or delete what is left`, pairing: speak`Enter the code`, prepare: start,
       sending: speak`Sending`, done: speak`Start another`, running: paused ? speak`Connect the sensors again` : speak`Stop`,

@@ -1,6 +1,6 @@
 // What the page says: what to do now, and one sentence for what is wrong.
 import { STAND_S } from "../common/standing.js";
-import { speak, translate } from "../common/words.js";
+import { fixed, plural, speak, translate } from "../common/words.js";
 
 // By the stage the server is at (its "state" messages); before the first one, by the time since the start.
 // toDo: what the person of a guided test does now, in the server's words.
@@ -25,7 +25,7 @@ export const RELOADED = {
 };
 
 export function sendingRest(heldS) {
-  const left = speak`${heldS.toFixed(1)} s are still on this tablet. Keep this page open.`;
+  const left = speak`${fixed(heldS, 1)} s are still on this tablet. Keep this page open.`;
   return { icon: "upload", title: speak`Sending the rest`, more: heldS > 0.05 ? left : speak`The server closes the recording.` };
 }
 
@@ -56,11 +56,11 @@ export const OTHER_TAKE = {
 
 export const NOT_THOSE = speak`These are not the sensors this recording began with. Connect the same ones, or stop here.`;
 
-export const loss = (heldS) => speak`${heldS.toFixed(1)} s of the recording are not on the server and cannot be brought back.`;
+export const loss = (heldS) => speak`${fixed(heldS, 1)} s of the recording are not on the server and cannot be brought back.`;
 
 // Why the socket ended for good.
 export function linkProblem({ code, detail }, heldS) {
-  const left = heldS > 0.05 ? speak` ${heldS.toFixed(1)} s are still on this tablet only.` : "";
+  const left = heldS > 0.05 ? speak` ${fixed(heldS, 1)} s are still on this tablet only.` : "";
   const save = speak`Save what is left here and tell the person who runs the server.`;
   switch (code) {
     case "token": {
@@ -80,7 +80,7 @@ export function linkProblem({ code, detail }, heldS) {
 }
 
 export const serverFull = (detail) => ({
-  title: speak`The server cannot take data now`, detail: speak`${detail} It is kept here and sent later.`,
+  title: speak`The server cannot take data now`, detail: speak`${translate(detail)} It is kept here and sent later.`,
 });
 
 export function storageProblem(error) {
@@ -117,4 +117,4 @@ export function hours(value) {
 }
 
 /** @param {number} n */
-export const asBefore = (n) => n === 1 ? speak`As last time: 1 sensor` : speak`As last time: ${n} sensors`;
+export const asBefore = (n) => plural(n, speak`As last time: 1 sensor`, speak`As last time: ${n} sensors`);

@@ -7,13 +7,28 @@ const address = document.documentElement.dataset.texts;
 /** @type {Record<string, string>} */
 const CATALOGUE = address ? await fetch(address).then((answer) => answer.json(), () => ({})) : {};
 
+const OWN_WORDS = /^(kind|label|protocol)\d*$/; // as web/language.py tells what people typed or uploaded
+const IDENTIFIERS = /^(device|device_id|duplicate_of|file|file_name|column)\d*$/;
+const QUOTED = /“([^“”]*)”/gu;
+const OWN_QUOTATIONS = new Set(Object.keys(CATALOGUE).flatMap((message) => [...message.matchAll(QUOTED)].map(([, quoted]) => quoted)));
+const FIRST_MASK = 0xe000;
+
+/**
+ * Placeholders of a message that hold user text: those in quotation marks, and identifiers.
+ * @param {string[]} pieces literals and names in turn
+ */
+function typedOf(pieces) {
+  const isTyped = (name, i) => IDENTIFIERS.test(name) || (!OWN_WORDS.test(name) && /['“]$/.test(pieces[i - 1]) && /^['”]/.test(pieces[i + 1]));
+  return new Set(pieces.filter((piece, i) => i % 2 && isTyped(piece, i)));
+}
+
 const PLACEHOLDER = /\{(\w*)\}/;
 const PATTERNS = Object.entries(CATALOGUE).filter(([message]) => PLACEHOLDER.test(message)).map(([message, said]) => {
   const pieces = message.split(PLACEHOLDER);
   const literals = pieces.filter((_, i) => i % 2 === 0);
   const escaped = literals.map((piece) => piece.replace(/[\\^$.*+?()[\]{}|]/g, "\\$&"));
   return {
-    said, names: pieces.filter((_, i) => i % 2), form: new RegExp(`^${escaped.join("(.+?)")}$`, "s"),
+    said, names: pieces.filter((_, i) => i % 2), typed: typedOf(pieces), form: new RegExp(`^${escaped.join("(.+?)")}$`, "s"),
     words: literals.reduce((sum, piece) => sum + piece.trim().length, 0),
   };
 }).sort((a, b) => b.words - a.words); // of two that fit, the one with more words of its own
@@ -33,7 +48,14 @@ const fill = (said, values) => said.replace(/\{(\w*)\}/g, (whole, name) => value
 export const localise = (value) => (MARK === "." ? value : value.replace(/(?<![\w.,])(\d+)\.(\d+)(?![\d.])/g, `$1${MARK}$2`));
 
 /**
- * What the server or a person said, in the language of the page: a message of the catalogue, or a sentence that was
+ * A number with so many decimals and the decimal mark of the language.
+ * @param {number} value
+ * @param {number} digits
+ */
+export const fixed = (value, digits) => localise(value.toFixed(digits));
+
+/**
+ * What the server said, in the language of the page: a message of the catalogue, or a sentence that was
  * made from one; all else stays as it is, numbers apart.
  * @param {string} value
  * @returns {string}
@@ -43,9 +65,23 @@ export function translate(value) {
   const before = SAID.get(value);
   if (before !== undefined) return before;
   if (SAID.size >= MOST_SAID) SAID.clear();
-  const found = find(value);
+  const found = findAround(value);
   SAID.set(value, found);
   return found;
+}
+
+/**
+ * A sentence whose quotations stay as they are.
+ * @param {string} value
+ */
+function findAround(value) {
+  const kept = [];
+  const masked = value.replace(QUOTED, (whole, quoted) => (OWN_QUOTATIONS.has(quoted) ? whole : `“${String.fromCharCode(FIRST_MASK + kept.push(quoted) - 1)}”`));
+  const [open, close] = LANGUAGE === "de" ? "„“" : "“”";
+  return kept.reduce((said, quoted, i) => {
+    const mask = String.fromCharCode(FIRST_MASK + i);
+    return said.replaceAll(`“${mask}”`, `${open}${mask}${close}`).replaceAll(mask, () => quoted);
+  }, find(masked));
 }
 
 const SAID = new Map(); // live pages say the same many times a second
@@ -61,9 +97,10 @@ function find(value) {
   }
   const known = CATALOGUE[inner] ?? recase(inner, FOLDED.get(inner.toLowerCase()));
   if (known !== undefined) return value.replace(inner, () => known);
-  for (const { said, names, form } of PATTERNS) {
+  for (const { said, names, typed, form } of PATTERNS) {
     const found = form.exec(inner);
-    if (found) return value.replace(inner, () => fill(said, Object.fromEntries(names.map((name, i) => [name, translate(found[i + 1])]))));
+    const say = (name, i) => (typed.has(name) ? found[i + 1] : translate(found[i + 1]));
+    if (found) return value.replace(inner, () => fill(said, Object.fromEntries(names.map((name, i) => [name, say(name, i)]))));
   }
   const [, said, source] = SOURCED.exec(inner) ?? [];
   if (said && CATALOGUE[said]) return value.replace(inner, () => CATALOGUE[said] + source);
@@ -75,18 +112,29 @@ function find(value) {
 const recase = (value, said) => (said && /^\p{Lu}/u.test(value) ? said[0].toUpperCase() + said.slice(1) : said);
 
 /**
- * The tag of every text for people: speak`Sensor ${n} is ready`. Values that are words are translated too.
+ * The tag of every text for people: speak`Sensor ${n} is ready`. Numbers are localised; strings are in the language of the page
+ * already, or were typed or uploaded by people, and stay as they are: what the server sent goes through `translate` before.
  * @param {TemplateStringsArray} strings
  * @param {...any} values
  * @returns {string}
  */
 export function speak(strings, ...values) {
-  const shown = values.map((value) => (address ? translate(String(value)) : String(value)));
+  const shown = values.map((value) => (typeof value === "number" ? localise(String(value)) : String(value)));
   if (!address) return strings.reduce((said, piece, i) => said + shown[i - 1] + piece);
   const message = strings.reduce((said, piece, i) => `${said}{${i - 1}}${piece}`);
   const inner = message.trim();
   return message.replace(inner, () => fill(CATALOGUE[inner] ?? inner, Object.fromEntries(shown.map((value, i) => [String(i), value]))));
 }
+
+const RULES = new Intl.PluralRules(LANGUAGE);
+
+/**
+ * The wording of one thing, or of any other number of them.
+ * @param {number} count
+ * @param {string} one
+ * @param {string} many
+ */
+export const plural = (count, one, many) => (RULES.select(count) === "one" ? one : many);
 
 /**
  * The name of a value inside a sentence: small in English, as it is where nouns are written with a capital.

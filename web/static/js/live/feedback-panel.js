@@ -1,7 +1,7 @@
 // <live-feedback>: level, schedule, next probe, with against without feedback, side effects; all in words.
 import { setState } from "./shapes.js";
 import { number, say, withUnit } from "./words.js";
-import { speak } from "../common/words.js";
+import { plural, speak } from "../common/words.js";
 
 const STOPS = { max_strides: speak`The number of strides is reached.`, max_minutes: speak`The time is over.`, gps_rise: speak`The walk as a whole changed too much.` };
 const NOT_JUDGED = { too_few_strides: speak`too few strides yet`, joint_missing: speak`not measured`, both_sides_trained: speak`both are trained`, no_limit: speak`no limit known` };
@@ -45,9 +45,9 @@ class LiveFeedback extends HTMLElement {
   }
 
   probe(state) {
-    if (state.block_left) return speak`now, ${state.block_left} strides left`;
+    if (state.block_left) return plural(state.block_left, speak`now, 1 stride left`, speak`now, ${state.block_left} strides left`);
     if (state.next_probe === null || state.next_probe === undefined) return speak`none`;
-    return state.next_probe === 1 ? speak`in 1 stride` : speak`in ${state.next_probe} strides`;
+    return plural(state.next_probe, speak`in 1 stride`, speak`in ${state.next_probe} strides`);
   }
 
   summary(s) {

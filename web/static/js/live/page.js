@@ -15,7 +15,7 @@ import { Top } from "./top.js";
 import { After } from "./after.js";
 import { Notes } from "./notes.js";
 import { inOrder } from "./sensors.js";
-import { formatClock, speak } from "../common/words.js";
+import { formatClock, plural, speak } from "../common/words.js";
 import { number, say } from "./words.js";
 
 const data = JSON.parse(document.getElementById("live-data").textContent);
@@ -245,7 +245,7 @@ class LivePage extends HTMLElement {
   speak() {
     if (this.dataset.view !== "run") return;
     const { delay } = this.feed;
-    const words = [this.stopping ? speak`Stopping, saving` : this.feed.fresh === false ? speak`Paused, no new data` : "", this.querySelector("[data-in-zone]").textContent, delay === undefined || delay === null ? "" : speak`delay ${Math.round(delay)} milliseconds`];
+    const words = [this.stopping ? speak`Stopping, saving` : this.feed.fresh === false ? speak`Paused, no new data` : "", this.querySelector("[data-in-zone]").textContent, delay === undefined || delay === null ? "" : plural(Math.round(delay), speak`delay 1 millisecond`, speak`delay ${Math.round(delay)} milliseconds`)];
     say(this.querySelector("[data-spoken]"), words.filter(Boolean).join(", "));
   }
 }

@@ -31,7 +31,7 @@ export function rowsOf(feed, parameter, prescription) {
 
 export function fill(body, rows, term) {
   body.replaceChildren(...[...rows].reverse().map((r, i) => {
-    const told = !r.cue ? "–" : r.cue.shown ? speak`yes` : speak`no, ${WHY[r.cue.why_not] ?? "not shown"}`;
+    const told = !r.cue ? "–" : r.cue.shown ? speak`yes` : speak`no, ${WHY[r.cue.why_not] ?? speak`not shown`}`;
     return h(
       "tr",
       {},

@@ -1,6 +1,6 @@
 // The two questions of the timeline: why a stride is left out, and which event is added where.
 import { seconds } from "./words.js";
-import { speak } from "../common/words.js";
+import { speak, translate } from "../common/words.js";
 
 // What strides are left out for, as the question offers it.
 export const reasons = () => [...document.querySelectorAll("#why option")].map((o) => o.value).filter(Boolean);
@@ -9,7 +9,7 @@ export function askReason(stride, answer) {
   const dialog = document.getElementById("leave-out");
   const form = dialog.querySelector("form");
   const { why, words } = form.elements;
-  dialog.querySelector("[data-which]").textContent = speak`The ${stride.side} stride from ${seconds(stride.start_s)} to ${seconds(stride.end_s)} s no longer counts in any number. Undo brings it back.`;
+  dialog.querySelector("[data-which]").textContent = speak`The ${translate(stride.side)} stride from ${seconds(stride.start_s)} to ${seconds(stride.end_s)} s no longer counts in any number. Undo brings it back.`;
   form.reset();
   words.oninput = () => words.value && (why.value = "");
   form.onsubmit = (e) => {

@@ -1,12 +1,12 @@
 // What stands beside and below the drawing: the picked stride, the changes, and the table of strides in view.
 import { chip, h, icon } from "../common/elements.js";
 import { reasons } from "./dialogs.js";
-import { WORD, seconds } from "./words.js";
-import { localise, lowered, speak } from "../common/words.js";
+import { WORD, seconds, whyOut } from "./words.js";
+import { fixed, lowered, speak, translate } from "../common/words.js";
 
 const LISTED = 40;
 
-const stance = (s) => (s.tc_s === null ? "–" : localise(((100 * (s.tc_s - s.start_s)) / (s.end_s - s.start_s)).toFixed(1)));
+const stance = (s) => (s.tc_s === null ? "–" : fixed((100 * (s.tc_s - s.start_s)) / (s.end_s - s.start_s), 1));
 
 // The picked stride with its three events as fields, and whether it counts.
 export function strideBox(stride, { editable, review, onMove, onDelete, onLeaveOut, onCount }) {
@@ -18,16 +18,16 @@ export function strideBox(stride, { editable, review, onMove, onDelete, onLeaveO
   ].map(([kind, label, time]) => eventRow(stride, kind, label, time, { editable, review, onMove, onDelete }));
   const facts = h("p", { class: "small mut num" }, speak`${seconds(stride.end_s - stride.start_s)} s, stance ${stance(stride)} %`);
   const said = stride.used
-    ? stride.flags.length ? speak`Counts, although a rule says: ${stride.flags.join(", ").replaceAll("_", " ")}.` : ""
-    : stride.excluded_by === "person" ? speak`Left out by hand: ${stride.excluded}.` : speak`Left out by rule: ${stride.excluded}.`;
+    ? stride.flags.length ? speak`Counts, although a rule says: ${stride.flags.map((flag) => translate(flag.replaceAll("_", " "))).join(", ")}.` : ""
+    : stride.excluded_by === "person" ? speak`Left out by hand: ${stride.excluded}.` : speak`Left out by rule: ${whyOut(stride)}.`;
   const act = stride.used
-    ? whyOut((reason) => onLeaveOut(stride, reason))
+    ? askWhyOut((reason) => onLeaveOut(stride, reason))
     : h("button", { class: "btn", type: "button", "data-count": true, onclick: () => onCount(stride) }, speak`Count it`);
   return [facts, said ? h("p", { class: "small" }, said) : null, h("div", { class: "tl-fields" }, ...rows.flat()), editable ? act : null].filter(Boolean);
 }
 
 // One tap says why and leaves the stride out; words of one's own are asked for.
-function whyOut(answer) {
+function askWhyOut(answer) {
   const button = (words, reason, marks = {}) => h("button", { class: "btn", type: "button", ...marks, onclick: () => answer(reason) }, words);
   return h("fieldset", { class: "tl-why" }, h("legend", { class: "small mut" }, speak`Leave it out, because`), ...reasons().map((reason) => button(reason, reason, { "data-why": reason })), button(speak`Other…`, "", { "data-out": true }));
 }
@@ -61,8 +61,8 @@ export function strideRows(review, win, picked, onPick) {
       ...[s.start_s, s.tc_s, s.end_s].map((t) => h("td", { class: "n" }, t === null ? "–" : seconds(t))),
       h("td", { class: "n" }, seconds(s.end_s - s.start_s)),
       h("td", { class: "n" }, stance(s)),
-      h("td", {}, s.used ? speak`yes` : h("span", { class: "mut" }, speak`no: ${s.excluded}`)),
-      h("td", { class: "n" }, h("button", { class: "btn sm", type: "button", "aria-label": speak`Open ${s.side} stride at ${seconds(s.start_s)} s`, onclick: () => onPick(i) }, speak`Open`)),
+      h("td", {}, s.used ? speak`yes` : h("span", { class: "mut" }, speak`no: ${whyOut(s)}`)),
+      h("td", { class: "n" }, h("button", { class: "btn sm", type: "button", "aria-label": speak`Open ${translate(s.side)} stride at ${seconds(s.start_s)} s`, onclick: () => onPick(i) }, speak`Open`)),
     ),
   );
   return { words, rows };

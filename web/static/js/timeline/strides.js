@@ -1,5 +1,6 @@
 // Strides as blocks over time: stance full, swing pale, left out crossed. Drawn once, moved by the viewBox.
-import { SIDE_KEY, speak } from "../common/words.js";
+import { SIDE_KEY, fixed, speak, translate } from "../common/words.js";
+import { whyOut } from "./words.js";
 import { s } from "../common/elements.js";
 
 const MS = 1000; // the x axis of the drawing is in milliseconds, so that rounding is never seen
@@ -41,11 +42,11 @@ function block(stride, index, top, height) {
   const [y, tall] = [top + height * 0.08, height * 0.84];
   const [start, end] = [stride.start_s * MS, stride.end_s * MS];
   const off = stride.tc_s === null ? end : stride.tc_s * MS;
-  const why = stride.used ? "" : speak`, left out: ${stride.excluded}`;
+  const why = stride.used ? "" : speak`, left out: ${whyOut(stride)}`;
   return s(
     "g",
     { "data-stride": index },
-    s("title", {}, speak`${stride.side} stride, ${stride.start_s.toFixed(2)} to ${stride.end_s.toFixed(2)} s${why}`),
+    s("title", {}, speak`${translate(stride.side)} stride, ${fixed(stride.start_s, 2)} to ${fixed(stride.end_s, 2)} s${why}`),
     s("rect", { class: `st${k}${faded}`, x: start, width: Math.max(off - start, 0), y, height: tall }),
     s("rect", { class: `sw${k}${faded}`, x: off, width: Math.max(end - off, 0), y, height: tall }),
     stride.used ? null : s("path", { class: "xx", d: `M${start} ${y + tall * 0.1}L${end} ${y + tall * 0.9}M${start} ${y + tall * 0.9}L${end} ${y + tall * 0.1}` }),

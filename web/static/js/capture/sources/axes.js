@@ -1,7 +1,7 @@
 // Which way this device's sensors point, found by turning it: lying, on its left edge, upright, lying again.
 // Browsers disagree: on the sign of acceleration, on which axis alpha, beta and gamma turn about, on degrees. Gravity
 // decides: between two poses the turned-along gravity g' = g − (ω × g) dt must arrive where it is measured.
-import { speak } from "../../common/words.js";
+import { fixed, speak } from "../../common/words.js";
 export const POSES = [
   { name: "flat", axis: 2, words: speak`Lay the device flat, screen up` },
   { name: "side", axis: 0, words: speak`Stand it on its left long edge` },
@@ -55,7 +55,7 @@ export class AxesTest {
     const middle = mean(late, "acc"), norm = length(middle);
     if (late.some((row) => length(row.acc.map((v, i) => v - middle[i])) > STILL_SPREAD)) return false;
     if (Math.abs(norm - GRAVITY) > OFF) {
-      return this.fail(speak`Lying still it measures ${norm.toFixed(1)} m/s², not 9.8; its acceleration has no gravity in it.`);
+      return this.fail(speak`Lying still it measures ${fixed(norm, 1)} m/s², not 9.8; its acceleration has no gravity in it.`);
     }
     if (Math.abs(middle[this.pose.axis]) < ALONG * norm) return false;
     this.still.push({ from, to: this.rows.length - 1, acc: middle, rate: mean(late, "rate") });
@@ -78,7 +78,7 @@ export class AxesTest {
     found.sort((a, b) => a.error - b.error);
     const [best, next] = found;
     if (best.error > FITS_DEG || next.error < OTHERS_DEG) {
-      const off = best.error <= 180 ? ` (${best.error.toFixed(0)}° off)` : "";
+      const off = best.error <= 180 ? speak` (${Math.round(best.error)}° off)` : "";
       return this.fail(speak`The turns do not fit gravity${off}. Turn the device straight from one way to the next, without haste.`);
     }
     this.result = { accSign: signs[0], order: best.order, signs: best.signs, scale: best.scale, errorDeg: best.error };

@@ -36,7 +36,7 @@ export function parseMtText(text, name) {
   if (!lines.length) throw new Error(speak`${name} has a header but no samples. Record or export it again.`);
   const columns = columnsOf(names, lines[0], separator, name);
   if (columns[0][0] === undefined) {
-    const what = names.includes("FreeAcc_X") ? speak`acceleration with gravity` : "acceleration";
+    const what = names.includes("FreeAcc_X") ? speak`acceleration with gravity` : speak`acceleration`;
     throw new Error(speak`${name} has no ${what} (Acc_X, Acc_Y, Acc_Z). Export it again with it.`);
   }
   if (columns[1][0] === undefined) throw new Error(speak`${name} has no rate of turn (Gyr_X, Gyr_Y, Gyr_Z). Export it again with it.`);

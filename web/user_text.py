@@ -1,0 +1,87 @@
+"""Text that a person entered or uploaded, as a type: pages show it unchanged in every language."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from markupsafe import Markup, escape
+
+
+class UserText(str):
+    """Text that a person entered or uploaded; it is never translated and its numbers are never localised.
+
+    Parts of it, changes of case and sums with other texts are user text too. An f-string, `format` and
+    `str.join` return a plain `str`: inside a sentence the text is put in quotation marks by `quote`, or given
+    to a message as a value.
+
+    >>> [type(text).__name__ for text in (UserText("Left knee")[:4], "Of " + UserText("Left"))]
+    ['UserText', 'UserText']
+    """
+
+    __slots__ = ()
+
+    def __html__(self) -> Markup:
+        """Escape the text; templates that join it with their own words leave the result as it is."""
+        return escape(str(self))
+
+    def __radd__(self, before: str) -> UserText:
+        """Return user text after another text."""
+        return UserText(before + str(self))
+
+
+def _keep_type(name: str) -> Callable[..., Any]:
+    method = getattr(str, name)
+
+    def keeping(self: UserText, *args: Any, **options: Any) -> Any:
+        return mark_user_text(method(self, *args, **options))
+
+    keeping.__name__ = name
+    keeping.__doc__ = method.__doc__
+    return keeping
+
+
+_KEEPING: Final = (
+    "__add__", "__getitem__", "__mul__", "__rmul__", "capitalize", "casefold", "expandtabs", "lower",
+    "lstrip", "partition", "removeprefix", "removesuffix", "replace", "rpartition", "rsplit", "rstrip",
+    "split", "splitlines", "strip", "title", "upper",
+)  # fmt: skip
+for _name in _KEEPING:
+    setattr(UserText, _name, _keep_type(_name))
+
+
+def mark_user_text(value: Any) -> Any:
+    """Mark every text of a value as user text, in lists and in mappings, whose keys are marked too.
+
+    >>> type(mark_user_text({"sensors": ["Left foot"]})["sensors"][0]).__name__
+    'UserText'
+    """
+    if isinstance(value, str):
+        return UserText(value)
+    if isinstance(value, list | tuple):
+        return type(value)(map(mark_user_text, value))
+    if isinstance(value, Mapping):
+        return {mark_user_text(key): mark_user_text(inner) for key, inner in value.items()}
+    return value
+
+
+def encode_user_text(value: object) -> str:
+    """Return user text as a plain string: the `enc_hook` of msgspec, which writes exact types only.
+
+    Raises
+    ------
+    NotImplementedError
+        The value is of another type that msgspec does not know.
+    """
+    if isinstance(value, UserText):
+        return str(value)
+    raise NotImplementedError(f"Objects of type {type(value).__name__} cannot be encoded.")
+
+
+def quote(text: str) -> str:
+    """Return user text in quotation marks, which no language looks into, for a sentence; else the text.
+
+    >>> quote(UserText("Pain, left knee")), quote("too short")
+    ('“Pain, left knee”', 'too short')
+    """
+    return f"“{text}”" if isinstance(text, UserText) else text
