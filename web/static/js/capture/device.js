@@ -26,7 +26,9 @@ export async function stayAwake(on) {
 
 let audio = null;
 
+// Browsers allow no sound before the first tap: the words say the same.
 export function tone(hz = 880, seconds = 0.18) {
+  if (navigator.userActivation?.hasBeenActive === false) return;
   try {
     audio ??= new AudioContext();
   } catch {
