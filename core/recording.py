@@ -149,7 +149,7 @@ class ImuStream(HoldsSamples):
     def __post_init__(self) -> None:
         n = len(self.t_s)
         if n == 0:
-            raise SignalError("empty", f"{self.source}: no samples.", sensor=self.device_id)
+            raise SignalError("empty", f"“{self.source}”: no samples.", sensor=self.device_id)
         for name, a, shape in (
             ("t_s", self.t_s, (n,)),
             ("acc", self.held("acc"), (n, 3)),
@@ -160,7 +160,7 @@ class ImuStream(HoldsSamples):
             _frozen(a, name, shape, self.source)
         if np.any(self.t_s[1:] <= self.t_s[:-1]):
             raise SignalError(
-                "time_not_increasing", f"{self.source}: time does not increase.", sensor=self.device_id
+                "time_not_increasing", f"“{self.source}”: time does not increase.", sensor=self.device_id
             )
 
 

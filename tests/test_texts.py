@@ -314,6 +314,10 @@ def test_what_a_sentence_quotes_stays_as_it_is(typed: str) -> None:
     assert stride == f"Doppelschritt links, 1,50 bis 2,25 s, ausgelassen: „{typed}“"
     figure = f"<title>left stride, 1.50 to 2.25 s, left out: {quote(UserText(typed))}</title>"
     assert Shown(DE).say_figure(figure) == f"<title>{stride}</title>"
+    nested = f"say “{typed}” twice"
+    assert DE.translate(f"left stride, 1.50 to 2.25 s, left out: “{nested}”").endswith(f"„{nested}“")
+    missing = DE.translate(f"No trial “{typed}”, “{typed}” among the session's files.")
+    assert missing == f"Unter den Dateien der Sitzung fehlt die Aufnahme „{typed}“, „{typed}“."
     low = f"Sensor {typed} has no sample with both acceleration and angular rate; export it again."
     assert f"Sensor {typed} " in DE.translate(low)
 

@@ -30,12 +30,12 @@ MONTHS: Final = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", 
 
 PLACEHOLDER: Final = re.compile(r"\{(\w*)\}")
 
-QUOTED: Final = re.compile(r"“([^“”]*)”")
+QUOTED: Final = re.compile(r"“((?:[^“”]|“[^“”]*”)*)”")
 """A quotation: nothing in it is translated, unless a message itself has these words in quotation marks."""
 
 QUOTATION_MARKS: Final[Mapping[str, str]] = {"de": "„{}“"}
 
-IDENTIFIERS: Final = re.compile(r"(device|device_id|duplicate_of|file|file_name|column)\d*")
+IDENTIFIERS: Final = re.compile(r"(by|column|device|device_id|duplicate_of|file|file_name|ids)\d*")
 """Placeholders of messages that hold what a person typed or uploaded, quoted or not."""
 
 OWN_WORDS: Final = frozenset({"kind", "label", "protocol"})
@@ -136,6 +136,8 @@ class Catalogue:
 
     def _unmask(self, said: str, quotations: Sequence[str]) -> str:
         marks = QUOTATION_MARKS.get(self.language, "“{}”")
+        opening, closing = marks.split("{}")
+        said = said.replace("”, “", f"{closing}, {opening}")  # a list of them in one placeholder
         for i, quoted in enumerate(quotations):
             mask = chr(FIRST_MASK + i)
             said = said.replace(f"“{mask}”", marks.format(mask)).replace(mask, quoted)

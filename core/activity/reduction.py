@@ -143,7 +143,7 @@ def _lay_pieces(stream: LongStream, rate: int) -> Iterator[_Window]:
         if float(block.t_s[-1]) > LONGEST_S:
             raise SignalError(
                 "clock_jump",
-                f"The clock of {stream.source} runs over {block.t_s[-1] / 86400:.0f} days; at most "
+                f"The clock of “{stream.source}” runs over {block.t_s[-1] / 86400:.0f} days; at most "
                 f"{LONGEST_S / 86400:.0f} are read. Export the recording again.",
                 sensor=stream.device_id,
             )
@@ -159,7 +159,7 @@ def _lay_pieces(stream: LongStream, rate: int) -> Iterator[_Window]:
     if not seen:
         raise SignalError(
             "bad_signal",
-            f"{stream.source} has no complete sample; export it again.",
+            f"“{stream.source}” has no complete sample; export it again.",
             sensor=stream.device_id,
         )
     until = floor(last_s * rate + 0.01) + 1

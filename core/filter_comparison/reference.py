@@ -201,7 +201,7 @@ def find_lag(
 def _too_short(source: str) -> FormatError:
     return FormatError(
         "no_overlap",
-        f"{source} and the take have less than {LEAST_OVERLAP_S:g} s in common; give the whole of it.",
+        f"“{source}” and the take have less than {LEAST_OVERLAP_S:g} s in common; give the whole of it.",
     )
 
 

@@ -311,11 +311,15 @@ def _copies(recording: Recording) -> list[Notice]:
         if len(group) < 2:
             continue
         used = [d for d in group if d in worn]
-        which = f"only {used[0]} is analysed" if used else "none of them is analysed"
+        device = used[0] if used else None
+        ids = "”, “".join(group)
         found.append(
             Notice(
                 "duplicate_stream",
-                f"Sensors {' and '.join(group)} hold identical samples (a copy under another id); {which}.",
+                f"Sensors “{ids}” hold identical samples (a copy under another id); none of them is analysed."
+                if device is None
+                else f"Sensors “{ids}” hold identical samples (a copy under another id); only “{device}” is "
+                "analysed.",
                 used[0] if used else group[0],
                 severity="info",
             )

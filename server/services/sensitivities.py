@@ -69,7 +69,7 @@ def read_reference(content: bytes, name: str, *, from_standing: bool) -> Referen
         angles = read_angles(content)
     except (KeyError, ValueError, OSError) as error:
         raise InputError(
-            "reference_unreadable", f"{name} is not the angles.parquet of an analysis or a simulation."
+            "reference_unreadable", f"“{name}” is not the angles.parquet of an analysis or a simulation."
         ) from error
     offset: Mapping[str, float] = {} if from_standing else angles.zero_offset
     known = {n: values + offset.get(n, 0.0) for n, values in angles.angles.items()}

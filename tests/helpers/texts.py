@@ -157,7 +157,7 @@ NOT_WORDS: Final = re.compile(
 )
 """Strings that read like words and are none: classes of CSS, names of types."""
 
-SENTENCE: Final = re.compile(r"(?=(\S+ ){3})[A-Z{].*\.$", re.DOTALL)
+SENTENCE: Final = re.compile(r"(?=(\S+ ){3})[A-Z{“].*\.$", re.DOTALL)
 
 UNMEASURED: Final = "not measured: "
 """How a reason begins; in lists it stands without."""

@@ -8,8 +8,8 @@ const address = document.documentElement.dataset.texts;
 const CATALOGUE = address ? await fetch(address).then((answer) => answer.json(), () => ({})) : {};
 
 const OWN_WORDS = /^(kind|label|protocol)\d*$/; // as web/language.py tells what people typed or uploaded
-const IDENTIFIERS = /^(device|device_id|duplicate_of|file|file_name|column)\d*$/;
-const QUOTED = /“([^“”]*)”/gu;
+const IDENTIFIERS = /^(by|column|device|device_id|duplicate_of|file|file_name|ids)\d*$/;
+const QUOTED = /“((?:[^“”]|“[^“”]*”)*)”/gu;
 const OWN_QUOTATIONS = new Set(Object.keys(CATALOGUE).flatMap((message) => [...message.matchAll(QUOTED)].map(([, quoted]) => quoted)));
 const FIRST_MASK = 0xe000;
 
@@ -81,7 +81,7 @@ function findAround(value) {
   return kept.reduce((said, quoted, i) => {
     const mask = String.fromCharCode(FIRST_MASK + i);
     return said.replaceAll(`“${mask}”`, `${open}${mask}${close}`).replaceAll(mask, () => quoted);
-  }, find(masked));
+  }, find(masked).replaceAll("”, “", `${close}, ${open}`)); // a list of them in one placeholder
 }
 
 const SAID = new Map(); // live pages say the same many times a second
