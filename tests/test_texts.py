@@ -111,6 +111,7 @@ SINGULAR: Final = {
 }  # fmt: skip
 
 MORE_THAN_ONE: Final = (
+    "The assessment has {text} characters",
     # constants of the product and settings with a least value
     "{film_minutes} minutes", "{gyro_noise} times", "{filters} filters", "{hours} hours", "{window} strides",
     "{strides_per_share} strides", "Expected {0} samples a second", "{1} steps, {2} s",
