@@ -94,7 +94,7 @@ class GaitEvents:
         return known[len(known) // 2] if known else None
 
     def times(self, side: Side, kind: EventKind) -> tuple[float, ...]:
-        """Event times in s of one side and kind, increasing."""
+        """Event times in s of one side and kind, strictly increasing: two events at one moment are one."""
         return self._times.get((side, kind), ())
 
     @cached_property
@@ -102,7 +102,7 @@ class GaitEvents:
         found: dict[tuple[Side, EventKind], list[float]] = {}
         for e in self.events:
             found.setdefault((e.side, e.kind), []).append(e.time_s)
-        return {key: tuple(times) for key, times in found.items()}
+        return {key: tuple(dict.fromkeys(times)) for key, times in found.items()}
 
 
 @dataclass(frozen=True)

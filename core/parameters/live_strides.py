@@ -117,7 +117,7 @@ class LiveStrides:
     ) -> list[LiveStride]:
         """The stride that this contact ends, if it began within reach; `number`: of one told before."""
         own = [e.time_s for e in self._events if e.side == event.side and e.kind == "ic"]
-        if len(own) < 2:
+        if len(own) < 2 or own[-2] == own[-1]:  # two contacts may be refined to the same moment
             return []
         first, past = self._sample(own[-2]) - 1, at + 1
         if not history.reaches(first, past):

@@ -55,6 +55,14 @@ def test_a_cycle_carries_its_own_and_the_other_foots_events() -> None:
     assert second.excluded_reason is None
 
 
+def test_two_contacts_refined_to_the_same_moment_make_no_stride_of_no_duration() -> None:
+    events = straight().events
+    doubled = tuple(e for event in events for e in (event, event))
+    found, expected = stride_list(GaitEvents(doubled), standing()), stride_list(straight(), standing())
+    assert found.strides == expected.strides
+    assert (found.columns.duration_s > 0.0).all()
+
+
 def test_the_first_and_last_stride_of_a_bout_are_set_aside() -> None:
     assert reasons(stride_list(straight(), standing())) == ["first", *[None] * 6, "last"]
 
