@@ -40,7 +40,8 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
         raise SignalError(
             "recording_too_long",
             f"The recording of “{'”, “'.join(too_long)}” is too long for the protocol "
-            f"'{recording.protocol}'. Cut out the walk, or choose daily life (activity) for a sensor on the trunk.",
+            f"'{recording.protocol}'. Cut out the walk, or choose daily life (activity) for a sensor on the "
+            "trunk.",
         )
     if not worn:
         raise SignalError(
