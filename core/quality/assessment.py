@@ -314,8 +314,8 @@ def _copies(recording: Recording) -> list[Notice]:
                 "duplicate_stream",
                 f"Sensors “{ids}” hold identical samples (a copy under another id); none of them is analysed."
                 if device_id is None
-                else f"Sensors “{ids}” hold identical samples (a copy under another id); only “{device_id}” is "
-                "analysed.",
+                else f"Sensors “{ids}” hold identical samples (a copy under another id); only "
+                f"“{device_id}” is analysed.",
                 used[0] if used else group[0],
                 severity="info",
             )
