@@ -25,6 +25,7 @@ from core.formats.live_log import (
     record,
     scan_records,
 )
+from core.plurals import plural
 from server.storage import fs
 
 log = logging.getLogger(__name__)
@@ -47,8 +48,9 @@ class Damage:
     def sentence(self) -> str:
         """For the people of the session."""
         return (
-            f"Damaged on the server's disk and left out: {self.lost} B of the live recording. "
-            "The original is kept; ask your administrator."
+            f"{self.lost} {plural(self.lost, 'byte', 'bytes')} of the live recording "
+            f"{plural(self.lost, 'was', 'were')} damaged on the server's disk and "
+            f"{plural(self.lost, 'is', 'are')} left out. The original is kept; ask your administrator."
         )
 
 

@@ -93,7 +93,7 @@ def test_a_sensor_that_is_too_long_is_not_left_out_beside_a_short_one(recording:
     ((worn, segment),) = recording.segments.items()
     short = replace(recording.streams[worn], device_id="short")
     both = replace(found, streams={"short": short}, segments={worn: segment, "short": "pelvis"})
-    with pytest.raises(SignalError, match=f"{worn} is too long") as error:
+    with pytest.raises(SignalError, match=f"“{worn}” is too long") as error:
         synchronise(both)
     assert error.value.code == "recording_too_long"
 

@@ -171,7 +171,7 @@ async def test_a_damaged_log_keeps_its_original_and_the_session_says_so(
     hurt = flip(path, path.stat().st_size // 2)
     [said] = findings(clinic.settings)
     assert said.startswith(f"live: {take}.log: ")
-    assert "Damaged on the server's disk" in said
+    assert "bytes of the live recording were damaged" in said
     users = clinic.users
     async with open_clinic(tmp_path, live_workers=0) as clinic:
         clinic.users = users
