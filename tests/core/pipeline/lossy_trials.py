@@ -28,7 +28,7 @@ from core.simulate import (
 from core.simulate.chest import PostureHold
 from core.simulate.script import Stand, Straight
 from core.squat.params import SquatParams
-from tests.kept import keep
+from tests.helpers.kept import keep
 
 LEGS: Final[tuple[Segment, ...]] = ("thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r")
 FEET: Final[tuple[Segment, ...]] = ("foot_l", "foot_r")
