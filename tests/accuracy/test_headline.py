@@ -25,7 +25,7 @@ SIGNATURES: dict[str, tuple[str, ...]] = {
     "stiff_knee": ("left knee bends",),
     "drop_foot": ("left toes hang", "left foot lands"),
     "crouch": ("Both knees move little",),
-    "antalgic": ("right leg carries longer", "left step takes"),
+    "antalgic": ("right leg carries longer", "right step takes"),
     "parkinson": ("Steps are short and quick",),
     "severe_shuffle": ("Steps are quick",),
     "step_asym": ("left step is",),
