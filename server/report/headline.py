@@ -334,12 +334,14 @@ def _has_norm(row: ParameterRow) -> bool:
 
 
 def _side_off_norm(row: ParameterRow) -> Side | None:
-    """The side further from its norm; None where both are within it."""
+    """The side further from its norm; None where both are within it, as their row shows them.
+
+    The uncertainty of a level is mostly common to both sides (the definition of a contact); whether the sides
+    differ is judged by the interval of their difference.
+    """
     z = {side: c.z for side in SIDES if (c := _cell(row, side)) is not None and c.z is not None}
-    certain = (_certain_z(row, _cell(row, side)) for side in SIDES)
-    if not any(one is not None and abs(one) > BEYOND_SD for one in certain):
-        return None
-    return max(z, key=lambda side: abs(z[side]))
+    furthest = max(z, key=lambda side: abs(z[side]))
+    return furthest if abs(z[furthest]) > BEYOND_SD else None
 
 
 def _join_steps(found: list[HeadlineSentence], rows: Mapping[str, ParameterRow]) -> list[HeadlineSentence]:

@@ -10,7 +10,7 @@ import pytest
 from core.activity.parameters import MEASURES as DAILY
 from core.functional_tests import chair, sway, tug, walks
 from core.measure import measure_gait
-from core.parameters.catalogue import CATALOGUE
+from core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES, index_entries, require_entries
 from core.simulate import simulate_scenario
 from core.squat.measures import MEASURES
 from server.report.wording import REASONS
@@ -33,6 +33,19 @@ def names() -> set[str]:
 @pytest.mark.slow
 def test_the_catalogue_knows_what_is_measured_and_nothing_else(names: set[str]) -> None:
     assert set(CATALOGUE) == names
+
+
+def test_a_registry_with_a_name_that_the_catalogue_does_not_have_cannot_be_built() -> None:
+    require_entries([*CATALOGUE, *LIMIT_FIGURES], "all of them")
+    with pytest.raises(ValueError, match=r"core\.rules uses figures .* stride_colour_nm"):
+        require_entries(("stride_time_s", "stride_colour_nm"), "core.rules")
+
+
+def test_a_name_stands_in_the_catalogue_once() -> None:
+    entry = CATALOGUE["stride_time_s"]
+    with pytest.raises(ValueError, match="two entries of the name stride_time_s"):
+        index_entries((entry, entry))
+    assert not set(CATALOGUE) & set(LIMIT_FIGURES)
 
 
 def test_the_document_has_the_tables_of_the_catalogue() -> None:

@@ -1,6 +1,6 @@
 """Pages and papers of every simulated patient show every rule at every rank, in every language.
 
-An everyday run has two patients, and every rule once among what is shown and once among what has no room.
+An everyday run has one patient, and every rule once among what is shown and once among what has no room.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ def test_every_figure_of_a_rule_has_a_name_and_a_definition() -> None:
         assert entry.definition
 
 
-@pytest.mark.parametrize("name", slow_after(2, NAMES))
+@pytest.mark.parametrize("name", slow_after(1, NAMES))
 async def test_every_rule_is_shown_whatever_its_rank(
     clinic: Clinic, pages: dict[str, Shown], name: str
 ) -> None:
