@@ -51,8 +51,11 @@ class LongStream:
 
 
 def find_complete_rows(block: SampleBlock) -> SampleBlock:
-    """The rows of a block in which every channel was measured."""
-    good = is_complete(block.acc)
+    """The rows of a block in which every channel was measured.
+
+    An acceleration of exactly zero on all axes is what a device writes when it does not measure.
+    """
+    good = is_complete(block.acc) & block.acc.any(axis=1)
     if block.gyr is not None:
         good = good & is_complete(block.gyr)
     if good.all():

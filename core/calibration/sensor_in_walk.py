@@ -88,7 +88,8 @@ def find_flat_moments(gyr: Floats, walked: Bools, rate_hz: float, params: WalkRu
     from scipy.ndimage import uniform_filter1d
 
     width = max(2, round(params.flat_mean_s * rate_hz))
-    rate = np.sqrt(uniform_filter1d(find_squares(gyr), width, mode="nearest"))
+    # a running sum over zeros may round to less than zero
+    rate = np.sqrt(np.maximum(uniform_filter1d(find_squares(gyr), width, mode="nearest"), 0.0))
     lows = find_peaks(-np.where(walked, rate, rate.max()), distance=params.flat_apart_s * rate_hz)
     lows = lows[walked[lows]]
     if not len(lows):

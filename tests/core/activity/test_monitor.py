@@ -251,3 +251,16 @@ def test_every_hour_is_told_while_it_goes_on() -> None:
     # the fourth hour ends with the recording, a sample early: the next stage tells that
     assert shares == pytest.approx([0.0, 0.2375, 0.475, 0.7125])
     assert told[-2:] == [("quality", 0.95), ("done", 1.0)]
+
+
+@pytest.mark.parametrize("lost", [0.0, np.nan])
+def test_samples_that_were_not_measured_are_a_hole(lost: float) -> None:
+    made = simulate_chest(CHAIR)
+    (stream,) = made.recording.streams.values()
+    half = np.arange(len(stream.t_s)) < len(stream.t_s) // 2
+    acc, gyr = (np.where(half[:, None], x, lost) for x in (stream.acc, stream.gyr) if x is not None)
+    found = monitor_activity(as_long_stream(replace(stream, acc=acc, gyr=gyr), 100), "chest", 1.75)
+    assert found.steps_s.max(initial=0.0) < stream.t_s[len(stream.t_s) // 2]
+    nothing = replace(stream, acc=np.full_like(stream.acc, lost))
+    with pytest.raises(SignalError, match="no complete sample"):
+        monitor_activity(as_long_stream(nothing, 100), "chest", 1.75)

@@ -131,3 +131,11 @@ def test_every_stance_has_a_flat_moment() -> None:
     whole = int((steps > 0).sum()) - 2
     assert truth.flat["right"][flats].mean() > 0.9
     assert whole <= len(flats) <= 2 * whole + 4
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_foot_whose_sensor_holds_zeros_for_a_while_is_flat_only_at_numbers() -> None:
+    gyr = np.random.default_rng(0).normal(0.0, 3.0, (4000, 3))
+    gyr[np.arange(4000) // 50 % 2 == 1] = 0.0
+    flats = find_flat_moments(gyr, np.ones(4000, np.bool_), 100.0, WalkRungParams())
+    assert len(flats) > 20

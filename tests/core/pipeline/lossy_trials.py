@@ -140,6 +140,10 @@ def _alternate(rng: np.random.Generator, n: int, k: int, sensors: int) -> Bools:
     return np.asarray((np.arange(n) // length) % max(2, sensors) == k)
 
 
+def _nothing(rng: np.random.Generator, n: int, k: int, sensors: int) -> Bools:
+    return np.zeros(n, np.bool_)
+
+
 def _few(rng: np.random.Generator, n: int, k: int, sensors: int) -> Bools:
     kept = np.zeros(n, np.bool_)
     kept[rng.choice(n, min(n, int(rng.choice([1, 2, 3, 10]))), replace=False)] = True
@@ -186,7 +190,7 @@ def _all_but_a_stretch(rng: np.random.Generator, n: int, k: int, sensors: int) -
 
 PATTERNS: Final[tuple[Pattern, ...]] = (
     _own_turn, _alternate, _few, _short_stretch, _bursts, _start, _end, _single_samples,
-    _halves, _halves, _all_but_start, _all_but_a_stretch,
+    _halves, _halves, _nothing, _all_but_start, _all_but_a_stretch,
 )  # fmt: skip
 
 
@@ -195,7 +199,8 @@ def lose_samples(stream: ImuStream, kept: Bools, how: str) -> ImuStream:
 
     Parameters
     ----------
-    how : "missing" rows are not there, "acc", "gyr" or "both" are NaN, "frozen" rows repeat the last one.
+    how : "missing" rows are not there, "acc", "gyr" or "both" are NaN, "frozen" rows repeat the last one,
+        "zero" rows hold zeros.
     """
     acc, gyr, gone = stream.acc.copy(), None if stream.gyr is None else stream.gyr.copy(), ~kept
     if how == "missing" and kept.any():
@@ -208,6 +213,9 @@ def lose_samples(stream: ImuStream, kept: Bools, how: str) -> ImuStream:
             acc[start:stop] = acc[at]
             if gyr is not None:
                 gyr[start:stop] = gyr[at]
+    if how == "zero":
+        acc[gone] = 0.0
+        gyr = None if gyr is None else np.where(gone[:, None], 0.0, gyr)
     if how in ("acc", "both"):
         acc[gone] = np.nan
     if how in ("gyr", "both") and gyr is not None:
@@ -267,4 +275,4 @@ def draw_trial(seed: int) -> LossyTrial:
 
 
 def _draw_loss(rng: np.random.Generator) -> str:
-    return str(rng.choice(["both", "both", "both", "missing", "acc", "gyr", "frozen", "leap"]))
+    return str(rng.choice(["both", "both", "both", "missing", "acc", "gyr", "frozen", "zero", "leap"]))

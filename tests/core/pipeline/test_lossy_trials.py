@@ -18,7 +18,7 @@ from server.report.exports import analysis_files
 from tests.core.pipeline.lossy_trials import LossyTrial, draw_trial, keep_segments, lose_samples, walk
 
 EVERYDAY = range(24)
-WIDE = range(1000, 3000)
+WIDE = range(1000, 2000)
 
 OURS = ("stage_not_reached", "bad_shape")
 """Codes of a fault of the chain itself: no recording has it."""
