@@ -35,6 +35,7 @@ UNMIRRORED: Final = frozenset(
         "tests/core/parameters/test_dictionary.py",
         "tests/core/pipeline/test_chain.py",
         "tests/core/pipeline/test_functional.py",
+        "tests/core/pipeline/test_lossy_trials.py",
         "tests/core/pipeline/test_resume.py",
         "tests/core/pipeline/test_squat.py",
         "tests/core/pipeline/test_trunk_only.py",
