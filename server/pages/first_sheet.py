@@ -13,7 +13,7 @@ MOST_BARS: Final = 6
 MOST_LINES: Final = 13
 """Of note and headline, where ten rows, three curves and the profile stand below them."""
 
-MOST_LINES_COMPARED: Final = 10
+MOST_LINES_COMPARED: Final = 6
 """The same where a column of changes makes the other columns narrow, so that rows need two lines."""
 
 HALF: Final = 48

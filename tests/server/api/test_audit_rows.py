@@ -96,6 +96,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     f"PATCH {SESSION}": {"json": {"title": "Walk"}},
     f"POST {SESSION}/edits": {"json": EDIT},
     f"DELETE {SESSION}/edits": {},
+    f"POST {SESSION}/edits/redo": {},
     f"PUT {SESSION}/files/{{name:path}}": {"content": b"x"},
     f"POST {SESSION}/files": {"files": {"files": ("judge.npz", b"x")}},
     f"DELETE {SESSION}/files/{{name:path}}": {},
