@@ -178,14 +178,14 @@ async def test_a_damaged_log_keeps_its_original_and_the_session_says_so(
         original = path.with_name(f"{take}.1.damaged")
         assert original.read_bytes() == hurt
         assert 0 < len(stored(path)) < len(FRAMES)
-        assert "Damaged on the server's disk" in caplog.text
+        assert "damaged on the server's disk" in caplog.text
         async with clinic.client("clinician") as http:
             async with asyncio.timeout(PATIENCE_S):
                 while "A part of the live recording is lost" not in (
                     page := (await http.get(f"/sessions/{session}")).text
                 ):
                     await asyncio.sleep(0.05)
-        assert "Damaged on the server&#39;s disk" in page
+        assert "damaged on the server&#39;s disk" in page
         [said] = findings(clinic.settings)
         assert original.name in said
         hub: Hub = clinic.app.state.hub
@@ -209,5 +209,5 @@ async def test_a_log_without_a_readable_sample_is_not_thrown_away(tmp_path: Path
         assert path.with_name(f"{take}.1.damaged").read_bytes() == hurt
         with clinic.db.read() as c:
             [text] = live.list_damages(c, session)
-        assert "Damaged on the server's disk" in text
+        assert "damaged on the server's disk" in text
         assert any(".1.damaged" in said for said in findings(clinic.settings))

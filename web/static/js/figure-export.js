@@ -22,7 +22,7 @@ function isEmpty({ data }) {
 
 // viser draws as many pixels as its frame has room for, fewer where drawing is slow. The frame gets the room that a
 // picture needs and is scaled back, so that nothing moves on the page.
-function enlarge(frame, canvas, [width, height]) {
+function enlarge(frame, canvas, { width, height }) {
   const wanted = Math.ceil(((WIDTH + 1) * canvas.clientWidth) / canvas.width);
   if (wanted <= frame.clientWidth) return;
   const size = { width: `${wanted}px`, height: `${Math.round((wanted * height) / width)}px` };
@@ -33,7 +33,7 @@ function enlarge(frame, canvas, [width, height]) {
 // something on it, for a stream may begin with the empty canvas. viser draws only when something changed: `redraw`
 // shows the same moment again. In a frame it is drawn larger for as long as the picture takes.
 export async function savePicture(canvas, redraw, name, frame = null) {
-  const size = frame && [frame.clientWidth, frame.clientHeight];
+  const size = frame && { width: frame.clientWidth, height: frame.clientHeight };
   const stream = canvas.captureStream();
   const video = document.createElement("video");
   video.muted = true;

@@ -191,7 +191,7 @@ function addRoom(area) {
 for (const area of document.querySelectorAll("textarea[data-limit]")) showRoom(area);
 document.addEventListener("input", ({ target }) => {
   if (target.matches("textarea[data-limit]")) showRoom(target);
-  const saved = target.form?.querySelector("[data-saved]");
+  const saved = target.closest("form")?.querySelector("[data-saved]");
   if (saved) saved.textContent = "";
 });
 
