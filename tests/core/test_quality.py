@@ -168,8 +168,9 @@ def test_a_sensor_that_stopped_early_is_not_reported_again_as_a_gap() -> None:
     keep[300:500] = False
     for rows, gaps in ((np.flatnonzero(keep), ["10.0 %"]), (np.arange(800), [])):
         short = stream("b", acc[rows] + 1.0, gyr[rows], t_s=rows / 100.0)
-        others = {"foot_l": stream("a", acc, gyr), "pelvis": stream("c", acc + 2.0, gyr)}
-        recording = take({**others, "shank_l": short})
+        recording = take(
+            {"foot_l": stream("a", acc, gyr), "pelvis": stream("c", acc + 2.0, gyr), "shank_l": short}
+        )
         uniform = synchronise(recording)
         assert [n.code for n in uniform.notices] == ["unequal_lengths"]
         said = [n.message for n in assess(recording, uniform).notices if n.code == "gap"]
