@@ -50,7 +50,7 @@ def test_eleven_files_become_a_session_page(solid: Browser, running: RunningServ
     assert "100 Hz" in facts
     copies = page.locator(".note", has_text="copies of others")
     expect(copies).to_contain_text("“00B40C49” of “00B40C44”")
-    expect(copies).to_contain_text("00B40C4A of 00B40C47")
+    expect(copies).to_contain_text("“00B40C4A” of “00B40C47”")
 
     _map_sensors(page)
     page.locator("[data-analyse]").click()
