@@ -151,7 +151,7 @@ def find_untested_modules() -> list[str]:
 
 
 def _own_test(module: Path) -> Path:
-    """Where the test of a module (relative path) belongs, e.g. tests/core/test_x.py for core/x.py."""
+    """Where the test of a module (relative path) belongs."""
     return TESTS / module.with_name(f"test_{module.name}")
 
 
