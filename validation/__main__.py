@@ -1,6 +1,6 @@
 """Run the validation: `python -m validation [PART ...]`.
 
-Parts are accuracy, bench, faults, fuzz, browser and postgresql; without one, all run. Units that passed on
+Parts are accuracy, bench, faults, sweep, browser and postgresql; without one, all run. Units that passed on
 the same code are skipped, so an interrupted validation resumes (`--again` repeats them). `--write` puts the
 figures into validation/report.md and docs/accuracy.md, which a release requires.
 """
@@ -11,6 +11,7 @@ import argparse
 import hashlib
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -28,6 +29,8 @@ from validation.report import UnitResult, write_report
 DEFAULT_STORE: Final = ROOT / ".validation"
 HASHED: Final = ("core", "migrations", "sagittal", "server", "tests", "validation", "web")
 """Folders whose contents decide whether a stored result still holds."""
+SWEEP: Final = re.compile(r"\bmark\.sweep\b|\bsweep_after\(")
+"""A test with many variants, or the helper that marks those of its parameters."""
 TENTHS: Final = 10
 NO_TESTS: Final = 5
 """pytest's exit status when no test was collected."""
@@ -66,14 +69,14 @@ def list_units() -> list[Unit]:
             name = str(path.relative_to(ROOT))
             units.append(Unit(part, name, (name,), alone))
     units.append(Unit("bench", "tests", ("tests", "-m", "bench"), alone=True))
-    units += [
-        Unit("fuzz", f"tests/{folder}", (f"tests/{folder}", "-m", "slow"))
-        for folder in ("core", "server", "web", "acceptance")
-    ]
+    for path in sorted((ROOT / "tests").rglob("test_*.py")):
+        if SWEEP.search(path.read_text("utf-8")):
+            name = str(path.relative_to(ROOT))
+            units.append(Unit("sweep", name, (name, "-m", "sweep")))
     for path in sorted((ROOT / "tests" / "server").iterdir()):
         if path.is_dir() and any(path.glob("test_*.py")):
             name = str(path.relative_to(ROOT))
-            marks = "not (slow or bench or browser or faults)"
+            marks = "not (slow or sweep or bench or browser or faults)"
             units.append(Unit("postgresql", name, (name, "-m", marks, "--engine", "postgresql")))
     return units
 

@@ -48,7 +48,7 @@ def sources(*endings: str) -> Iterator[Path]:
                 yield path
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_the_names_are_written_in_the_list_alone() -> None:
     found = [
         (str(path.relative_to(ROOT)), text)

@@ -268,7 +268,7 @@ def test_movement_sorts_nine_real_sensors_and_sets_ankles_and_copies_aside(neura
     assert segments == {d: NEURA.get(d) for d in neura.streams}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("script", ["comfortable", "fast_with_turns", "slow"])
 def test_movement_tells_segments_and_sides_of_simulated_walks(script: str) -> None:
     recording, truth = nameless(simulate_scenario(script, seed=1).recording)

@@ -23,7 +23,7 @@ from tests.core.formats.making import stream, take
 from tests.data import data_folder
 from tests.helpers import gaitmap, mobgap
 from tests.helpers.live_walks import live
-from tests.helpers.marks import slow_after
+from tests.helpers.marks import sweep_after
 from tests.helpers.walks import cut, neura_walk, simulated
 
 Spoil = Callable[[Floats, Floats, int], None]
@@ -247,7 +247,7 @@ def test_real_sensors_all_measure(takes: Callable[[], list[UniformRecording]]) -
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("script", slow_after(1, [s for s in SCRIPTS if s != "five_minutes"]))
+@pytest.mark.parametrize("script", sweep_after(1, [s for s in SCRIPTS if s != "five_minutes"]))
 def test_simulated_sensors_all_measure(script: str) -> None:
     recording = synchronise(simulate_scenario(script, 0).recording)
     assert mark_stuck(recording) is recording

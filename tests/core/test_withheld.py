@@ -39,7 +39,7 @@ from server.report.table import NOBODY
 from server.report.tables import curves_csv
 from server.report.tracks import read_tracks
 from server.report.wording import REASONS
-from tests.helpers.marks import slow_after
+from tests.helpers.marks import sweep_after
 from tests.helpers.walks import neura_recording
 
 
@@ -269,7 +269,7 @@ def test_what_the_leg_model_holds_fixed_is_no_result(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "walk", slow_after(2, ["neura", "comfortable", "hemiparetic", "stiff_knee", "crouch"])
+    "walk", sweep_after(2, ["neura", "comfortable", "hemiparetic", "stiff_knee", "crouch"])
 )
 def test_nothing_is_withheld_of_a_right_setup(walk: str) -> None:
     recording = neura_recording() if walk == "neura" else simulate_scenario(walk, 0).recording

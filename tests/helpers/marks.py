@@ -14,8 +14,16 @@ sqlite_only = pytest.mark.skipif(
 
 def slow_after(count: int, cases: Sequence[Any]) -> list[Any]:
     """Parameters of a test of which all after the first `count` are marked slow."""
-    slow = [
-        pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.slow)
-        for case in cases[count:]
+    return _mark_after(count, cases, pytest.mark.slow)
+
+
+def sweep_after(count: int, cases: Sequence[Any]) -> list[Any]:
+    """Parameters of a test of which all after the first `count` are left to the validation."""
+    return _mark_after(count, cases, pytest.mark.sweep)
+
+
+def _mark_after(count: int, cases: Sequence[Any], mark: pytest.MarkDecorator) -> list[Any]:
+    marked = [
+        pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=mark) for case in cases[count:]
     ]
-    return [*cases[:count], *slow]
+    return [*cases[:count], *marked]

@@ -47,7 +47,7 @@ FIRST: Final = "pytest.mark.first"
 ORDER: Final = ("core", "server", "web", "lint", "helpers", "test_", "acceptance", "faults", "browser")
 """Order of the folders: cheap tests first. Browser tests last: while Playwright drives Chromium an event loop
 runs in its thread, which other tests must not meet."""
-MARKS_WITH_RECORDINGS: Final = frozenset({"recorded", "slow", *MARKED, "bench", "postgres"})
+MARKS_WITH_RECORDINGS: Final = frozenset({"recorded", "slow", "sweep", *MARKED, "bench", "postgres"})
 """Tests with one of these marks also run where recordings are available."""
 LONGEST: Final = ("test_capture.py", "test_german.py", "test_live.py", "test_look.py", "test_replay.py")
 """Files of minutes: first in their folder, so that no process is left alone with one at the end."""

@@ -49,7 +49,7 @@ def test_no_unit_is_started_when_time_is_up(tmp_path: Path, capsys: pytest.Captu
 def test_every_study_is_a_unit_of_one_name() -> None:
     units = list_units()
     assert len({(u.part, u.name) for u in units}) == len(units)
-    assert {"accuracy", "bench", "faults", "fuzz", "browser", "postgresql"} == {u.part for u in units}
+    assert {"accuracy", "bench", "faults", "sweep", "browser", "postgresql"} == {u.part for u in units}
 
 
 def test_an_unknown_part_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -77,7 +77,7 @@ def test_what_the_gyroscope_saw_of_a_slip_leaves_its_rate() -> None:
     assert np.abs(back.acc[230:] - [9.81, 0.0, 0.0]).max() < 1e-9
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize(("segment", "by_deg"), [("thigh_l", 15.0), ("foot_l", 15.0), ("foot_l", -15.0)])
 def test_no_figure_rests_on_what_a_slipped_sensor_measured(segment: Segment, by_deg: float) -> None:
     """Whatever is still told is what the same walk gives without the slip, within what is stated."""

@@ -83,7 +83,7 @@ def test_a_forbidden_repair_leaves_the_signals() -> None:
     assert found.doubtful["thigh_l"] == (-np.inf, np.inf)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("segment", ["thigh_l", "shank_l", "foot_l"])
 def test_no_figure_rests_on_a_sensor_that_slipped_before_the_walk(segment: Segment) -> None:
     right = analysed("healthy", 5)

@@ -41,7 +41,7 @@ def standing(analysis: TakeAnalysis) -> slice:
     return slice(round(a * 100), round(b * 100))
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("width", [0.1, 0.3])
 def test_the_figure_stands_as_wide_as_measured(width: float) -> None:
     made = analysed(width)

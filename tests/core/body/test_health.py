@@ -15,7 +15,7 @@ from core.recording import Recording, UniformRecording
 from core.rotation import about, rotate
 from core.simulate import simulate_scenario
 from tests.core.body.test_estimate import estimated
-from tests.helpers.marks import slow_after
+from tests.helpers.marks import sweep_after
 from tests.helpers.walks import simulated
 
 
@@ -59,7 +59,7 @@ def test_the_longest_run_is_found_wherever_it_lies() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seed"),
-    slow_after(1, [("comfortable", 3), ("fast_with_turns", 2), ("hemiparetic", 4), ("drop_foot", 5)]),
+    sweep_after(1, [("comfortable", 3), ("fast_with_turns", 2), ("hemiparetic", 4), ("drop_foot", 5)]),
 )
 def test_a_right_set_up_is_not_accused(name: str, seed: int) -> None:
     made = estimated(take(seed, name))
@@ -104,7 +104,7 @@ def test_a_foot_that_never_rests_is_told() -> None:
     assert told.verdict == "bad"
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("lost_s", [0.5, 8.0])
 def test_a_known_gap_is_bridged_told_and_recovered(lost_s: float) -> None:
     was = take().sensors["shank_r"]

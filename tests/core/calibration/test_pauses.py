@@ -39,7 +39,7 @@ def pause(steps: int, stands_s: float) -> UniformRecording:
     return cut(recording, truth.stands[0][1] + 1.0, truth.stands[-1][0] - 1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", PATIENTS)
 def test_a_stop_of_a_virtual_person_is_no_standing(name: str) -> None:
     found = calibrate(within_walk(name)).calibration
@@ -56,7 +56,7 @@ def test_the_standing_before_a_walk_is_taken(name: str) -> None:
     assert found.zero[0] < 6.0
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("stands_s", [1.9, 2.5, 4.0, 6.0])
 @pytest.mark.parametrize("steps", [7, 8, 11, 12])
 def test_a_stop_is_no_standing_wherever_it_is_and_however_long(steps: int, stands_s: float) -> None:
@@ -94,7 +94,7 @@ def test_a_take_of_walking_with_a_pause_states_no_levels_and_no_step_length() ->
         assert figures["stride_length_m", side].mean == pytest.approx(1.28, abs=0.03)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", [n for n in NAMES if n != "14-1"])
 def test_the_standing_of_a_real_walk_is_taken(name: str) -> None:
     """All but one of `ipol_walks` in which nobody stands still."""

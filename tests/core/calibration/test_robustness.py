@@ -50,7 +50,7 @@ def test_any_piece_with_any_sensors_ends_in_a_result_or_a_code(seed: int) -> Non
     assert set(angles.angles) == set(angles.zero_offset)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("rate_hz", [60.0, 128.0, 512.0])
 def test_flexion_is_right_at_any_sampling_rate(rate_hz: float) -> None:
     take = simulate_scenario("slow", 3, rate_hz=rate_hz)

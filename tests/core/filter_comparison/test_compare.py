@@ -63,7 +63,7 @@ def truth_table(truth: WalkTruth, error: Floats | None = None) -> OrientationTab
     return OrientationTable("truth.sto", truth.t_s + LAG_S, q)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_one_filter_alone_has_no_spread_and_is_its_own_median() -> None:
     found = compare("mahony_2008")
     assert all(np.nanmax(s.sd) < 1e-9 and np.nanmax(s.range) < 1e-9 for s in found.spreads)

@@ -134,7 +134,7 @@ def test_it_is_the_offline_calibration_of_the_same_samples() -> None:
         assert np.array_equal(ours.gyro_bias, mounted.gyro_bias)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("n", [1, 7, 333, 10_000])
 def test_no_border_of_a_block_is_seen_in_it(n: int) -> None:
     found, again = walked().found[0], run(walk(), n).found[0]
@@ -173,7 +173,7 @@ def test_a_sensor_that_moves_is_named_and_nothing_begins() -> None:
     assert done.calibrator.view.stood_s == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_redo_begins_anew_with_the_next_sample() -> None:
     recording, _ = scripted(
         (
@@ -294,7 +294,7 @@ def strapped_on(seed: int) -> UniformRecording:
     return replace(first, t_s=np.arange(n) / 100.0, sensors=sensors)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("seed", range(4))
 def test_strapping_sensors_on_is_no_walk(seed: int) -> None:
     done = run(joined(strapped_on(seed), walk()))
@@ -341,7 +341,7 @@ def test_a_take_in_which_hardly_anybody_walks_begins_anew() -> None:
     assert done.found == ()
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_contradicting_mounting_is_told_and_not_calibrated() -> None:
     recording, _ = scripted((Stand(5.0), Straight(16.0, 0.6, 0.55), Stand(4.0)))
     left, right = (run(replace(recording, mounting={"shank_l": f"face {way}"})) for way in ("left", "right"))

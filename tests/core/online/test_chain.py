@@ -23,7 +23,7 @@ from core.online.chain import COURSES
 from core.parameters.live_stride import NOT_YET
 from core.recording import UniformRecording
 from tests.helpers.live_walks import Run, batches, hello_of, live, recorded
-from tests.helpers.marks import slow_after
+from tests.helpers.marks import sweep_after
 from tests.helpers.walks import cut, lost, neura_walk, only, simulated
 
 FILTER_DELAY_S = {"neura_walk": 0.07, "simulated": 0.08}
@@ -120,7 +120,7 @@ def same(a: Told, b: Told) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SETS)
-@pytest.mark.parametrize("sizes", slow_after(1, [7, ((64, 3, 21, 1, 40),), 200, 1]))
+@pytest.mark.parametrize("sizes", sweep_after(1, [7, ((64, 3, 21, 1, 40),), 200, 1]))
 def test_batches_of_any_size_give_the_same_bits(name: str, sizes: int | tuple[int, ...]) -> None:
     same(streamed(name)[1], told(live(worn(name), sizes)[1]))
 
@@ -150,7 +150,7 @@ def test_a_chest_sensor_beside_the_seven_stops_neither_calibration_nor_strides()
     assert len(told(frames).strides) == len(streamed("seven")[1].strides)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("sizes", [5, 10])
 def test_a_redone_calibration_starts_at_the_next_sample_and_nothing_else_changes(sizes: int) -> None:
     take = simulated("comfortable", 1)[0]
@@ -169,7 +169,7 @@ def test_a_redone_calibration_starts_at_the_next_sample_and_nothing_else_changes
     same(again[sizes], again[20])
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_the_log_of_a_take_gives_the_same_bits_as_its_stream() -> None:
     take = worn("seven")
     log = FILE_MARK
@@ -280,7 +280,7 @@ def test_a_live_stride_has_the_figures_of_the_whole_take(name: str) -> None:
     assert compared(run.strides, whole) > 14 * len(complete)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("person", ["hemiparetic", "parkinson", "step_asym"])
 def test_it_has_them_of_other_gaits_too(person: str) -> None:
     run = recorded(simulated(person, 2)[0])

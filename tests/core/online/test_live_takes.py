@@ -33,7 +33,7 @@ def codes(frames: list[LiveFrame]) -> list[str]:
     return [n.code for f in frames for n in f.notices]
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("speed", [BELT, None])
 def test_on_a_belt_distances_are_the_belts_or_none(speed: float | None) -> None:
     take = walk()
@@ -63,7 +63,7 @@ def test_a_belts_speed_without_a_treadmill_is_refused() -> None:
     assert caught.value.code == "belt_speed_without_treadmill"
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("segment", ["foot_r", "shank_l", "pelvis"])
 def test_a_lost_sensor_comes_back_into_the_figure(segment: Segment) -> None:
     """What hangs on it is withheld while it is away; a few steps later all is as if nothing had been."""
@@ -85,7 +85,7 @@ def test_a_lost_sensor_comes_back_into_the_figure(segment: Segment) -> None:
         assert not s.counted
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("seconds", [0.5, 1.0, 5.0])
 def test_feet_by_themselves_begin_anew_at_their_next_rest(seconds: float) -> None:
     """The tablet is out of reach for a while: nobody's samples come, one foot is in mid-swing."""
@@ -147,7 +147,7 @@ def slower(take: UniformRecording, rate_hz: float) -> UniformRecording:
     return replace(take, t_s=t_s, rate_hz=rate_hz, sensors={s: thin(x) for s, x in take.sensors.items()})
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("rate_hz", [60.0, 120.0])
 def test_sensors_of_another_rate_walk_the_same_strides(rate_hz: float) -> None:
     hundred = [s for s in recorded(walk()).strides if s.complete]
@@ -235,7 +235,7 @@ def compared(take: UniformRecording, sizes: int | tuple[int, ...]) -> tuple[Onli
     return online, told
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_late_sensor_is_told_and_marked_until_calibrated_again() -> None:
     late = delay_sensor(only(walk(), *PRESETS["lower_body7"]), "shank_l", 0.05)
     online, told = compared(late, 10)

@@ -58,7 +58,7 @@ def test_trials_with_lost_samples_end_in_results_or_a_notice() -> None:
     assert len(ends) > 2
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("first", range(WIDE.start, WIDE.stop, 100))
 def test_many_trials_with_lost_samples_end_in_results_or_a_notice(first: int) -> None:
     for seed in range(first, first + 100):

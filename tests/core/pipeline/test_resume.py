@@ -80,7 +80,7 @@ def test_an_analysis_that_nobody_resumes_lets_go_of_earlier_orientations_and_fin
         assert {x.mag is not None for x in streams} == {there} == {x.mag is not None for x in sensors}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_seven_sensors_resumed_where_their_mountings_are_found_are_the_whole() -> None:
     assert same(resume(whole(), "mounting"), whole())
 

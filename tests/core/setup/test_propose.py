@@ -51,7 +51,7 @@ def test_nothing_is_said_of_a_right_set_up_however_sensors_are_turned() -> None:
     assert exchange.swap == ()
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("segment", ["thigh_l", "shank_r"])
 @pytest.mark.parametrize(
     ("acc", "gyr"), [(LEFT_HANDED, LEFT_HANDED), (1.0, -1.0), (-1.0, 1.0)], ids=["left-handed", "gyr", "acc"]

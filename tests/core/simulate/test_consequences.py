@@ -60,7 +60,7 @@ def test_iron_beside_the_walkway_is_told_and_costs_nothing() -> None:
 
 
 @pytest.mark.parametrize(("late_s", "expected"), [(0.01, 1.1), (0.02, 2.1)])
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_clock_that_lags_at_the_thighs_costs_what_the_specification_measured(
     late_s: float, expected: float
 ) -> None:

@@ -37,7 +37,7 @@ from core.simulate.walker import REFERENCE_HEIGHT_M
 from core.timeline import synchronise
 from tests.helpers.event_scoring import match
 from tests.helpers.gait_features import Features, features
-from tests.helpers.marks import slow_after
+from tests.helpers.marks import sweep_after
 from tests.helpers.walks import joint_gap
 
 SEEDS = (5, 11, 23, 31)
@@ -139,7 +139,7 @@ def test_every_person_has_a_signature_and_a_script() -> None:
     assert set(PATIENTS) <= set(SCRIPTS)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", SIGNATURES)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_signature_shows(name: str, seed: int) -> None:
@@ -149,7 +149,7 @@ def test_the_signature_shows(name: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", SIGNATURES)
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_every_person_can_turn_stop_and_walk_arcs(name: str) -> None:
     """docs/science/simulation.md, "Limits on construction"."""
     patient = PATIENTS[name]
@@ -184,7 +184,7 @@ def test_contacts_of_healthy_walking_are_found_when_they_happen(seed: int) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", slow_after(3, list(SIGNATURES)))
+@pytest.mark.parametrize("name", sweep_after(3, list(SIGNATURES)))
 @pytest.mark.parametrize("rising", [True, False])
 def test_the_rule_invents_nothing_and_finds_all_heel_contacts(name: str, rising: bool) -> None:
     """In both ways of landing: the counts must not rest on the shaped pitch
@@ -199,7 +199,7 @@ def test_the_rule_invents_nothing_and_finds_all_heel_contacts(name: str, rising:
         assert missed <= 0.02 * total
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", [n for n in SIGNATURES if n != "severe_shuffle"])
 def test_contacts_stay_in_place_on_estimated_orientations_with_shocks(name: str) -> None:
     """What an analysis sees: half a degree of error must not move the maximum of the pitch by 0.1 s."""
@@ -241,7 +241,7 @@ def test_a_landing_on_the_forefoot_has_no_largest_pitch_at_contact() -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_lower_threshold_loses_the_contacts_of_a_drop_foot(seed: int) -> None:
     """The forefoot touches down at s of about −0.13, below −0.1
     (docs/science/simulation.md, "Virtual people").

@@ -46,7 +46,7 @@ def test_strides_and_angles_are_the_paper_s(walk: PotterWalk) -> None:
         assert 11.44 < np.degrees(flexion.max()) < 15.0
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_the_signals_integrate_to_the_truth(walk: PotterWalk) -> None:
     dt = 1.0 / walk.rate_hz
     for i in range(3):

@@ -9,7 +9,7 @@ from core.simulate import simulate_scenario
 SHORT = ["comfortable", "slow", "fast_with_turns", "figure_of_eight", "lost_sensor"]
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", SHORT)
 def test_named_scripts_are_long_enough_for_an_analysis(name: str) -> None:
     simulation = simulate_scenario(name, seed=2)
@@ -32,7 +32,7 @@ def test_the_lost_sensor_is_lost_and_comes_back() -> None:
     assert t[-1] == pytest.approx(simulation.truth.t_s[-1], abs=0.5)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_five_minutes_last_five_minutes() -> None:
     assert simulate_scenario("five_minutes", seed=1).truth.t_s[-1] == pytest.approx(300.0, abs=10.0)
 

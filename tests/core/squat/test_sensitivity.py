@@ -167,7 +167,7 @@ def both_legs() -> CalibratedRecording:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_without_a_reference_errors_are_changes_of_the_legs_own_angles() -> None:
     legs = [measure_leg(HEIGHT_M, side) for side in SIDES]
     told: list[float] = []

@@ -16,7 +16,7 @@ from server.app import create_app
 from server.services import patients, recordings, sessions
 from server.settings import Settings
 from tests.helpers.databases import write_database
-from tests.helpers.marks import slow_after
+from tests.helpers.marks import sweep_after
 from tests.server.clinic import Clinic
 
 EXAMPLES = 12
@@ -89,7 +89,7 @@ def target(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Target]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", slow_after(1, range(PARTS)))
+@pytest.mark.parametrize("part", sweep_after(1, range(PARTS)))
 def test_every_answer_is_one_the_document_names(target: Target, part: int) -> None:
     operations = [
         (path, method) for path, item in openapi(target.clinic.app)["paths"].items() for method in item

@@ -32,7 +32,7 @@ from server.report.headline import MOST, Headline, HeadlineSentence, find_stando
 from server.report.limits import limits_view
 from server.report.pdf import render_pdf
 from server.storage.tables import new_id
-from tests.helpers.marks import slow_after
+from tests.helpers.marks import sweep_after
 from tests.helpers.true_walks import true_tracks
 from tests.helpers.walks import simulated
 from tests.server import analysed
@@ -197,7 +197,7 @@ def test_every_figure_of_a_rule_has_a_name_and_a_definition() -> None:
         assert entry.definition
 
 
-@pytest.mark.parametrize("name", slow_after(1, NAMES))
+@pytest.mark.parametrize("name", sweep_after(1, NAMES))
 async def test_every_rule_is_shown_whatever_its_rank(
     clinic: Clinic, pages: dict[str, Shown], name: str
 ) -> None:
@@ -208,7 +208,7 @@ async def test_every_rule_is_shown_whatever_its_rank(
         assert pages[template].write("de")
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", NAMES)
 async def test_every_rule_is_shown_at_every_rank_on_every_side(
     clinic: Clinic, pages: dict[str, Shown], name: str
@@ -217,7 +217,7 @@ async def test_every_rule_is_shown_at_every_rank_on_every_side(
     check_pages(pages, list_cases(whole=True))
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 async def test_every_rule_is_in_the_pdf(clinic: Clinic, pages: dict[str, Shown]) -> None:
     if ctypes.util.find_library("pangoft2-1.0") is None:
         pytest.skip("the system library Pango is not installed")

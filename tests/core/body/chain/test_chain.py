@@ -63,6 +63,7 @@ def signals_at(chain: RevoluteChain, i: int, x: Floats, derive: bool = False) ->
     return s.h.copy(), s.H[:, :n].copy()
 
 
+@pytest.mark.sweep
 @pytest.mark.slow  # compiles for seconds a function by itself, of which a squat runs the whole
 @pytest.mark.parametrize("i", [0, 1, 2])
 def test_derivatives_are_those_of_differences(i: int) -> None:
@@ -130,7 +131,7 @@ def test_the_leg_is_the_chain_of_denavit_and_hartenberg() -> None:
     assert thigh[:3, 3] == pytest.approx(knee + links[1] @ chain.offsets[4], abs=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_a_squat_is_followed_within_half_a_degree(side: Side) -> None:
     errors = run(squats(side), leg(side))

@@ -126,7 +126,7 @@ def test_before_its_first_sample_a_sensor_holds_that_and_no_gap_of_it_begins() -
     assert (gyr[:first, foot] == take.inputs.gyr[first, foot]).all()
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("lost_s", [2.0, 8.0, 20.0])
 @pytest.mark.parametrize("segment", ["pelvis", "thigh_l", "shank_r", "foot_l"])
 def test_a_sensor_lost_while_the_person_turns_comes_back_where_it_belongs(

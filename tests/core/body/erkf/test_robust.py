@@ -182,7 +182,7 @@ def test_an_unnoticed_gap_of_a_foot_is_taken_up_again() -> None:
     assert np.linalg.norm(track.p[-1, foot] - filtered(mixed_walk(), LIVE).p[-1, foot]) < 10.0
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("params", [LIVE, OFFLINE], ids=["live", "offline"])
 def test_ten_minutes_keep_the_covariance_symmetric_and_positive(params: ErkfParams) -> None:
     """60 000 steps; a row and a column pass that are not mirrored would be 2e-5 apart by then."""

@@ -30,7 +30,7 @@ from core.rotation import about, multiply, rotate
 from core.simulate import simulate_scenario
 from tests.core.body.l7s.test_poses import still_feet
 from tests.core.body.test_estimate import FEET, PELVIS_FEET, estimated
-from tests.helpers.marks import slow_after
+from tests.helpers.marks import slow_after, sweep_after
 from tests.helpers.walks import cut, lost, only, simulated
 
 SEEN = {"l7s_3i": PELVIS_FEET, "l7s_2i": FEET}
@@ -77,7 +77,7 @@ ACCUSING = {
 @pytest.mark.parametrize("estimator", BOTH)
 @pytest.mark.parametrize(
     ("name", "seed"),
-    slow_after(2, [
+    sweep_after(2, [
         ("comfortable", 2), ("slow", 4), ("fast_with_turns", 3), ("hemiparetic", 3), ("drop_foot", 5),
         ("antalgic", 3), ("crouch", 4), ("parkinson", 2), ("elderly", 5),
     ]),

@@ -131,7 +131,7 @@ def test_a_start_is_upright_and_faces_north_however_the_sensor_sits() -> None:
     assert np.abs(rotate(conjugate(q), UP) - upright / 9.81).max() < 1e-12
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @every
 def test_standing_for_30_s_it_stays(algorithm: Algorithm) -> None:
     take = standing(30.0)
@@ -141,7 +141,7 @@ def test_standing_for_30_s_it_stays(algorithm: Algorithm) -> None:
     assert errors(algorithm, q, take.q).max() < 2.0
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @every
 def test_from_28_degrees_off_it_comes_back(algorithm: Algorithm) -> None:
     """The slow ones correct a tenth of a tilt a second, and less of a heading."""

@@ -51,6 +51,7 @@ def test_the_prediction_of_the_extended_filters() -> None:
     assert np.abs(P - 1e-3 * F @ F.T).max() < 1e-15
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("kind", ["gd_plain", "linear", "algebraic", "gd_disturbed"])
 def test_the_derivative_of_a_measured_quaternion(kind: str) -> None:
     """By both sensors."""

@@ -55,6 +55,7 @@ def propagate(x: Floats, error: Floats) -> tuple[Floats, Floats]:
     return x, sums
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("first", "size", "rows", "share"),
     [

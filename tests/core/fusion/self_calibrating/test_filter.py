@@ -42,6 +42,7 @@ def rms_deg(e: Floats) -> Floats:
     return np.asarray(np.degrees(np.sqrt(np.mean(e[SETTLED:] ** 2, axis=0))))
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("seed", range(3))
 def test_tilt_and_heading_are_the_true_ones_and_later_knowledge_helps(seed: int) -> None:
     sensor = moved(seed)
@@ -65,6 +66,7 @@ def test_the_field_does_not_tilt(field: bool) -> None:
     assert rms_deg(off)[:2].max() < 0.6
 
 
+@pytest.mark.sweep
 def test_what_is_wrong_with_the_sensor_is_found_as_surely_as_stated() -> None:
     found = []
     for seed in range(4):
@@ -102,6 +104,7 @@ def test_a_wrong_gyroscope_matrix_is_learnt_from_turns() -> None:
     assert np.diag(again.estimates.gyro_matrix[0]) == pytest.approx(found, abs=1e-4)
 
 
+@pytest.mark.sweep
 def test_a_bias_that_comes_with_shaking_is_found_and_not_taken_for_tilt() -> None:
     """Some tenths of a degree a second while shaken; at rest nothing of it is seen."""
     true, found = np.radians([0.03, -0.025, 0.02]), []
@@ -148,6 +151,7 @@ def test_the_heading_of_the_start_is_as_sure_as_its_noisy_field_and_a_rest_avera
     assert found[1][0] < min(found[1][1], 0.6 * found[0][0])
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("back", [True, False])
 def test_heading_is_surer_where_the_sensor_is_back_at_its_start(back: bool) -> None:
     """The field strays in motion; at the end it is the start's, or that of a place where it is 5° off."""
