@@ -202,7 +202,7 @@ def may_end(access: EmergencyAccess, who: Identity) -> bool:
 
 
 def end_emergency(c: Connection, who: Identity, access_id: str) -> EmergencyAccess:
-    """End an access in an emergency now, and the links that were made in it; one that is over stays as it is.
+    """End an access in an emergency now, and the links that hang on it; one that is over stays as it is.
 
     Raises
     ------
@@ -217,6 +217,7 @@ def end_emergency(c: Connection, who: Identity, access_id: str) -> EmergencyAcce
         mine = emergency_access.c.id == access_id
         c.execute(update(emergency_access).where(mine).values(ended_at=now()))
         report_links.end_of_emergency(c, who, access_id)
+        report_links.end_orphaned(c, who)
         audit.record(c, who, "emergency.ended", "patient", found.patient_id, {"access": access_id})
     return _get_access(c, access_id)
 

@@ -3,7 +3,8 @@
 Whoever has the address may read, so the address holds a random token of 256 bits that is shown once. The
 database keeps its hash and finds it by that: how long this takes tells nothing of the token. What a link
 opens bears a number instead of the patient's code. Who reopens a report ends its links. They also end with
-their maker's account, and as soon as the maker may no longer open the patient (`end_orphaned`).
+their maker's account, and as soon as the maker may no longer read the report (`end_orphaned`); what ends by
+the clock alone, such as an access in an emergency, is asked again whenever a link is opened.
 """
 
 from __future__ import annotations
@@ -12,10 +13,11 @@ import datetime as dt
 from dataclasses import dataclass
 from typing import Final
 
-from sqlalchemy import Connection, insert, select, update
+from sqlalchemy import ColumnElement, Connection, insert, select, update
 
 from server import audit
 from server.auth.identity import Identity
+from server.auth.roles import POLICY, Action
 from server.auth.sight import find_emergency, sees_patient
 from server.auth.tokens import new_token, token_hash
 from server.services import sessions, signed_reports
@@ -137,16 +139,9 @@ def end_of_emergency(c: Connection, actor: audit.Actor | None, access_id: str) -
 
 
 def list_orphaned(c: Connection) -> list[str]:
-    """Return ids of open links whose maker's account is closed or may no longer open the patient."""
-    may_share = user.c.active & sees_patient(session.c.patient_id)
-    query = (
-        select(report_link.c.id)
-        .join(user, user.c.id == report_link.c.maker_id)
-        .join(signed_report, signed_report.c.id == report_link.c.report_id)
-        .join(session, session.c.id == signed_report.c.session_id)
-        .where(report_link.c.revoked_at.is_(None), report_link.c.expires_at > now(), ~may_share)
-    )
-    return list(c.execute(query).scalars())
+    """Return ids of open links whose maker's account is closed or may no longer read the report."""
+    query = _WITH_MAKER.where(report_link.c.revoked_at.is_(None), report_link.c.expires_at > now())
+    return list(c.execute(query.where(~_may_share())).scalars())
 
 
 def end_orphaned(c: Connection, actor: audit.Actor | None) -> None:
@@ -171,6 +166,8 @@ def find_by_token(c: Connection, token: str) -> ReportLink:
     row = c.execute(select(*_COLUMNS).where(report_link.c.token_sha256 == token_hash(token))).first()
     found = None if row is None else ReportLink(**row._asdict())
     if found is None or not found.is_open:
+        raise LinkNotFound
+    if c.execute(_WITH_MAKER.where(report_link.c.id == found.id, ~_may_share())).first():
         raise LinkNotFound
     return found
 
@@ -205,4 +202,17 @@ def of_session(c: Connection, session_id: str) -> list[ReportLink]:
     return [ReportLink(**row._asdict()) for row in rows]
 
 
+def _may_share() -> ColumnElement[bool]:
+    """Whether the maker of a link may read the report now, as a condition of `_WITH_MAKER`."""
+    return user.c.active & user.c.role.in_(_READERS) & sees_patient(session.c.patient_id)
+
+
 _COLUMNS = tuple(report_link.c[name] for name in ReportLink.__dataclass_fields__)
+_READERS: Final = sorted(role.value for role in POLICY[Action.READ_RESULT])
+_WITH_MAKER: Final = (
+    select(report_link.c.id)
+    .join(user, user.c.id == report_link.c.maker_id)
+    .join(signed_report, signed_report.c.id == report_link.c.report_id)
+    .join(session, session.c.id == signed_report.c.session_id)
+)
+"""Ids of links, joined with their makers and sessions."""

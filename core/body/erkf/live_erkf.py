@@ -41,6 +41,17 @@ SETTLED_TILT: Final = radians(3.0)
 """Of gravity in one sample of a foot that stands: the rule's 1.2 m/s² would be 7°, a foot's rest has less."""
 
 
+RESTED_S: Final = 0.1
+"""Into a rest at which its tilt is looked at: a foot that lands or begins to roll is called still as well, up
+to 14° off then."""
+
+
+LOST_TILT: Final = radians(5.0)
+"""Of gravity against the state in a foot's rest, beyond which the state is lost: a sensor that repeated
+itself for 0.1 to 0.5 s in swing is 9 to 75° off, and every path after it half or three times as long; walks
+of simulated people have at most 1.5°, neura_walk 1.6°."""
+
+
 CENTRE_SD_M: Final = 0.03
 """Less than of files (`ErkfParams.people`): with 0.058 m live flexion of neura_walk is 0.1 to 0.3° worse and
 strides of simulated people 8 to 17 mm short instead of 6 short to 8 long."""
@@ -115,13 +126,15 @@ class LiveErkf:
         self._gone, self._adrift = np.zeros(n, np.int64), np.zeros(n, np.bool_)
         linked = {i for j in tree.joints for i in (j.proximal, j.distal)}
         self._alone = frozenset(tree.feet) - linked
+        self._rested, self._look = np.zeros(n, np.int64), max(1, round(RESTED_S * rate_hz))
         self._hold, self._params = round(HOLD_S * rate_hz), params
         self.broken = False
 
     def push(self, signals: SignalBlock) -> tuple[Floats, Floats]:
         """States (T, n, 16) and distances (T, joints) of the ends of each joint; NaN once it is `broken`.
 
-        NaN too is a foot that was lost for long, until it rests again.
+        NaN too is a foot that was lost for long, until it rests again, and for one sample a foot that begins
+        anew because its rest does not fit its path: no distance reaches across that.
         """
         T, n = signals.valid.shape
         output = new_output(self.tree, T)
@@ -138,12 +151,14 @@ class LiveErkf:
         flags = np.empty((T, n), np.uint8)
         _flag(signals.valid, signals.still, self._foot, flags)
         samples = (step, signals.acc, signals.gyr, flags, self._heading, self._rolling)
-        if signals.valid.all() and not self._gone.any() and not self._adrift.any():
+        looks = list(self._looks(signals))
+        whole = signals.valid.all() and not self._gone.any() and not self._adrift.any()
+        if whole and not looks:
             self._filter(samples, output)
             return states, residual
         adrift = np.zeros((T, n), np.bool_)
-        begins = list(self._settles(signals, adrift))
-        for first, past in pairwise(sorted({0, T, *(k for k, _ in begins)})):
+        begins = [] if whole else list(self._settles(signals, adrift))
+        for first, past in pairwise(sorted({0, T, *(k for k, _ in begins), *(k + 1 for k, _ in looks)})):
             for _, i in (x for x in begins if x[0] == first):
                 self._settle(i, signals.acc[first, i], signals.gyr[first, i])
             part = (*(x[first:past] for x in samples[:4]), *samples[4:])
@@ -151,6 +166,10 @@ class LiveErkf:
             if self.broken:
                 states[past:], residual[past:] = np.nan, np.nan
                 break
+            for k, i in (x for x in looks if x[0] == past - 1):
+                if _tilt(states[k, i, 6:10], signals.acc[k, i]) > LOST_TILT:
+                    self._settle(i, signals.acc[k, i], signals.gyr[k, i])
+                    adrift[k, i] = True
         states[adrift] = np.nan
         return states, residual
 
@@ -181,6 +200,20 @@ class LiveErkf:
                         yield k, i
             adrift[k] = self._adrift
 
+    def _looks(self, signals: SignalBlock) -> Iterator[tuple[int, int]]:
+        """Sample and foot where one that hangs on nothing has rested for long enough to be looked at."""
+        for i in sorted(self._alone):
+            still = signals.still[:, i, 0]
+            moving = np.flatnonzero(~still)
+            # samples of its rest up to each one, those of the blocks before included
+            since = np.zeros(len(still), np.int64)
+            since[moving] = moving + 1
+            since = np.maximum.accumulate(since)
+            rested = np.arange(1, len(still) + 1) - since + np.where(since == 0, self._rested[i], 0)
+            if len(rested):
+                self._rested[i] = rested[-1]
+            yield from ((k, i) for k in np.flatnonzero(rested == self._look).tolist())
+
     def _settle(self, i: int, acc: Floats, gyr: Floats) -> None:
         """Begin sensor i anew where it is, at rest: level by gravity, as it faces."""
         memory, m, c = self._memory, self._noise.m, self._params
@@ -198,3 +231,9 @@ class LiveErkf:
                         c.start_acc_bias_sd), 3)[:m]  # fmt: skip
         memory.P[part, part] = np.diag(sd**2)
         memory.before[i], memory.refused[i] = np.concatenate((acc, gyr)), 0
+
+
+def _tilt(q: Floats, acc: Floats) -> float:
+    """Angle between the vertical and what an accelerometer at rest measures, by the sensor's orientation."""
+    force = rotate(q, acc)
+    return float(np.arctan2(np.hypot(force[0], force[1]), force[2]))

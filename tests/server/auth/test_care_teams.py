@@ -163,6 +163,11 @@ def leads(clinic: Clinic, made: dict[str, Any]) -> bool:
             return False
 
 
+def is_revoked(clinic: Clinic, made: dict[str, Any]) -> bool:
+    with clinic.db.read() as c:
+        return report_links.get(c, made["link"]["id"]).revoked_at is not None
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("by", ["locum", "admin"])
 async def test_an_emergency_ends_now_with_its_links(clinic: Clinic, by: str) -> None:
@@ -276,11 +281,44 @@ async def test_links_of_makers_who_had_left_before_an_upgrade_end_at_the_start(t
         made = await share(clinic, "leaver", await sign(clinic, patient))
         with clinic.db.write() as c:
             c.execute(update(user).where(user.c.name == "leaver").values(active=False))
-        assert leads(clinic, made)
+        assert not is_revoked(clinic, made)
         source = clinic.settings.database_source
     command.downgrade(configuration(source), "0021")  # which did not know the makers
     async with open_clinic(tmp_path) as clinic:
+        assert is_revoked(clinic, made)
         assert not leads(clinic, made)
+
+
+@pytest.mark.parametrize("how", ["ended", "by_the_clock", "role"])
+async def test_a_link_of_a_member_ends_with_the_last_access_to_the_report(clinic: Clinic, how: str) -> None:
+    """Who was in the team while an emergency went on made a link of no emergency, and left the team first."""
+    clinic.app.state.throttle = Throttle()
+    code, name = f"Larch-{how}", f"guest-{how}"
+    patient = await add(clinic, code)
+    report = await sign(clinic, patient)
+    await switch(clinic, on=True)
+    access = await open_in_emergency(clinic, name, code)
+    await set_team(clinic, patient, name)
+    made = await share(clinic, name, report)
+    assert made["link"]["emergency_id"] is None
+    if how != "role":
+        await set_team(clinic, patient)
+    assert leads(clinic, made), "the emergency goes on"
+    if how == "ended":
+        async with clinic.client(name) as client:
+            (await client.post(f"{API}/emergency-accesses/{access}/end")).raise_for_status()
+        assert is_revoked(clinic, made)
+    elif how == "by_the_clock":
+        with clinic.db.write() as c:
+            mine = emergency_access.c.id == access
+            c.execute(update(emergency_access).where(mine).values(ends_at=now()))
+    else:
+        async with clinic.client("admin") as client:
+            to = f"{API}/users/{clinic.user(name)}"
+            (await client.patch(to, json={"role": "assistant"})).raise_for_status()
+        assert is_revoked(clinic, made)
+    assert not leads(clinic, made)
+    await switch(clinic, on=False)
 
 
 async def test_an_access_that_ended_meanwhile_does_not_come_back_with_a_backup(clinic: Clinic) -> None:
