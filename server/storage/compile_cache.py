@@ -1,4 +1,4 @@
-"""One folder of compiled filters per user, installation and version of the filters, shared by all its processes.
+"""One folder of compiled filters per user, installation and version of the filters, shared by all processes.
 
 numba compiles a filter at its first call, which takes up to a minute for all of them, and reads it from this
 folder ever after: command line, web server, workers, live estimators, demo and tests use the same one.
@@ -52,7 +52,7 @@ def has_compiled_filters() -> bool:
 
 
 def find_compile_cache(environment: Mapping[str, str], fallback: Path) -> Path:
-    """Return the user's folder for this installation of the filters, made if need be; `fallback` if it cannot be.
+    """Return the user's folder for this installation's filters, made if need be; `fallback` if it cannot be.
 
     Parameters
     ----------
@@ -71,9 +71,9 @@ def find_compile_cache(environment: Mapping[str, str], fallback: Path) -> Path:
 def _name_installation(package: Path) -> str:
     """Return the fingerprint of the filters and of where they lie.
 
-    numba finds a compiled filter by the path of its source. In a folder of several installations of one version
-    the filters of another one would pass for ours: nobody would be told of the wait, and each process would
-    compile by itself, one filter after another.
+    numba finds a compiled filter by the path of its source. In a folder of several installations of a version
+    those of another would pass for ours: nobody would be told of the wait, and each process would compile by
+    itself, one filter after another.
     """
     place = hashlib.sha256(os.fsencode(package.resolve())).hexdigest()[:4]
     return f"{fingerprint_filters(package)}-{place}"
