@@ -32,7 +32,7 @@ from server.report.headline_phrases import (
 )
 from server.report.level import from_standing
 from server.report.table import BEYOND_SD, ParameterRow, TableCell
-from server.report.wording import format_number, parameter_term, printed_difference
+from server.report.wording import format_number, parameter_term, round_difference
 
 Kind = Literal["norm", "limit", "sides", "change"]
 
@@ -323,7 +323,7 @@ def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence |
     side = _side_off_norm(row) if _has_norm(row) else larger if p.names_larger else OTHER[larger]
     if side is None:
         return None
-    apart = printed_difference(row.left.value, row.right.value, parameter_term(name))
+    apart = round_difference(row.left.value, row.right.value, parameter_term(name))
     words = {"d": _number(row, apart), "cm": format_number(100.0 * apart, 0)}
     return _sentence(
         row.name, p.family, "sides", size, p.larger if side == larger else p.smaller, words, side
