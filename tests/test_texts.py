@@ -279,6 +279,10 @@ def test_messages_are_found_in_scripts() -> None:
         ),
         ("0.600 ± 0.030\u202fm, entered", "0,600 ± 0,030\u202fm, eingegeben"),
         (
+            "± 4.2\u202f% (95 %): strides ± 1.0, moments of contact ± 4.1",
+            "± 4,2\u202f% (95 %): Doppelschritte ± 1,0, Zeitpunkte der Kontakte ± 4,1",
+        ),
+        (
             "MCID 8.5°: Guzik et al. 2020 (J Clin Med 9:3305) (children).",
             "MCID 8,5°: Guzik et al. 2020 (J Clin Med 9:3305) (Kinder).",
         ),

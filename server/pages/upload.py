@@ -320,7 +320,7 @@ def _facts(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> li
     return [
         ("Sensors", str(len(own)), f"and {copies} {plural(copies, 'copy', 'copies')}" if copies else ""),
         ("Rate", ", ".join(f"{r:g}" for r in rates) + " Hz", ""),
-        ("Length", seconds(found["duration_s"]), ""),
+        ("Duration", seconds(found["duration_s"]), ""),
         ("Lost samples", f"{number(worst, 1)} %", f"longest gap {gap * 1000:.0f} ms" if gap else ""),
         ("Signals", ", ".join(["acceleration", *signals]), ""),
         ("Units", "m/s², rad/s" if "gyroscope" in signals else "m/s²", _at_rest(still)),

@@ -32,7 +32,7 @@ from server.report.headline_phrases import (
 )
 from server.report.level import from_standing
 from server.report.table import BEYOND_SD, ParameterRow, TableCell
-from server.report.wording import format_number, parameter_term
+from server.report.wording import format_number, parameter_term, round_difference
 
 Kind = Literal["norm", "limit", "sides", "change"]
 
@@ -323,7 +323,8 @@ def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence |
     side = _side_off_norm(row) if _has_norm(row) else larger if p.names_larger else OTHER[larger]
     if side is None:
         return None
-    words = {"d": _number(row, abs(s.difference)), "cm": format_number(100.0 * abs(s.difference), 0)}
+    apart = round_difference(row.left.value, row.right.value, parameter_term(name))
+    words = {"d": _number(row, apart), "cm": format_number(100.0 * apart, 0)}
     return _sentence(
         row.name, p.family, "sides", size, p.larger if side == larger else p.smaller, words, side
     )

@@ -278,15 +278,25 @@ def _signed(value: float, digits: int = 1) -> str:
 NO_DIFFERENCE: Final = "no difference"
 
 
-def difference_words(left: float, right: float, term: Term) -> str:
-    """Left against right in words: "left longer by 0.04 s", "no difference" where the printed values agree.
+def round_difference(left: float, right: float, term: Term) -> float:
+    """How far apart two values are that are printed side by side, so that whoever subtracts them agrees.
 
     Angles are compared in whole degrees: tenths are far below what repeats between visits.
     """
-    digits = 0 if term.unit == "°" else term.digits
+    digits = _difference_digits(term)
     if term.unit != "°":
         left, right = round(left, digits), round(right, digits)
-    shown = round(abs(left - right), digits)
+    return round(abs(left - right), digits)
+
+
+def _difference_digits(term: Term) -> int:
+    return 0 if term.unit == "°" else term.digits
+
+
+def difference_words(left: float, right: float, term: Term) -> str:
+    """Left against right in words: "left longer by 0.04 s", "no difference" where printed values agree."""
+    digits = _difference_digits(term)
+    shown = round_difference(left, right, term)
     if shown == 0:
         return NO_DIFFERENCE
     unit = {"%": " points", "°": "°"}.get(term.unit, f"\u202f{term.unit}")

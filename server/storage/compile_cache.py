@@ -1,4 +1,4 @@
-"""One folder of compiled filters per user and version of the filters, shared by every process of ours.
+"""One folder of compiled filters per user, installation and version of the filters, shared by all processes.
 
 numba compiles a filter at its first call, which takes up to a minute for all of them, and reads it from this
 folder ever after: command line, web server, workers, live estimators, demo and tests use the same one.
@@ -52,20 +52,31 @@ def has_compiled_filters() -> bool:
 
 
 def find_compile_cache(environment: Mapping[str, str], fallback: Path) -> Path:
-    """Return the user's folder for this version of the filters, made if need be; `fallback` if it cannot be.
+    """Return the user's folder for this installation's filters, made if need be; `fallback` if it cannot be.
 
     Parameters
     ----------
     environment : `XDG_CACHE_HOME` and `HOME` are read from it.
     fallback : folder taken where the user's cache folder belongs to somebody else or cannot be written.
     """
-    version = fingerprint_filters(Path(core.__file__ or "").parent)
+    version = _name_installation(Path(core.__file__ or "").parent)
     home = environment.get("XDG_CACHE_HOME") or os.path.join(environment.get("HOME", "/"), ".cache")  # noqa: PTH118
     folder = Path(home) / "sagittal" / f"filters-{version}"
     if not (Path(home).is_absolute() and _is_ours(folder)):
         return fallback / f"filters-{version}"
     _remove_old_versions(folder)
     return folder
+
+
+def _name_installation(package: Path) -> str:
+    """Return the fingerprint of the filters and of where they lie.
+
+    numba finds a compiled filter by the path of its source. In a folder of several installations of a version
+    those of another would pass for ours: nobody would be told of the wait, and each process would compile by
+    itself, one filter after another.
+    """
+    place = hashlib.sha256(os.fsencode(package.resolve())).hexdigest()[:4]
+    return f"{fingerprint_filters(package)}-{place}"
 
 
 def fingerprint_filters(package: Path) -> str:

@@ -52,6 +52,19 @@ def test_a_page_is_german_and_keeps_to_the_design(name: str, opened: Opener, fil
         assert not layout_faults(page) | text_faults(page), f"{width}"
 
 
+def test_scripts_say_in_german_who_a_norm_is_of(opened: Opener, filled: Filled) -> None:
+    """A target of a prescription: the pattern of a group and its source took their number for the group."""
+    page = opened(PAGES["prescription"](filled), locale="de-DE")
+    said = page.evaluate(
+        "async (text) => (await import('/static/js/common/words.js')).translate(text)",
+        "healthy adults asked to walk at this speed, n = 52 (Schreiber & Moissenet 2019 (Sci Data 6:111))",
+    )
+    assert said == (
+        "gesunde Erwachsene, die in diesem Tempo gehen sollten, n = 52 "
+        "(Schreiber & Moissenet 2019 (Sci Data 6:111))"
+    )
+
+
 def test_a_printed_report_is_german_and_stays_on_its_sheets(opened: Opener, filled: Filled) -> None:
     page = opened(PAGES["print"](filled), locale="de-DE")
     page.wait_for_load_state()

@@ -360,6 +360,22 @@ def test_the_fields_of_a_stride_move_its_events_and_refuse_what_cannot_be(
     expect(problem).to_be_hidden()
 
 
+def test_a_stride_whose_contact_was_typed_later_stays_the_one_in_the_fields(timeline: Page) -> None:
+    """The cursor stayed where the contact had been, so the fields were those of the stride before."""
+    pick_counted(timeline)
+    contact = timeline.get_by_label("Contact", exact=True)
+    others = [timeline.get_by_label(name, exact=True).input_value() for name in ("Foot-off", "Next contact")]
+    later = f"{float(contact.input_value()) + 0.05:.3f}"
+    contact.fill(later)
+    contact.press("Enter")
+    done(timeline, "left contact moved")
+    expect(contact).to_have_value(later)
+    expect(contact).to_be_focused()
+    expect(timeline.get_by_label("Foot-off", exact=True)).to_have_value(others[0])
+    expect(timeline.get_by_label("Next contact", exact=True)).to_have_value(others[1])
+    expect(timeline.locator("#h-stride")).to_have_text(f"Left stride, {float(later):.2f} s")
+
+
 def test_zooming_and_moving_keep_all_lanes_and_the_table_together(timeline: Page) -> None:
     span = timeline.locator("[data-span]")
     first = span.inner_text()

@@ -89,13 +89,14 @@ WORDS: Final = frozenset(
     assistant away back bad bar barefoot bars baseline before below both bouts cane centimetres changed
     chest children clinician complementary consistent copies copy crutch days degrees directions down
     early ended entered estimated exact fading failed fast faster feet female flexion foot forward
-    frontal further good gravity harness heading higher hip inclination inconsistent inside insoles
-    inward kinematic knee larger late left less limits longer low lower male mean measured median months
-    more moving narrower no none norm norms now off on outward pace pass paused pelvis points poor probe
-    push-off reconstruction redo repetitions revoked rhythm right rollator sagittal shank shoes shorter
-    silent slow slower smaller socks squat squats step steps steps/min stick still stopped straighter
-    stride strides tests thigh threshold training trainings transverse treadmill trunk turns unaffected
-    unknown up usable viewer walk walking week wider works yes
+    frontal further good gravity gyroscope harness heading higher hip inclination inconsistent inside
+    insoles inward kinematic knee larger late left less limits longer low lower magnetometer male mean
+    measured median months more moving narrower no none norm norms now off on orientation outward pace
+    pass paused pelvis points poor probe push-off reconstruction redo repetitions revoked rhythm right
+    rollator sagittal shank shoes shorter silent slow slower smaller socks squat squats step steps
+    steps/min stick still stopped straighter stride strides tests thigh threshold training trainings
+    transverse treadmill trunk turns unaffected unknown up usable viewer walk walking week wider works
+    yes
         """,
     )
 )
@@ -119,6 +120,8 @@ PHRASES: Final = (
     "MCID {limit}: {source} ({people}).",
     "MCID {limit}: {source}.",
     "{group} ({source})",
+    "{group}, n = {people} ({source})",
+    "moments of contact ± {value}",
     "mean + 2 SD, {source}",
     "mean − 2 SD, {source}",
     "left {left}, right {right}",

@@ -118,3 +118,14 @@ def classes_in(texts: Iterator[str] | list[str]) -> Iterator[str]:
             yield from written.split()
         if WORDS.fullmatch(text):
             yield from text.split()
+
+
+def test_only_links_are_underlined_under_the_pointer() -> None:
+    """A fold that shares a class with plain links was underlined as a whole, fields and all."""
+    found: list[str] = []
+    for sheet in WEB.rglob("*.css"):
+        for selectors, rules in re.findall(r"([^{};]+:hover)\s*\{([^{}]*)\}", sheet.read_text()):
+            if "text-decoration: underline" in rules:
+                found += [s.strip() for s in selectors.split(",")]
+    assert found
+    assert [s for s in found if not re.search(r"\ba(\.[\w-]+)?:hover$", s)] == []

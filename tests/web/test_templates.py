@@ -69,3 +69,14 @@ def test_macros_that_use_nothing_of_a_page_are_made_once() -> None:
         used = meta.find_undeclared_variables(env.parse(source)) - env.globals.keys()
         assert used <= SET_WITHIN.get(name, set()), f"{name} uses what its page has"
         assert not any(with_context for _, with_context in IMPORT.findall(source))
+
+
+def test_no_page_takes_the_name_by_which_the_navigation_knows_where_it_is() -> None:
+    """The page of algorithms called its own address so, and no entry of the navigation was marked."""
+    assert [p.name for p in TEMPLATES if re.search(r"{%-? set here\b", p.read_text())] == []
+
+
+def test_a_unit_stands_on_the_line_of_the_last_word() -> None:
+    """A degree sign alone on a line of its own, in the narrow columns of the values."""
+    macros = load_templates("en").env.get_template("_params.html").module
+    assert str(macros.unit("°")).startswith("&nbsp;<span")  # type: ignore[attr-defined]

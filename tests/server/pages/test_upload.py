@@ -12,6 +12,7 @@ import pytest
 from server.pages.upload import fits_movement, view_inspection
 from server.services.devices import LastPlaces
 from server.services.recordings import StoredRecording
+from web.language import load_catalogue
 
 
 def device(name: str, part: str | None = None, leg: int | None = None, **more: Any) -> dict[str, Any]:
@@ -134,6 +135,15 @@ def test_copies_are_said_in_one_sentence_and_not_used() -> None:
     assert notice["title"] == "2 sensors are copies of others"
     assert "“A2” of “A”, “B2” of “B”" in notice["message"]
     assert ("Sensors", "4", "and 2 copies") in view["facts"]
+
+
+def test_what_was_found_is_german_too() -> None:
+    """The length of a take was called by the word for a length of the body, its signals stayed English."""
+    facts = view_inspection(recording([device("A", has_mag=True, has_orientation=True)]), {})["facts"]
+    say = load_catalogue("de").translate
+    german = {say(name): say(value) for name, value, _ in facts}
+    assert german["Dauer"] == "25,0 s"
+    assert german["Signale"] == "Beschleunigung, Gyroskop, Magnetometer, Orientierung"
 
 
 def test_grave_notices_come_first_and_only_once() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from string import Formatter
 
@@ -64,6 +65,26 @@ def test_a_side_that_differs_is_named_with_the_difference() -> None:
     norms = norm("knee_flexion_max_swing_deg", 60.0, 5.0, apart=3.0)
     told = said(norms, *both_sides("knee_flexion_max_swing_deg", 42.0, 60.0))
     assert told == ["The left knee bends 18° less in swing than the right"]
+
+
+@pytest.mark.parametrize(
+    ("name", "left", "right"),
+    [("stance_pct", 59.94, 73.46), ("step_time_s", 0.4951, 0.7449), ("circumduction_m", 0.0994, 0.0445)],
+)
+def test_the_difference_is_that_of_the_values_as_they_are_printed(
+    name: str, left: float, right: float
+) -> None:
+    """The headline said 13.5 points where the row below it said 59.9, 73.5 and "shorter by 13.6"."""
+    norms = Norms(None, None)
+    parameters = both_sides(name, left, right, sd=0.001)
+    (row,) = parameter_rows(parameters, norms)
+    by = re.search(r"by ([\d.]+)", row.difference)
+    (told,) = said(norms, *parameters)
+    spoken = re.search(r"([\d.]+) (points|s|cm)", told)
+    assert by is not None
+    assert spoken is not None
+    shown = float(by[1]) * (100.0 if spoken[2] == "cm" else 1.0)
+    assert float(spoken[1]) == pytest.approx(shown, abs=0.5 if spoken[2] == "cm" else 1e-9)
 
 
 def test_sides_within_what_healthy_sides_differ_by_are_not_told() -> None:

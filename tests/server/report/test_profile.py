@@ -9,6 +9,7 @@ from server.report.profile import TOTALS, profile_view
 from server.report.trends import collect_figures
 from tests.server.report.conftest import MakeBundle
 from tests.server.report.test_estimator import section
+from web.language import load_catalogue
 
 
 def test_every_scored_curve_has_a_bar_and_the_profile_comes_last(make_bundle: MakeBundle) -> None:
@@ -32,6 +33,8 @@ def test_what_it_leaves_out_and_compares_with_is_said(make_bundle: MakeBundle) -
     profile = report_model(make_bundle()).profile
     assert profile is not None
     assert "There is no GPS" in profile.note
+    german = load_catalogue("de").translate(profile.note)
+    assert "Es gibt keinen GPS: Beckenrotation, Fußstellung zur Gehrichtung (nicht gemessen: " in german
     assert "42 healthy adults" in profile.note
     assert profile.index.startswith("GDI*, sagittal: left ")
 

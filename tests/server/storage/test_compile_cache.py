@@ -90,6 +90,23 @@ def test_versions_that_nobody_uses_any_more_are_removed(tmp_path: Path) -> None:
     assert young.exists()
 
 
+def test_two_installations_of_one_version_have_folders_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A second installation took the filters of the first for its own and compiled for minutes in silence."""
+    folders = set()
+    for name in ("one", "two"):
+        package = tmp_path / name / "core"
+        package.mkdir(parents=True)
+        (package / "kernel.py").write_text(FILTER)
+        monkeypatch.setattr("core.__file__", str(package / "__init__.py"))
+        folder = find_compile_cache(os.environ, tmp_path)
+        (folder / "core_0").mkdir()
+        (folder / "core_0" / "kernel.nbi").write_bytes(b"")
+        folders.add(folder)
+    assert len(folders) == 2
+
+
 def test_the_version_changes_with_every_source_a_filter_is_made_of(tmp_path: Path) -> None:
     (tmp_path / "events").mkdir()
     sources = {"events/kernel.py": FILTER, "frames.py": "G = 9.81\n", "angles.py": "", "report.py": ""}

@@ -29,10 +29,15 @@ class Clock extends EventTarget {
     return (100 * (this.t - s.start_s)) / (s.end_s - s.start_s);
   }
 
-  // Another stride list, as a correction gives it; the time stays.
+  // Another stride list, as a correction gives it. The stride that was picked, known by its middle, stays picked, also
+  // when its contact is moved past the moment that is shown; the moment then goes with it.
   load(strides) {
+    const before = this.stride;
+    const middle = before ? (before.start_s + before.end_s) / 2 : NaN;
+    const same = strides.find((s) => s.side === before?.side && middle >= s.start_s && middle < s.end_s);
+    if (same && this.t >= before.start_s && this.t < same.start_s) this.t = same.start_s;
     this.strides = strides;
-    this.stride = this.at(this.t) ?? strides.find((s) => s.start_s >= this.t) ?? strides.at(-1) ?? null;
+    this.stride = same ?? this.at(this.t) ?? strides.find((s) => s.start_s >= this.t) ?? strides.at(-1) ?? null;
     this.dispatchEvent(new Event("tick"));
   }
 
