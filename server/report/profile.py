@@ -228,7 +228,7 @@ def _note(scores: Scores) -> str:
     gps = scores.find("gps_deg", MODE, "left")
     missing = [LABELS.get(v, v.replace("_", " ").capitalize()).lower() for v in gps.missing]
     without = (
-        f" There is no GPS: {', '.join(missing)} {reason_words(gps.reason)}."
+        f"There is no GPS ({reason_words(gps.reason)}): {', '.join(missing)}."
         if gps.value is None and missing
         else ""
     )
@@ -237,8 +237,9 @@ def _note(scores: Scores) -> str:
         if scores.speed_matched
         else f"{scores.reference_n} healthy adults at their own comfortable speed"
     )
-    return (
+    drawn = (
         f"Root mean square distance of each mean curve from that of {people}. The level of each curve is "
         "removed, because angles start from the person's standing. Dark to the 75th, light to the 95th "
-        f"percentile of these adults, their median as a line.{without} {scores.source}."
+        "percentile of these adults, their median as a line."
     )
+    return " ".join(part for part in (drawn, without, f"{scores.source}.") if part)

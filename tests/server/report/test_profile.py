@@ -9,6 +9,7 @@ from server.report.profile import TOTALS, profile_view
 from server.report.trends import collect_figures
 from tests.server.report.conftest import MakeBundle
 from tests.server.report.test_estimator import section
+from web.language import load_catalogue
 
 
 def test_every_scored_curve_has_a_bar_and_the_profile_comes_last(make_bundle: MakeBundle) -> None:
@@ -34,6 +35,15 @@ def test_what_it_leaves_out_and_compares_with_is_said(make_bundle: MakeBundle) -
     assert "There is no GPS" in profile.note
     assert "42 healthy adults" in profile.note
     assert profile.index.startswith("GDI*, sagittal: left ")
+
+
+def test_why_there_is_no_profile_score_is_said_in_german(make_bundle: MakeBundle) -> None:
+    profile = report_model(make_bundle()).profile
+    assert profile is not None
+    said = load_catalogue("de").translate(profile.note)
+    missing = next(s for s in said.split(". ") if "GPS" in s)
+    assert missing.startswith("Es gibt keinen GPS (nicht gemessen: "), missing
+    assert "Beckenrotation" in missing, missing
 
 
 def test_estimated_angles_are_not_scored(make_bundle: MakeBundle) -> None:
