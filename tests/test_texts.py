@@ -354,6 +354,12 @@ def test_a_level_that_an_estimator_lowers_is_said(language: str) -> None:
     assert [s for s in (*JUDGED.values(), PATH_JUDGED) if load_catalogue(language).find(s) is None] == []
 
 
+def test_a_sum_in_a_sentence_is_one_value() -> None:
+    few = "3 steps were found, nowhere 6 without a break: no walking bout is reported. Record a longer walk."
+    assert DE.translate(few).startswith("3 Schritte wurden gefunden, nirgends 6 ohne Pause:")
+    assert DE.translate("Day 3") == "Tag 3"
+
+
 def test_what_a_helper_refuses_is_said_as_a_whole() -> None:
     refused = (
         "left thigh: it bends about an axis 81° off the agreed one; limit 35°. Put the sensor on as agreed, "

@@ -329,6 +329,8 @@ def _parts(node: ast.AST, names: list[str]) -> list[tuple[str, ...]]:
             return [part for value in node.values for part in parts(value)]
         case ast.FormattedValue():
             return parts(node.value)
+        case ast.BinOp(op=ast.Add(), right=ast.Constant(value=int())):
+            return parts(node.left)  # a number further on is a number
         case ast.BinOp(op=ast.Add()):
             return [*parts(node.left), *parts(node.right)]
         case ast.IfExp(body=one, orelse=other) | ast.Call(func=ast.Name(id="plural"), args=[_, one, other]):
