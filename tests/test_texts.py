@@ -12,6 +12,7 @@ from babel.messages.pofile import read_po
 from core.frames import SIDES
 from core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES
 from server.report.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
+from server.report.level import STANDING, define_parameter
 from server.report.wording import JUDGED, PATH_JUDGED, REASONS, reason_words
 from tests.data import ROOT
 from tests.helpers.texts import STAYS_ENGLISH, list_messages, python_texts, script_texts
@@ -338,6 +339,15 @@ def test_what_every_figure_is_is_said(language: str) -> None:
     entries = (*CATALOGUE.values(), *LIMIT_FIGURES.values())
     said = {e.definition: catalogue.find(e.definition) for e in entries if e.definition}
     assert [text for text, other in said.items() if other in (None, text)] == []
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_what_a_figure_from_the_anatomical_zero_is_is_said(language: str) -> None:
+    catalogue = load_catalogue(language)
+    names = [n for n, e in CATALOGUE.items() if STANDING in e.definition and n.endswith("_deg")]
+    said = [define_parameter(f"{name.removesuffix('_deg')}_anatomical_deg") for name in names]
+    assert said
+    assert [text for text in said if catalogue.find(text) in (None, text)] == []
 
 
 @pytest.mark.parametrize("language", OTHERS)

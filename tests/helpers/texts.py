@@ -14,6 +14,7 @@ from typing import Final
 from babel.messages.catalog import Catalog
 from babel.messages.pofile import read_po, write_po
 
+from server.report.level import ANATOMICAL, STANDING
 from tests.data import ROOT
 from web.language import CITED, LANGUAGES, SOURCE, catalogue_path
 from web.template_texts import has_words, list_texts, reads_like_text
@@ -209,6 +210,9 @@ def list_messages() -> dict[str, list[str]]:
         found.setdefault(word, []).append("tests/helpers/texts.py")
     for phrase in PHRASES:
         found.setdefault(phrase, ["tests/helpers/texts.py"])
+    # what a figure is, where a goniometer gave the zero (server/report/level.py)
+    for message in [m for m in found if m.endswith(f", {STANDING}.")]:
+        found.setdefault(message.replace(STANDING, ANATOMICAL), found[message])
     for beginning in UNMEASURED:
         for message in [m for m in found if m.startswith(beginning)]:
             found.setdefault(message.removeprefix(beginning), found[message])
