@@ -9,7 +9,11 @@ from typing import Final
 import pytest
 from babel.messages.pofile import read_po
 
+from core.frames import SIDES
+from core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES
 from server.report.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
+from server.report.level import STANDING, define_parameter
+from server.report.wording import JUDGED, PATH_JUDGED, REASONS, reason_words
 from tests.data import ROOT
 from tests.helpers.texts import STAYS_ENGLISH, list_messages, python_texts, script_texts
 from web.language import (
@@ -331,6 +335,54 @@ def test_a_long_text_costs_no_more_than_its_sentences() -> None:
     """A text of many parts is looked for in sentences; patterns on all of it would take minutes."""
     text = "The cat sat, and the dog; and a fox, or a hen: no, " * 100
     assert DE.find(text) is None
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_what_every_figure_is_is_said(language: str) -> None:
+    catalogue = load_catalogue(language)
+    entries = (*CATALOGUE.values(), *LIMIT_FIGURES.values())
+    said = {e.definition: catalogue.find(e.definition) for e in entries if e.definition}
+    assert [text for text, other in said.items() if other in (None, text)] == []
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_what_a_figure_from_the_anatomical_zero_is_is_said(language: str) -> None:
+    catalogue = load_catalogue(language)
+    names = [n for n, e in CATALOGUE.items() if STANDING in e.definition and n.endswith("_deg")]
+    said = [define_parameter(f"{name.removesuffix('_deg')}_anatomical_deg") for name in names]
+    assert said
+    assert [text for text in said if catalogue.find(text) in (None, text)] == []
+
+
+@pytest.mark.parametrize("language", OTHERS)
+@pytest.mark.parametrize("side", SIDES)
+def test_why_one_side_has_no_number_is_said(language: str, side: str) -> None:
+    """The table puts the side before the reason where the other side has a number."""
+    catalogue = load_catalogue(language)
+    named = [f"{side} {reason_words(code)}" for code in (None, *REASONS)]
+    assert [text for text in named if side in (catalogue.find(text) or side)] == []
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_a_level_that_an_estimator_lowers_is_said(language: str) -> None:
+    assert [s for s in (*JUDGED.values(), PATH_JUDGED) if load_catalogue(language).find(s) is None] == []
+
+
+def test_a_sum_in_a_sentence_is_one_value() -> None:
+    few = "3 steps were found, nowhere 6 without a break: no walking bout is reported. Record a longer walk."
+    assert DE.translate(few).startswith("3 Schritte wurden gefunden, nirgends 6 ohne Pause:")
+    assert DE.translate("Day 3") == "Tag 3"
+
+
+def test_what_a_helper_refuses_is_said_as_a_whole() -> None:
+    refused = (
+        "left thigh: it bends about an axis 81° off the agreed one; limit 35°. Put the sensor on as agreed, "
+        "or calibrate from the table."
+    )
+    assert DE.translate(refused) == (
+        "Oberschenkel links: es beugt um eine Achse, die 81° von der vereinbarten abweicht; Grenze 35°. "
+        "Legen Sie den Sensor an wie vereinbart, oder kalibrieren Sie vom Tisch."
+    )
 
 
 def test_english_says_what_the_sources_say() -> None:

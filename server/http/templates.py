@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Mapping, MutableMapping
 from contextlib import suppress
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
@@ -119,6 +120,7 @@ def load_templates(language: str) -> Jinja2Templates:
     templates.env.globals["plural"] = plural
     templates.env.globals["languages"] = LANGUAGES
     templates.env.globals["language"] = language
+    templates.env.globals["makes_pdf"] = find_spec("weasyprint") is not None
     templates.env.globals["ASSUMED_HEIGHT"] = f"{NOMINAL_HEIGHT_M:.2f} m"
     return templates
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Final
 
@@ -22,6 +21,7 @@ from core.quality.devices import check_device, is_serial
 from core.scores import CurveMeans, Scores, score_curves
 from server.report.columns import SCHEMA, list_turns, reduce_to_plain
 from server.report.estimator import list_estimated_variables
+from server.report.wording import JUDGED, PATH_JUDGED
 
 if TYPE_CHECKING:
     # these packages bring numba, which the web process does without
@@ -75,19 +75,6 @@ def _quality(analysis: TakeAnalysis) -> dict[str, object]:
     judged = PATH_JUDGED if concern_paths_alone(bad) else JUDGED.get(verdict)
     reasons = [*analysis.quality.reasons, *([] if judged is None else [judged])]
     return {**found, "level": level, "signals_level": analysis.quality.level, "reasons": reasons}
-
-
-JUDGED: Final[Mapping[str | None, str]] = {
-    "warn": "The pose estimator doubts part of its result.",
-    "bad": "The sensors contradict each other: the pose estimator cannot stand behind its result.",
-}
-"""Verdict of the estimator → reason of the level."""
-
-
-PATH_JUDGED: Final = (
-    "The path of a foot does not fit its rests on the floor: the estimator cannot stand behind its distances."
-)
-"""The same where nothing but the path of a foot is bad."""
 
 
 def _devices(analysis: TakeAnalysis) -> list[dict[str, object]]:

@@ -22,6 +22,9 @@ GROUP = "Angles from the anatomical zero"
 STANDING: Final = "from the person's own standing"
 """Words of definitions that do not hold for an anatomical angle."""
 
+ANATOMICAL: Final = "from the anatomical zero"
+"""Words in their place."""
+
 _SUFFIX: Final = "_anatomical_deg"
 
 
@@ -35,7 +38,7 @@ def define_parameter(name: str) -> str:
     entry = find_entry(from_standing(name) or name)
     if entry is None or from_standing(name) is None:
         return "" if entry is None else entry.definition
-    return entry.definition.replace(STANDING, "from the anatomical zero")
+    return entry.definition.replace(STANDING, ANATOMICAL)
 
 
 def label_parameter(name: str) -> str:

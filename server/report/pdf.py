@@ -28,7 +28,7 @@ MISSING: Final = (
 class PdfMissing(SagittalError):  # noqa: N818 - says what is missing
     """The library that makes PDFs is not installed."""
 
-    status = 501
+    status = 404
 
     def __init__(self) -> None:
         super().__init__("pdf_missing", MISSING)

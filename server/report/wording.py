@@ -301,3 +301,15 @@ def difference_words(left: float, right: float, term: Term) -> str:
         return NO_DIFFERENCE
     unit = {"%": " points", "°": "°"}.get(term.unit, f"\u202f{term.unit}")
     return f"left {term.comparison[0 if left > right else 1]} by {format_number(shown, digits)}{unit}"
+
+
+JUDGED: Final[Mapping[str | None, str]] = {
+    "warn": "The pose estimator doubts part of its result.",
+    "bad": "The sensors contradict each other: the pose estimator cannot stand behind its result.",
+}
+"""Verdict of the estimator → reason of the level."""
+
+PATH_JUDGED: Final = (
+    "The path of a foot does not fit its rests on the floor: the estimator cannot stand behind its distances."
+)
+"""The same where nothing but the path of a foot is bad."""

@@ -14,15 +14,16 @@ from typing import Final
 from babel.messages.catalog import Catalog
 from babel.messages.pofile import read_po, write_po
 
+from server.report.level import ANATOMICAL, STANDING
 from tests.data import ROOT
 from web.language import CITED, LANGUAGES, SOURCE, catalogue_path
 from web.template_texts import has_words, list_texts, reads_like_text
 
 SAID: Final = re.compile(
-    r"^(Notice|_notify|Problem|Offer|SignalError|CalibrationError|EstimationError"
+    r"^(Notice|_notify|_refuse|Problem|Offer|SignalError|CalibrationError|EstimationError"
     r"|ServiceError|NotFound|NotAllowed|Conflict|TooLarge|__init__|KeyUnusable|ValueUnreadable)$"
 )
-"""Classes whose arguments pages show, wherever they are made."""
+"""Classes, and what makes them, whose arguments pages show, wherever they are made."""
 
 WHOLE: Final = (
     "core/agreement/tell.py",
@@ -125,6 +126,10 @@ PHRASES: Final = (
     "mean + 2 SD, {source}",
     "mean − 2 SD, {source}",
     "left {left}, right {right}",
+    "{side} not measured: {why}",
+    "{side} withheld: {why}",
+    "{side} not measured by two sensors",
+    "{side} not measured",
     "{name} left",
     "{name} right",
     "{side} stride, {start_s} to {end_s} s",
@@ -162,8 +167,8 @@ NOT_WORDS: Final = re.compile(
 
 SENTENCE: Final = re.compile(r"(?=(\S+ ){3})[A-Z{“].*\.$", re.DOTALL)
 
-UNMEASURED: Final = "not measured: "
-"""How a reason begins; in lists it stands without."""
+UNMEASURED: Final = ("not measured: ", "withheld: ")
+"""How a reason begins; in lists and beside a side's name it stands without."""
 
 _CODE: Final = frozenset(
     re.findall(
@@ -201,12 +206,19 @@ def list_messages() -> dict[str, list[str]]:
             if name in SPEAKS or not any(_is_in(name, silent) for silent in STAYS_ENGLISH):
                 whole = any(_is_in(name, place) for place in WHOLE)
                 keep(python_texts(path.read_text("utf-8"), whole=whole), path)
+            elif _is_in(name, "core/formats"):
+                # its notices are called something above their English sentence
+                keep(titles_of(ast.parse(path.read_text("utf-8"))), path)
     for word in sorted(WORDS):
         found.setdefault(word, []).append("tests/helpers/texts.py")
     for phrase in PHRASES:
         found.setdefault(phrase, ["tests/helpers/texts.py"])
-    for message in [m for m in found if m.startswith(UNMEASURED)]:
-        found.setdefault(message.removeprefix(UNMEASURED), found[message])
+    # what a figure is, where a goniometer gave the zero (server/report/level.py)
+    for message in [m for m in found if m.endswith(f", {STANDING}.")]:
+        found.setdefault(message.replace(STANDING, ANATOMICAL), found[message])
+    for beginning in UNMEASURED:
+        for message in [m for m in found if m.startswith(beginning)]:
+            found.setdefault(message.removeprefix(beginning), found[message])
     return found
 
 
@@ -239,12 +251,7 @@ def python_texts(source: str, *, whole: bool) -> Iterator[str]:
     tree = ast.parse(source)
     no_text = set(_no_texts(tree))
     calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and SAID.match(_name(n.func))]
-    for call in calls:
-        codes = (a.value for a in call.args if isinstance(a, ast.Constant) and isinstance(a.value, str))
-        code = next(codes, "")
-        if re.fullmatch(r"[a-z][a-z_]{2,}", code):
-            # a notice without a title of its own is called by its code
-            yield code.replace("_", " ").capitalize()
+    yield from titles_of(tree)
     made = set() if whole else {id(node) for call in calls for node in ast.walk(call)}
     for node in ast.walk(tree):
         if id(node) not in no_text and _is_text(node):
@@ -253,6 +260,16 @@ def python_texts(source: str, *, whole: bool) -> Iterator[str]:
                 told_here = whole or id(node) in made or (bool(calls) and SENTENCE.match(message))
                 if told_here and reads_like_text(message) and has_words(message):
                     yield message
+
+
+def titles_of(tree: ast.AST) -> Iterator[str]:
+    """What notices without a title of their own are called, by their codes."""
+    for call in ast.walk(tree):
+        if isinstance(call, ast.Call) and SAID.match(_name(call.func)):
+            codes = (a.value for a in call.args if isinstance(a, ast.Constant) and isinstance(a.value, str))
+            code = next(codes, "")
+            if re.fullmatch(r"[a-z][a-z_]{2,}", code):
+                yield code.replace("_", " ").capitalize()
 
 
 def _between_tags(told: str) -> list[str]:
@@ -319,6 +336,8 @@ def _parts(node: ast.AST, names: list[str]) -> list[tuple[str, ...]]:
             return [part for value in node.values for part in parts(value)]
         case ast.FormattedValue():
             return parts(node.value)
+        case ast.BinOp(op=ast.Add(), right=ast.Constant(value=int())):
+            return parts(node.left)  # a number further on is a number
         case ast.BinOp(op=ast.Add()):
             return [*parts(node.left), *parts(node.right)]
         case ast.IfExp(body=one, orelse=other) | ast.Call(func=ast.Name(id="plural"), args=[_, one, other]):

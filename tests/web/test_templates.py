@@ -48,6 +48,13 @@ def test_a_text_of_many_lines_has_a_limit_that_cuts_nothing(path: Path) -> None:
         assert "maxlength=" not in area, area
 
 
+@pytest.mark.parametrize("path", TEMPLATES, ids=lambda p: p.name)
+def test_sentences_are_shown_one_by_one(path: Path) -> None:
+    """Joined, one that begins with a small letter is taken for the end of the one before."""
+    joined = re.findall(r"(?<!\"){{[^{}]*\| join\(' '\) }}", path.read_text())
+    assert joined == []
+
+
 def test_every_part_is_used() -> None:
     text = "\n".join(path.read_text() for path in TEMPLATES)
     unused = [p.name for p in TEMPLATES if p.name.startswith("_") and f'"{p.name}"' not in text]

@@ -32,7 +32,7 @@ ENTRIES: Final = (
         scale=(0, 15),
         comparison=SIZE,
         definition=(
-            "Phase coordination index (Plotnik 2007): how far and how variably the step times depart from "
+            "Phase coordination index (Plotnik 2007), how far and how variably the step times depart from "
             "half of the stride; 0 is perfectly alternating."
         ),
         needs=("other_foot", "foot_off"),

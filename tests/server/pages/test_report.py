@@ -18,6 +18,7 @@ import pypdfium2
 import pytest
 import sqlalchemy as sa
 
+from server.http.templates import TEMPLATES
 from server.report.pdf import PdfMissing, render_pdf
 from server.services import report_links
 from server.services.signed_reports import ASSESSMENT_CHARACTERS
@@ -199,7 +200,24 @@ def test_without_the_library_the_answer_says_what_to_install(monkeypatch: pytest
     monkeypatch.setitem(sys.modules, "weasyprint", None)
     with pytest.raises(PdfMissing, match=r"sagittal\[pdf\].*libpango") as refused:
         render_pdf("<p>Nothing</p>")
-    assert refused.value.status == 501
+    assert refused.value.status == 404
+
+
+async def test_a_server_without_the_library_offers_no_pdf(
+    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    patient, session = await visit(clinic, "S-8")
+    pages = [f"/sessions/{session}/{page}" for page in ("report", "print", "leaflet")]
+    environment = TEMPLATES["en"].env
+    monkeypatch.setattr(environment, "cache", None)  # a template keeps the globals it was loaded with
+    async with clinic.client("clinician") as client:
+        for there in (True, False):
+            monkeypatch.setitem(environment.globals, "makes_pdf", there)
+            for page in (*pages, f"/patients/{patient}/course"):
+                answer = await client.get(page)
+                assert answer.status_code == 200
+                assert bool(re.search(r"href=\"[^\"]*\.pdf", answer.text)) is there, page
+                assert (page != pages[0]) or (("choose PDF as the printer" in answer.text) is not there)
 
 
 @pytest.mark.slow
