@@ -47,8 +47,11 @@ class StuckParams:
     clipped_s : time at the end of the range, beyond `clipped_share` of the time around it. A heel that
         strikes beyond the range stays there for some milliseconds, 3 % of a stride at most.
     frozen_s : a whole sensor repeats one sample that is none of rest (rest_acc, rest_gyr from gravity and
-        zero). resting_s : a whole accelerometer or gyroscope repeats any one while another sensor moves: a
-        foot stands for long, a real one not for so long without a single new value.
+        zero), `fewest` times at least. Good recordings never repeat one, and rounded to 0.1 m/s² and 1°/s
+        none for so long. The same of a sample of rest is known at its end, where the next one turns faster
+        than jump_gyr: nobody goes off like that. resting_s : a whole accelerometer or gyroscope repeats any
+        one while another sensor moves: a foot stands for long, a real one not for so long without a single
+        new value.
     looped_s : a whole sensor repeats its last samples. packet_s : longest piece that is looked for.
     """
 
@@ -61,12 +64,22 @@ class StuckParams:
     clipped_share: float = 0.05
     acc_floor: float = 1.9 * GRAVITY
     gyr_floor: float = float(np.radians(245.0))
-    frozen_s: float = 0.5
+    frozen_s: float = 0.05
+    fewest: int = 3
+    jump_gyr: float = 1.0
     resting_s: float = 5.0
     rest_acc: float = 1.5
     rest_gyr: float = 0.3
     looped_s: float = 1.0
     packet_s: float = 0.5
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _rests(x, gravity, rest_acc, rest_gyr):  # type: ignore[no-untyped-def]
+    """Whether a sample (6,) is one of a sensor at rest."""
+    force = np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2)
+    rate = np.sqrt(x[3] ** 2 + x[4] ** 2 + x[5] ** 2)
+    return abs(force - gravity) < rest_acc and rate < rest_gyr
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
@@ -89,7 +102,7 @@ def _watch(  # type: ignore[no-untyped-def]
     """
     share, moving_acc, moving_gyr, dead, change, clipped, relief = limits[:7]
     acc_floor, gyr_floor, frozen, resting, rest_acc, rest_gyr, looped = limits[7:14]
-    gravity = limits[14]
+    gravity, jump = limits[14], limits[15]
     T, n = valid.shape
     P = ring.shape[1]
     x = np.empty(6)
@@ -117,6 +130,7 @@ def _watch(  # type: ignore[no-untyped-def]
                 equal[c] = x[c] == last[i, c]
                 whole = whole and equal[c]
             # a whole sensor that repeats one sample
+            before = same[i]
             same[i] = same[i] + 1 if whole else 0
             elsewhere = movers - moving[i] > 0
             for t in range(2):
@@ -125,12 +139,20 @@ def _watch(  # type: ignore[no-untyped-def]
                 else:
                     others[i, t] = 0
                     others_begun[i, t] = at
-            force = np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2)
             rate = np.sqrt(x[3] ** 2 + x[4] ** 2 + x[5] ** 2)
-            rests = abs(force - gravity) < rest_acc and rate < rest_gyr
+            rests = _rests(x, gravity, rest_acc, rest_gyr)
             if kind[i] == 0 and ((same[i] >= frozen and not rests) or others[i].min() >= resting):
                 bad[k, i] = 3
                 back[k, i] = same[i]
+            elif (
+                kind[i] == 0
+                and before >= frozen
+                and not whole
+                and rate > jump
+                and _rests(last[i], gravity, rest_acc, rest_gyr)
+            ):
+                bad[k, i] = 3
+                back[k, i] = before
             # a whole sensor that repeats its last samples
             j = place[0] - 1
             for p in range(1, P):
@@ -218,8 +240,8 @@ class StuckWatch:
             [
                 1.0 - np.exp(-1.0 / (p.smooth_s * rate_hz)), p.moving_acc, p.moving_gyr, p.dead_s * rate_hz,
                 p.change, p.clipped_s * rate_hz, p.clipped_share, p.acc_floor, p.gyr_floor,
-                p.frozen_s * rate_hz, p.resting_s * rate_hz, p.rest_acc, p.rest_gyr, p.looped_s * rate_hz,
-                GRAVITY,
+                max(p.frozen_s * rate_hz, p.fewest), p.resting_s * rate_hz, p.rest_acc, p.rest_gyr,
+                p.looped_s * rate_hz, GRAVITY, p.jump_gyr,
             ]
         )  # fmt: skip
         each = (n, CHANNELS)

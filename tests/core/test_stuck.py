@@ -347,3 +347,21 @@ def test_a_thigh_that_stops_measuring_live_has_no_angles_from_then_on() -> None:
     late = [s for f in frames for s in f.strides if s.side == "left" and s.start_s > known_at]
     assert late
     assert all(s.values["knee_flexion_rom_deg"] is None for s in late)
+
+
+@pytest.mark.parametrize(("start_s", "length"), [(20.0, 6), (20.0, 30), (20.3, 30), (20.6, 45), (20.9, 40)])
+def test_a_hiccup_in_which_a_foot_swings_is_lost(start_s: float, length: int) -> None:
+    """Whether the sample that is sent again is one of swing or of a foot that stands."""
+
+    def pause(acc: Floats, gyr: Floats, k: int) -> None:
+        acc[k + 1 : k + length], gyr[k + 1 : k + length] = acc[k], gyr[k]
+
+    first = round(100 * start_s)
+    rate = np.linalg.norm(comfortable().sensors["foot_r"].gyr, axis=1)
+    assert rate[first : first + length].max() > 1.0
+    found = mark_stuck(spoilt(comfortable(), "foot_r", pause, start_s))
+    assert told(found.notices) == [("sensor_frozen", "foot_r")]
+    lost = np.flatnonzero(~found.sensors["foot_r"].valid)
+    assert first <= lost[0] <= first + 1
+    assert lost[-1] in (first + length - 1, first + length)
+    assert len(lost) == lost[-1] - lost[0] + 1
