@@ -19,6 +19,10 @@ from core.frames import FOOT, SIDES, Bools, Floats, Oriented, Side
 from core.plurals import plural
 from core.rotation import wrap_angle, yaw
 
+NEAR_S: Final = 0.3
+"""A contact so near lost samples may be wrong: it is found by what comes up to 0.25 s before and after it
+(docs/science/events.md, "Refinement"). At the edge of a hole of 0.3 s it was up to 0.15 s off."""
+
 NOTICES: Final = ("short_walk", "no_strides")
 """Codes of what the stride list says about itself."""
 
@@ -39,9 +43,10 @@ def stride_list(
 
     Returns
     -------
-    flags: "gap" (the foot's sensor was lost inside), "incomplete" (not exactly one terminal contact, or the
-    other foot landed twice: a contact was missed), "implausible_time", "turn", "outlier" of the foot's stride
-    times, "first" / "last" of a bout, "near_turn", "non_periodic" (alone); excluded_reason the first of them.
+    flags: "gap" (the foot's sensor was lost inside or within `NEAR_S`), "incomplete" (not exactly one
+    terminal contact, or the other foot landed twice: a contact was missed), "implausible_time", "turn",
+    "outlier" of the foot's stride times, "first" / "last" of a bout, "near_turn", "non_periodic" (alone);
+    excluded_reason the first of them. The other foot's contacts are None where its sensor was lost as near.
     """
     params = params or StrideParams()
     plain = [
@@ -73,7 +78,15 @@ def side_strides(
     places = np.searchsorted(orientations.t_s, contacts)
     first, past = places[:-1], places[1:]
     foot = FOOT[side]
-    lost = _total(~orientations.valid[foot] if foot in orientations.q else np.zeros(n, np.bool_))
+    reach = np.searchsorted(orientations.t_s, (contacts[:-1] - NEAR_S, contacts[1:] + NEAR_S))
+
+    def is_lost(which: Side) -> Bools:
+        """Whether samples of a foot are missing in each cycle or so near it that a contact may be wrong."""
+        if FOOT[which] not in orientations.valid:
+            return np.zeros(len(first), np.bool_)
+        total = _total(~orientations.valid[FOOT[which]])
+        return np.asarray(total[reach[1]] > total[reach[0]])
+
     in_turn = _total(np.zeros(n, np.bool_) if turning is None else turning)
     start, end = contacts[:-1], contacts[1:]
     tc, left = _inside(leavings, start, end)
@@ -82,7 +95,10 @@ def side_strides(
     opposite_tc, _ = _inside(
         np.array(events.times(other, "tc")), start, np.where(landings == 1, opposite_ic, end)
     )
-    gap = lost[past] > lost[first]
+    # of a foot that is lost for a while nobody knows which of its contacts is which
+    unknown = is_lost(other)
+    opposite_ic, opposite_tc = (np.where(unknown, np.nan, x) for x in (opposite_ic, opposite_tc))
+    gap = is_lost(side)
     turn = np.full(len(start), np.nan)
     if foot in orientations.q:
         heading = yaw(orientations.q[foot][np.minimum(places, n - 1)])

@@ -40,9 +40,14 @@ class SampleHistory:
         """Samples so far."""
         return self._first + self._rows
 
+    @property
+    def reach(self) -> int:
+        """Samples that are kept however they came."""
+        return self._kept - MOST
+
     def reaches(self, first: int, past: int) -> bool:
         """Whether samples first … past − 1 are near enough to `past`, however they came."""
-        return first >= 0 and past - first <= self._kept - MOST
+        return first >= 0 and past - first <= self.reach
 
     def append(self, columns: Mapping[str, NDArray[np.generic]]) -> None:
         """Add at most `MOST` samples of every column."""

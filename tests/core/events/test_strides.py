@@ -126,6 +126,25 @@ def test_lost_samples_exclude_the_strides_that_touch_them() -> None:
     assert found.strides[4].turn_rad is None
 
 
+@pytest.mark.parametrize(
+    ("at_s", "own", "opposite"),
+    [(1.5, True, True), (1.65, False, True), (2.15, False, False), (3.2, False, False), (3.35, True, False),
+     (3.85, True, True)],
+)  # fmt: skip
+def test_a_contact_near_lost_samples_counts_for_neither_foot(at_s: float, own: bool, opposite: bool) -> None:
+    """Where a hole of 0.1 s begins or ends, a contact may be off or none: of a stride 2.0 to 3.0 and of one
+    of the other foot, 2.5 to 3.5."""
+    lost = np.zeros(3000, np.bool_)
+    lost[round(at_s * RATE) : round(at_s * RATE) + 10] = True
+    found = stride_list(straight(), standing(lost=lost)).strides
+    (right,) = (s for s in found if s.side == "right" and s.start_s == 2.0)
+    (left,) = (s for s in found if s.side == "left" and s.start_s == 2.5)
+    assert (right.excluded_reason is None) == own
+    assert left.excluded_reason is None
+    assert left.opposite_ic_s == (3.0 if opposite else None)
+    assert left.opposite_tc_s == (pytest.approx(2.6) if opposite else None)
+
+
 def test_lost_samples_in_the_signal_exclude_it_end_to_end() -> None:
     lost = np.ones(1830, np.bool_)
     lost[700:720] = False
