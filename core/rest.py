@@ -14,6 +14,7 @@ from math import radians
 from typing import Final, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.frames import Bools, Floats, Segment
 from core.recording import SensorSignals, UniformRecording
@@ -143,6 +144,22 @@ def find_windows(quiet: Bools, rate_hz: float, params: RestParams | None = None)
         if last - first >= params.shortest_s * rate_hz - 1:
             found.append((first / rate_hz, last / rate_hz))
     return tuple(found)
+
+
+def count_runs(mask: Bools, before: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Samples in a row (T, n), this one included, up to each of a block of a mask (T, n).
+
+    Parameters
+    ----------
+    before : (n,) of those so far, advanced in place.
+    """
+    if not len(mask):
+        return np.zeros(mask.shape, np.int64)
+    count = np.arange(1, len(mask) + 1)[:, None]
+    since = np.maximum.accumulate(np.where(mask, 0, count), axis=0)
+    found = count - since + np.where(since == 0, before, 0)
+    before[:] = found[-1]
+    return np.asarray(found, np.int64)
 
 
 def find_runs(mask: Bools) -> list[tuple[int, int]]:

@@ -16,22 +16,24 @@ class MeasuredBlock(NamedTuple):
     Parameters
     ----------
     turned : segment → (T, 4) to W by its sensor alone (`AttitudeTracker`), of
-        `LivePoseEstimator.attitudes` and the feet.
+        `LivePoseEstimator.attitudes` and the feet. filled : (T, n) lost, a straight line instead.
     """
 
     acc: Floats
     gyr: Floats
     valid: Bools
     turned: Mapping[Segment, Floats]
+    filled: Bools
 
 
 class FootBlock(NamedTuple):
-    """A block of the feet: p (T, F, 3), q (T, F, 4), still, valid (T, F), as `FootTracks`."""
+    """A block of the feet: p (T, F, 3), q (T, F, 4), still, valid, patched (T, F), as `FootTracks`."""
 
     p: Floats
     q: Floats
     still: Bools
     valid: Bools
+    patched: Bools
 
 
 class BodyBlock(NamedTuple):

@@ -10,22 +10,82 @@ import numpy as np
 from core.calibration.result import SegmentCalibration
 from core.frames import R_NEUTRAL, Bools, Floats
 from core.fusion.attitude import AttitudeParams, attitude_kernel
+from core.fusion.live_rest import LOST_TILT, RestLooks
 from core.rotation import from_matrix
 from core.rotation.compiled import multiply
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _turn(acc, gyr, valid, which, bias, norm, mount, dt, kp, relearn_s, state, out):  # type: ignore[no-untyped-def]
-    """Advance the filters of some sensors: `out` (T, f, 4) segment to W, `state` (f, 9) in place."""
+def _settle(state, force):  # type: ignore[no-untyped-def]
+    """Turn a filter's orientation by the shortest way so that this mean force (3,) in W points up."""
+    x, y, z = force[0], force[1], force[2]
+    sine, length = np.sqrt(x * x + y * y), np.sqrt(x * x + y * y + z * z)
+    half = 0.5 * np.arctan2(sine, z)
+    s = np.sin(half) / sine if sine > 1e-9 * length else 0.0
+    # about force × up
+    w, i, j, k = multiply(np.cos(half), s * y, -s * x, 0.0, state[0], state[1], state[2], state[3])
+    state[0], state[1], state[2], state[3] = w, i, j, k
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _turn(  # type: ignore[no-untyped-def]
+    acc, gyr, valid, still, look, which, bias, norm, mount, dt, kp, relearn_s, state, doubt, rest, out, known
+):
+    """Advance the filters of some sensors, of which the first still.shape[1] are feet.
+
+    Parameters
+    ----------
+    still, look : (T, feet). state : (f, 9), doubt : (feet,), rest : (feet, 3) advanced in place: s since the
+        orientation was lost, −1 = it is known; sum of the force in W over the rest.
+    out : (T, f, 4) written, segment to W. known : (T, f) written.
+    """
     T = acc.shape[0]
     f, w, ok, q = np.empty((T, 3)), np.empty((T, 3)), np.empty(T, np.bool_), np.empty((T, 4))
     for s in range(which.shape[0]):
-        i = which[s]
+        i, foot = which[s], s < still.shape[1]
         for k in range(T):
-            ok[k] = valid[k, i]
+            ok[k] = known[k, s] = valid[k, i]
             for c in range(3):
                 f[k, c], w[k, c] = acc[k, i, c], gyr[k, i, c] - bias[s, c]
-        attitude_kernel(w, f, ok, dt, norm[s], kp, relearn_s, state[s], q)
+        first = 0
+        for k in range(T):
+            if k < T - 1 and not (foot and look[k, s]):
+                continue
+            past = k + 1
+            attitude_kernel(
+                w[first:past], f[first:past], ok[first:past], dt, norm[s], kp, relearn_s, state[s],
+                q[first:past],
+            )  # fmt: skip
+            if foot:
+                for e in range(first, past):
+                    if not ok[e]:
+                        doubt[s] = 0.0
+                    elif doubt[s] >= 0.0:
+                        doubt[s] += dt
+                        if doubt[s] * kp >= 1.0:
+                            # the filter has learnt its tilt again by itself
+                            doubt[s] = -1.0
+                    known[e, s] = ok[e] and doubt[s] < 0.0
+                    if not still[e, s]:
+                        rest[s, :] = 0.0
+                        continue
+                    a, b, c, d = q[e]
+                    x, y, z = f[e]
+                    p0, p1, p2, p3 = multiply(a, b, c, d, 0.0, x, y, z)
+                    _, x, y, z = multiply(p0, p1, p2, p3, a, -b, -c, -d)
+                    rest[s, 0] += x
+                    rest[s, 1] += y
+                    rest[s, 2] += z
+                if look[k, s]:
+                    tilt = np.arctan2(np.sqrt(rest[s, 0] ** 2 + rest[s, 1] ** 2), rest[s, 2])
+                    lost = doubt[s] >= 0.0
+                    if lost or tilt > LOST_TILT:
+                        _settle(state[s], rest[s])
+                        state[s, 7], doubt[s] = np.inf, -1.0
+                        q[k] = state[s, :4]
+                        # what was measured before does not fit what comes
+                        known[k, s] = lost
+            first = past
         m = mount[s]
         for k in range(T):
             a, b, c, d = q[k]
@@ -37,9 +97,13 @@ def _turn(acc, gyr, valid, which, bias, norm, mount, dt, kp, relearn_s, state, o
 class AttitudeTracker:
     """Tilt and turn of some sensors by themselves, from standing on; blocks do not matter.
 
+    A loss while a foot swings leaves its pitch wrong by a right angle and more, and the filter alone takes
+    ten seconds to forget it. So a foot's orientation is unknown from a loss until gravity in its next rest
+    says how it is tilted, or those ten seconds are over; and it begins anew at any rest that contradicts it.
+
     Parameters
     ----------
-    which : of the chain's sensors. mounted : how these sit.
+    which : of the chain's sensors. mounted : how these sit. feet : so many of them, the first, are feet.
     """
 
     def __init__(
@@ -48,6 +112,7 @@ class AttitudeTracker:
         mounted: Sequence[SegmentCalibration],
         rate_hz: float,
         params: AttitudeParams | None = None,
+        feet: int = 0,
     ) -> None:
         params = params or AttitudeParams()
         self._which = np.array(which, np.int64)
@@ -58,12 +123,20 @@ class AttitudeTracker:
         self._state = np.zeros((len(which), 9))
         for x, m in zip(self._state, mounted, strict=True):
             x[:4], x[7] = from_matrix(R_NEUTRAL @ m.R_segment_sensor), np.inf
+        self._looks = RestLooks(feet, rate_hz)
+        self._doubt, self._rest = np.full(feet, -1.0), np.zeros((feet, 3))
 
-    def push(self, acc: Floats, gyr: Floats, valid: Bools) -> Floats:
-        """Segments to W (T, f, 4) from signals as measured (T, n, 3)."""
+    def push(self, acc: Floats, gyr: Floats, valid: Bools, still: Bools) -> tuple[Floats, Bools]:
+        """Segments to W (T, f, 4), and where these are known (T, f).
+
+        Parameters
+        ----------
+        acc, gyr : (T, n, 3) as measured. valid : (T, n). still : (T, feet) the foot stands.
+        """
         out = np.empty((len(acc), len(self._which), 4))
+        known = np.empty(out.shape[:2], np.bool_)
         _turn(
-            acc, gyr, valid, self._which, self._bias, self._norm, self._mount, *self._scalars, self._state,
-            out,
+            acc, gyr, valid, still, self._looks.push(still), self._which, self._bias, self._norm, self._mount,
+            *self._scalars, self._state, self._doubt, self._rest, out, known,
         )  # fmt: skip
-        return out
+        return out, known

@@ -21,6 +21,7 @@ from core.body.erkf.params import ErkfParams
 from core.body.l7s.filter import L7sParams
 from core.body.l7s.live_figure import LiveL7s
 from core.body.live_estimator import BodyBlock, LivePoseEstimator, MeasuredBlock, list_worn_feet
+from core.body.live_still import StillnessDetector
 from core.body.still import FOOT_STILL
 from core.errors import Notice
 from core.estimators import ERKF, L7S_2I, L7S_3I
@@ -40,7 +41,7 @@ from core.parameters.live_stride import LiveStride
 from core.parameters.live_strides import HistoryColumns, LiveStrides
 from core.parameters.spatial import Surface
 from core.rest import index_window
-from core.timeline.columns import find_columns, take_columns
+from core.timeline.columns import find_columns, take_columns, take_mask
 
 NOT_LIVE: Final = (
     "The sensors that are worn ({}) show no figure while they stream: for one, wear both feet, or the pelvis "
@@ -115,7 +116,10 @@ class LiveChain:
         self._turned = turned
         self._index = np.array(index, np.int64)
         self._hold = HeadingHold(turned, rate, FOOT_STILL.gyr_limit)
-        self._attitudes = AttitudeTracker(index, [mounted[s] for s in turned], rate, self.params.attitude)
+        self._attitudes = AttitudeTracker(
+            index, [mounted[s] for s in turned], rate, self.params.attitude, len(feet)
+        )
+        self._still = StillnessDetector(len(feet), rate)
         self._contacts = ContactDetector(feet, rate, self.params.events, self.params.contacts)
         self._feet = np.array([self.segments.index(f) for f in feet], np.int64)
         self._foot_mounts = [mounted[f] for f in feet]
@@ -152,9 +156,10 @@ class LiveChain:
         """Names of the angles."""
         return self._angles.names
 
-    def push(self, acc: Floats, gyr: Floats, valid: Bools) -> ChainOutput:
-        """The next samples (T, columns, …) of the axis."""
-        return self._advance(*take_columns(acc, gyr, valid, self._columns))
+    def push(self, acc: Floats, gyr: Floats, valid: Bools, filled: Bools) -> ChainOutput:
+        """The next samples (T, columns, …) of the axis; filled : where samples were lost, as its blocks."""
+        signals = take_columns(acc, gyr, valid, self._columns)
+        return self._advance(*signals, take_mask(filled, self._columns))
 
     def _choose(self, calibration: LiveCalibration) -> LivePoseEstimator:
         """The estimator that the calibrated sensors allow, best first as offline."""
@@ -190,7 +195,12 @@ class LiveChain:
                 "feet_p": (feet, 3),
                 "feet_q": (feet, 4),
             },
-            {"course_valid": (len(self._courses),), "feet_still": (feet,), "feet_valid": (feet,)},
+            {
+                "course_valid": (len(self._courses),),
+                "feet_still": (feet,),
+                "feet_valid": (feet,),
+                "feet_patched": (feet,),
+            },
         )
 
     def _catch_up(self, calibration: LiveCalibration, zero: slice) -> ChainOutput:
@@ -199,30 +209,34 @@ class LiveChain:
         acc = np.stack([signals[s].acc for s in self.segments], axis=1)
         gyr = np.stack([signals[s].gyr for s in self.segments], axis=1)
         valid = np.stack([signals[s].valid for s in self.segments], axis=1)
-        found = [self._advance(acc[zero], gyr[zero], valid[zero])]
+        filled = np.stack([signals[s].interpolated for s in self.segments], axis=1)
+        found = [self._advance(acc[zero], gyr[zero], valid[zero], filled[zero])]
         for start in range(zero.stop, len(acc), MOST):
             k = slice(start, start + MOST)
-            found.append(self._advance(acc[k], gyr[k], valid[k]))
+            found.append(self._advance(acc[k], gyr[k], valid[k], filled[k]))
         return _joined(found)
 
-    def _advance(self, acc: Floats, gyr: Floats, valid: Bools) -> ChainOutput:
+    def _advance(self, acc: Floats, gyr: Floats, valid: Bools, filled: Bools) -> ChainOutput:
         if len(acc) > MOST and self._count:
             parts = [slice(k, k + MOST) for k in range(0, len(acc), MOST)]
-            return _joined([self._advance(acc[k], gyr[k], valid[k]) for k in parts])
-        q = self._attitudes.push(acc, gyr, valid)
+            return _joined([self._advance(acc[k], gyr[k], valid[k], filled[k]) for k in parts])
+        feet_valid = valid.take(self._feet, axis=1)
+        still = self._still.push(acc.take(self._feet, axis=1), gyr.take(self._feet, axis=1), feet_valid)
+        q, sure = self._attitudes.push(acc, gyr, valid, np.ascontiguousarray(still[:, :, 0]))
         if self.estimator.attitudes:
             k = self._index
             self._hold.push(q, gyr.take(k, axis=1), valid.take(k, axis=1))
         turned = {s: q[:, i] for i, s in enumerate(self._turned)}
-        placed = self.estimator.push(MeasuredBlock(acc, gyr, valid, turned))
+        placed = self.estimator.push(MeasuredBlock(acc, gyr, valid, turned, filled))
         angles = self._measure(placed, turned, valid)
         motions = [
             FootMovement.of_signals(acc[:, k], gyr[:, k], mount)
             for k, mount in zip(self._feet, self._foot_mounts, strict=True)
         ]
-        feet_valid = valid.take(self._feet, axis=1)
-        known = self._contacts.push(q[:, : len(self._feet)], feet_valid, motions, self.first)
-        self._remember(placed, turned, valid, angles)
+        # a foot whose orientation is not known has no contacts
+        sure = np.ascontiguousarray(sure[:, : len(self._feet)])
+        known = self._contacts.push(q[:, : len(self._feet)], sure, motions, self.first)
+        self._remember(placed, turned, valid, sure, angles)
         self._count += len(acc)
         for x in known:
             if x.event.first_s is None:
@@ -249,16 +263,25 @@ class LiveChain:
         return angles
 
     def _remember(
-        self, placed: BodyBlock, turned: Mapping[Segment, Floats], valid: Bools, angles: Floats
+        self,
+        placed: BodyBlock,
+        turned: Mapping[Segment, Floats],
+        valid: Bools,
+        sure: Bools,
+        angles: Floats,
     ) -> None:
         course = np.empty((len(angles), len(self._courses), 4))
         for i, s in enumerate(self._courses):
             k = self._figured[i]
             course[:, i] = turned[s] if k is None else placed.q[:, k]
         course_valid = valid.take(self._course_columns, axis=1) & np.isfinite(course[:, :, 0])
+        for i, k in enumerate(self._course_columns.tolist()):
+            for f in np.flatnonzero(self._feet == k).tolist():
+                course_valid[:, i] &= sure[:, f]
         rows = {
             "angles": angles, "course": course, "course_valid": course_valid, "feet_p": placed.paths.p,
             "feet_q": placed.paths.q, "feet_still": placed.paths.still, "feet_valid": placed.paths.valid,
+            "feet_patched": placed.paths.patched,
         }  # fmt: skip
         if len(angles) <= MOST:
             self.history.append(rows)

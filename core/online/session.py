@@ -116,7 +116,10 @@ class OnlineSession:
                 outcomes += self._begin(found, notices)
         self._agreement.push(block, self._calibrating.drain_standings())
         if self.chain is not None and start < len(block):
-            outcomes.append(self.chain.push(block.acc[start:], block.gyr[start:], block.valid[start:]))
+            k = slice(start, None)
+            outcomes.append(
+                self.chain.push(block.acc[k], block.gyr[k], block.valid[k], block.interpolated[k])
+            )
         if self._guided is not None:
             strides = [s for x in outcomes for s in x.strides]
             self._guided.push(block, strides, [e for x in outcomes for e in x.events])
@@ -205,7 +208,8 @@ def compile_live_kernels() -> None:
 def _compile_chain(worn: tuple[Segment, ...]) -> None:
     chain = LiveChain(_standing(worn), worn)
     acc = np.tile([0.0, GRAVITY, 0.0], (10, len(worn), 1))
-    chain.push(acc, np.zeros_like(acc), np.ones(acc.shape[:2], np.bool_))
+    here = np.ones(acc.shape[:2], np.bool_)
+    chain.push(acc, np.zeros_like(acc), here, ~here)
 
 
 def _standing(worn: tuple[Segment, ...], samples: int = 150, rate_hz: float = 100.0) -> LiveCalibration:

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import floor
+from math import ceil, floor
 from typing import Final
 
 import numpy as np
@@ -23,7 +23,7 @@ from core.body.model import BodyModel
 from core.events.flags import StrideParams, add_flag, find_flags
 from core.events.live_contacts import KnownContact
 from core.events.result import GaitEvent, GaitEvents, Stride, StrideFlag
-from core.events.strides import side_strides
+from core.events.strides import NEAR_S, side_strides
 from core.frames import FOOT, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.parameters.flats import OTHER
@@ -81,6 +81,7 @@ class LiveStrides:
         self._pending: list[_Pending] = []
         self._last: dict[Side, int] = {}
         self._count = 0
+        self._near = ceil(NEAR_S * setup.rate_hz) + 1
 
     def push(self, known: Iterable[KnownContact], history: SampleHistory) -> list[LiveStride]:
         """Strides that the contacts known since the last call, or the mere time since then, complete."""
@@ -124,7 +125,8 @@ class LiveStrides:
             return []
         span = self._span(first, past, history, event.side)
         inside = tuple(e for e in self._events if e.time_s >= own[-2] or e.side != event.side)
-        stride = side_strides(event.side, GaitEvents(inside), span, None, self._params)[-1]
+        feet = self._turned_feet(max(0, first - self._near), past, history)
+        stride = side_strides(event.side, GaitEvents(inside), feet, None, self._params)[-1]
         recent = self._recent[event.side]
         if recent and recent[-1].end_s != stride.start_s:
             recent.clear()
@@ -229,6 +231,16 @@ class LiveStrides:
     def _sample(self, time_s: float) -> int:
         return floor(time_s * self._setup.rate_hz + 1e-6) - self._setup.first
 
+    def _turned_feet(self, first: int, past: int, history: SampleHistory) -> Orientations:
+        """Orientations of both feet over samples first … past − 1, and where they are known."""
+        x = self._setup
+        first = max(first, past - history.reach)
+        t_s = np.arange(x.first + first, x.first + past) / x.rate_hz
+        q, valid = history.floats("course", first, past), history.bools("course_valid", first, past)
+        feet = {s: i for i, s in enumerate(x.courses) if s in FOOT.values()}
+        by_segment: Mapping[Segment, Floats] = {s: q[:, i] for s, i in feet.items()}
+        return Orientations(t_s, x.rate_hz, by_segment, {s: valid[:, i] for s, i in feet.items()}, "live")
+
     def _span(self, first: int, past: int, history: SampleHistory, side: Side | None = None) -> StrideSpan:
         """Samples first … past − 1 as the functions of a whole take want them.
 
@@ -255,6 +267,7 @@ class LiveStrides:
         if x.feet:
             p, turned = history.floats("feet_p", first, past), history.floats("feet_q", first, past)
             still, known = history.bools("feet_still", first, past), history.bools("feet_valid", first, past)
+            patched = history.bools("feet_patched", first, past)
             feet = FootTracks(
                 t_s=t_s,
                 rate_hz=x.rate_hz,
@@ -262,6 +275,7 @@ class LiveStrides:
                 q={s: turned[:, i] for i, s in enumerate(x.feet)},
                 still={s: still[:, i] for i, s in enumerate(x.feet)},
                 valid={s: known[:, i] for i, s in enumerate(x.feet)},
+                patched={s: patched[:, i] for i, s in enumerate(x.feet)},
                 linked=x.linked,
                 source=x.source,
                 body=x.body,

@@ -20,6 +20,11 @@ def find_columns(wanted: Sequence[Segment], there: Sequence[Segment]) -> Columns
     return np.array([there.index(s) for s in wanted], np.int64)
 
 
+def take_mask(mask: Bools, columns: Columns) -> Bools:
+    """A mask (T, n) of some columns, laid out as in `take_columns`."""
+    return mask if columns is None else mask.take(columns, axis=1)
+
+
 def take_columns(acc: Floats, gyr: Floats, valid: Bools, columns: Columns) -> tuple[Floats, Floats, Bools]:
     """acc, gyr (T, n, 3), valid (T, n) of some columns.
 
@@ -27,4 +32,4 @@ def take_columns(acc: Floats, gyr: Floats, valid: Bools, columns: Columns) -> tu
     """
     if columns is None:
         return acc, gyr, valid
-    return acc.take(columns, axis=1), gyr.take(columns, axis=1), valid.take(columns, axis=1)
+    return acc.take(columns, axis=1), gyr.take(columns, axis=1), take_mask(valid, columns)

@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 
 from core.body.erkf.filter import ErkfInputs, links_of, memory_of, new_output, new_record, noise_of
 from core.body.erkf.gaps import HOLD_S
-from core.body.erkf.kernel import CONTACT, INVALID, NONE_KEPT, STILL, ErkfOutput, filter_segments
+from core.body.erkf.kernel import CONTACT, INVALID, NONE_KEPT, PATCHED, STILL, ErkfOutput, filter_segments
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.start import start_state
 from core.body.live_still import ROLLING_MPS
 from core.body.tree import ImuTree
 from core.frames import Bools, Floats
+from core.fusion.live_rest import LOST_TILT, RestLooks
 from core.rotation import exp, multiply, rotate
 
 HEADING_SD: Final = radians(2.0)
@@ -39,17 +40,6 @@ UP: Final = np.array([0.0, 0.0, 1.0])
 
 SETTLED_TILT: Final = radians(3.0)
 """Of gravity in one sample of a foot that stands: the rule's 1.2 m/s² would be 7°, a foot's rest has less."""
-
-
-RESTED_S: Final = 0.1
-"""Into a rest at which its tilt is looked at: a foot that lands or begins to roll is called still as well, up
-to 14° off then."""
-
-
-LOST_TILT: Final = radians(5.0)
-"""Of gravity against the state in a foot's rest, beyond which the state is lost: a sensor that repeated
-itself for 0.1 to 0.5 s in swing is 9 to 75° off, and every path after it half or three times as long; walks
-of simulated people have at most 1.5°, neura_walk 1.6°."""
 
 
 CENTRE_SD_M: Final = 0.03
@@ -68,21 +58,22 @@ def live_params() -> ErkfParams:
 
 class SignalBlock(NamedTuple):
     """A block as the filters take it: acc, gyr (T, n, 3) corrected and bridged, valid (T, n), still (T, n, 2)
-    as `StillnessDetector` tells."""
+    as `StillnessDetector` tells, patched (T, n) as in `ErkfInputs`."""
 
     acc: Floats
     gyr: Floats
     valid: Bools
     still: Bools
+    patched: Bools
 
     def part(self, first: int, past: int) -> SignalBlock:
         """Samples first … past − 1."""
         k = slice(first, past)
-        return SignalBlock(self.acc[k], self.gyr[k], self.valid[k], self.still[k])
+        return SignalBlock(self.acc[k], self.gyr[k], self.valid[k], self.still[k], self.patched[k])
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _flag(valid, still, foot, flags):  # type: ignore[no-untyped-def]
+def _flag(valid, still, patched, foot, flags):  # type: ignore[no-untyped-def]
     """Write the kernel's bits (T, n) of what is measured, stands and rests."""
     for k in range(valid.shape[0]):
         for i in range(valid.shape[1]):
@@ -91,6 +82,8 @@ def _flag(valid, still, foot, flags):  # type: ignore[no-untyped-def]
                 flags[k, i] |= CONTACT
             if still[k, i, 1]:
                 flags[k, i] |= STILL
+            if patched[k, i]:
+                flags[k, i] |= PATCHED
 
 
 class LiveErkf:
@@ -126,7 +119,7 @@ class LiveErkf:
         self._gone, self._adrift = np.zeros(n, np.int64), np.zeros(n, np.bool_)
         linked = {i for j in tree.joints for i in (j.proximal, j.distal)}
         self._alone = frozenset(tree.feet) - linked
-        self._rested, self._look = np.zeros(n, np.int64), max(1, round(RESTED_S * rate_hz))
+        self._looked_at = RestLooks(n, rate_hz)
         self._hold, self._params = round(HOLD_S * rate_hz), params
         self.broken = False
 
@@ -149,7 +142,7 @@ class LiveErkf:
             step, self._first = step.copy(), False
             step[0] = 0.0
         flags = np.empty((T, n), np.uint8)
-        _flag(signals.valid, signals.still, self._foot, flags)
+        _flag(signals.valid, signals.still, signals.patched, self._foot, flags)
         samples = (step, signals.acc, signals.gyr, flags, self._heading, self._rolling)
         looks = list(self._looks(signals))
         whole = signals.valid.all() and not self._gone.any() and not self._adrift.any()
@@ -202,17 +195,8 @@ class LiveErkf:
 
     def _looks(self, signals: SignalBlock) -> Iterator[tuple[int, int]]:
         """Sample and foot where one that hangs on nothing has rested for long enough to be looked at."""
-        for i in sorted(self._alone):
-            still = signals.still[:, i, 0]
-            moving = np.flatnonzero(~still)
-            # samples of its rest up to each one, those of the blocks before included
-            since = np.zeros(len(still), np.int64)
-            since[moving] = moving + 1
-            since = np.maximum.accumulate(since)
-            rested = np.arange(1, len(still) + 1) - since + np.where(since == 0, self._rested[i], 0)
-            if len(rested):
-                self._rested[i] = rested[-1]
-            yield from ((k, i) for k in np.flatnonzero(rested == self._look).tolist())
+        look = self._looked_at.push(signals.still[:, :, 0])
+        yield from ((k, i) for k, i in np.argwhere(look).tolist() if i in self._alone)
 
     def _settle(self, i: int, acc: Floats, gyr: Floats) -> None:
         """Begin sensor i anew where it is, at rest: level by gravity, as it faces."""

@@ -95,8 +95,9 @@ class LinkedBody:
         known, whole = np.empty((T, n), np.bool_), np.empty(T, np.bool_)
         F = len(self._feet)
         paths = FootBlock(
-            np.empty((T, F, 3)), np.empty((T, F, 4)), np.empty((T, F), np.bool_), np.empty((T, F), np.bool_)
-        )
+            np.empty((T, F, 3)), np.empty((T, F, 4)), np.empty((T, F), np.bool_), np.empty((T, F), np.bool_),
+            (signals.patched & ~signals.still[:, :, 0]).take(self._feet, axis=1),
+        )  # fmt: skip
         _tell(
             q, p, signals.valid, signals.still, self._feet, self._shown, known, whole, paths.q, paths.p,
             paths.still, paths.valid,
@@ -141,4 +142,4 @@ class UnlinkedSensors:
 def make_empty_paths(samples: int) -> FootBlock:
     """Of a set without feet."""
     none = np.zeros((samples, 0), np.bool_)
-    return FootBlock(np.zeros((samples, 0, 3)), np.zeros((samples, 0, 4)), none, none)
+    return FootBlock(np.zeros((samples, 0, 3)), np.zeros((samples, 0, 4)), none, none, none)

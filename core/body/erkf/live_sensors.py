@@ -16,8 +16,9 @@ from core.body.model import BodyModel
 from core.body.tree import person_tree
 from core.calibration.result import SegmentCalibration
 from core.frames import GRAVITY, R_NEUTRAL, Floats, Segment
+from core.rest import count_runs
 from core.rotation import from_matrix, multiply
-from core.timeline.columns import find_columns, take_columns
+from core.timeline.columns import find_columns, take_columns, take_mask
 
 
 class FilteredBlock(NamedTuple):
@@ -53,6 +54,7 @@ class FilteredSensors:
         bias = [mounted[s].gyro_bias for s in segments]
         self._bridge = GapBridge(self.tree, np.array(excess), np.array(bias), rate_hz)
         self._still = StillnessDetector(len(segments), rate_hz)
+        self._filled = np.zeros(len(segments), np.int64)
         self._rate_hz, self._params = rate_hz, params
         # by convention all segments face ahead while standing (core/fusion/mahony.py)
         self._start = multiply(from_matrix(R_NEUTRAL), self.tree.q_mount)
@@ -67,7 +69,10 @@ class FilteredSensors:
         """The next samples."""
         measured_acc, measured_gyr, valid = take_columns(raw.acc, raw.gyr, raw.valid, self._columns)
         acc, gyr = self._bridge.push(measured_acc, measured_gyr, valid)
-        signals = SignalBlock(acc, gyr, valid, self._still.push(acc, gyr, valid))
+        filled = take_mask(raw.filled, self._columns)
+        # as `find_patches` of a file, but for the first sample of each: it is not known yet how long it gets
+        patched = filled & ((count_runs(filled, self._filled) + 1) / self._rate_hz > self._params.patch_s)
+        signals = SignalBlock(acc, gyr, valid, self._still.push(acc, gyr, valid), patched)
         if self._filter is None:
             self._filter = LiveErkf(self.tree, self._params, self._rate_hz, signals, self._start)
         states, residual = self._filter.push(signals)
@@ -90,4 +95,5 @@ class FootPaths:
         """The next samples."""
         x = self._filtered.push(raw)
         valid = x.signals.valid & np.isfinite(x.p[:, :, 0])
-        return FootBlock(x.p, x.q, np.ascontiguousarray(x.signals.still[:, :, 0]), valid)
+        still = np.ascontiguousarray(x.signals.still[:, :, 0])
+        return FootBlock(x.p, x.q, still, valid, x.signals.patched & ~still)
