@@ -4,7 +4,6 @@ from typing import Final
 
 UNMIRRORED: Final = frozenset(
     {
-        "tests/core/activity/test_parts.py",
         "tests/core/body/chain/test_chain.py",
         "tests/core/body/erkf/test_robust.py",
         "tests/core/body/erkf/test_start_headings.py",
@@ -102,17 +101,6 @@ UNMIRRORED: Final = frozenset(
 
 UNTESTED: Final = frozenset(
     {
-        "core/activity/day_part.py",
-        "core/activity/frames.py",
-        "core/activity/reduction.py",
-        "core/activity/wear.py",
-        "core/agreement/joints.py",
-        "core/agreement/labels.py",
-        "core/agreement/live_comparison.py",
-        "core/agreement/live_joints.py",
-        "core/agreement/mirrored.py",
-        "core/agreement/tell.py",
-        "core/agreement/tell_live.py",
         "core/angles/result.py",
         "core/body/chain/figure.py",
         "core/body/erkf/kernel.py",
