@@ -98,12 +98,6 @@ UNMIRRORED: Final = frozenset(
 
 UNTESTED: Final = frozenset(
     {
-        "core/events/foot_contact_kernel.py",
-        "core/events/foot_pitch_kernel.py",
-        "core/fusion/algorithms/choice.py",
-        "core/fusion/algorithms/complementary.py",
-        "core/fusion/algorithms/engines.py",
-        "core/fusion/algorithms/schemes.py",
         "core/fusion/algorithms/tuning_ranges.py",
         "core/fusion/live_attitude.py",
         "core/fusion/self_calibrating/start.py",

@@ -14,7 +14,7 @@ from core.body.live_estimator import LivePoseEstimator, list_worn_feet
 def test_feet_are_listed_left_first_and_nothing_else() -> None:
     assert list_worn_feet(["foot_r", "pelvis", "foot_l", "shank_l"]) == ("foot_l", "foot_r")
     assert list_worn_feet(("foot_r",)) == ("foot_r",)
-    assert list_worn_feet(s for s in ("pelvis", "chest")) == ()  # type: ignore[arg-type]
+    assert list_worn_feet(("pelvis", "chest")) == ()
 
 
 ESTIMATORS = sorted(

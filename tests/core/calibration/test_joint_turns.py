@@ -58,7 +58,7 @@ def test_without_enough_walking_a_joint_says_nothing() -> None:
 def test_a_joint_needs_both_sensors_and_signals_that_fit() -> None:
     recording, q = take()
     biases = {s: np.zeros(3) for s in q}
-    alone = {"foot_l": q["foot_l"]}
+    alone: dict[Segment, Floats] = {"foot_l": q["foot_l"]}
     assert measure_joint_turns(recording, biases, alone, [WALK], PARAMS) == []
     strict = JointTurnParams(worst_misfit=0.01)
     assert measure_joint_turns(recording, biases, q, [WALK], strict) == []

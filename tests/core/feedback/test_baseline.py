@@ -38,5 +38,6 @@ def test_what_cannot_be_is_refused(field: str, value: object) -> None:
     assert refused.value.message.startswith("baseline")
 
 
-def test_the_easiest_level_is_still_one() -> None:
-    assert Baseline.from_json({"last_level": LEVELS, "sd": 0.0}).last_level == LEVELS
+@pytest.mark.parametrize("level", [0, LEVELS])
+def test_the_hardest_and_the_easiest_level_are_still_levels(level: int) -> None:
+    assert Baseline.from_json({"last_level": level, "sd": 0.0}).last_level == level

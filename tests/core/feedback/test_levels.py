@@ -83,9 +83,9 @@ def test_the_share_itself_is_not_enough() -> None:
 
 
 def test_only_strides_on_the_worse_side_make_it_easier() -> None:
-    assert walk(ladder(level=3), *["high"] * 4) == 3
-    assert walk(ladder(level=3), *["near_low"] * 4) == 3
-    assert walk(ladder(zones=ZONES, level=3), *["low"] * 4) == 3, "no side is known"
+    assert walk(ladder(level=3), "high", "high", "high", "high") == 3
+    assert walk(ladder(level=3), "near_low", "near_low", "near_low", "near_low") == 3
+    assert walk(ladder(zones=ZONES, level=3), "low", "low", "low", "low") == 3, "no side is known"
 
 
 def test_only_the_last_window_counts() -> None:
@@ -96,7 +96,7 @@ def test_only_the_last_window_counts() -> None:
 
 def test_levels_end_at_the_hardest_and_the_easiest() -> None:
     made = ladder()
-    assert walk(made, *["in"] * 4) == 0
+    assert walk(made, "in", "in", "in", "in") == 0
     assert made.window_n == 4, "the level did not change, so the strides stay"
     made.move(LEVELS + 5)
     assert made.level == LEVELS

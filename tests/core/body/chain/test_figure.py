@@ -57,7 +57,7 @@ def test_the_pelvis_is_that_of_the_leg_that_stands() -> None:
 
 def test_on_both_legs_it_is_the_mean_whatever_half_of_the_sphere_they_use() -> None:
     left, right = leg("left", ALWAYS, 0.0), leg("right", ALWAYS, 10.0)
-    right.orientations.q["pelvis"][:] *= -1.0  # type: ignore[index]
+    right.orientations.q["pelvis"][:] *= -1.0
     assert turn_of(join_legs({"left": left, "right": right}).q["pelvis"]) == pytest.approx(5.0)
 
 
@@ -74,7 +74,7 @@ def test_a_leg_whose_pelvis_is_not_known_has_no_say() -> None:
 def test_a_lifted_foot_hangs_square_on_its_shin() -> None:
     left, right = leg("left", ALWAYS), leg("right", FIRST)
     bent = multiply(about(1, 0.5), NEUTRAL)
-    right.orientations.q["shank_r"][:] = bent  # type: ignore[index]
+    right.orientations.q["shank_r"][:] = bent
     drawn = draw_legs({"left": left, "right": right}, 1.7)
     foot = drawn.poses.q["foot_r"]
     assert foot[FIRST] == pytest.approx(np.tile(NEUTRAL, (N // 2, 1)), abs=1e-6)

@@ -10,6 +10,7 @@ from core.body.erkf.health import RESIDUAL_MM
 from core.body.erkf.live_watch import WINDOW_S, JointWatch
 from core.body.tree import ImuTree, person_tree
 from core.errors import Notice
+from core.frames import Segment
 
 RATE = 20.0
 WINDOW = round(WINDOW_S * RATE)
@@ -17,7 +18,7 @@ FAR_M = 1e-3 * RESIDUAL_MM[0]
 
 
 def tree() -> ImuTree:
-    segments = ("thigh_l", "shank_l", "foot_l")
+    segments: tuple[Segment, ...] = ("thigh_l", "shank_l", "foot_l")
     return person_tree(BodyModel.from_height(1.7), {s: np.eye(3) for s in segments}, segments)
 
 

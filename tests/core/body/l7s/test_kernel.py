@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.body.l7s import kernel
+from core.body.l7s import kernel, updates
 from core.body.l7s.updates import VELOCITY, WIDTH, N
 from core.frames import Floats
 from core.rotation import exp, to_matrix
@@ -81,7 +81,7 @@ def rows_of(
     group: int, R: Floats, p: Floats, v: Floats, measured: Floats
 ) -> tuple[Floats, Floats, Floats, list[int]]:
     """H (3, 27), residuals and variances of a group, and the places it reads."""
-    at, H, left, variance, gain = kernel.make_form()
+    at, H, left, variance, gain = updates.make_form()
     given = np.array([0.3, 0.4])
     triples = kernel._write_rows(
         group, R, p, v, measured, given, HEIGHTS, VARIANCES, (at, H, left, variance, gain), np.empty((3, 3))
@@ -153,7 +153,7 @@ def test_only_feet_that_stand_are_held_and_only_a_worn_pelvis_is_measured(
     slow, wide, dx = v.copy(), widen(spread()), np.empty(WIDTH)
     kernel.apply_measurement(
         R, p, slow, wide, R.copy(), three, np.array(stands), np.array([1.0, 1.0]), HEIGHTS, VARIANCES, dx,
-        kernel.make_form(), np.empty((3, 3, 3)),
+        updates.make_form(), np.empty((3, 3, 3)),
     )  # fmt: skip
     held = np.linalg.norm(slow[1:], axis=1) < 0.3 * np.linalg.norm(v[1:], axis=1)
     assert held.tolist() == list(stands)
