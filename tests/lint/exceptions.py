@@ -243,7 +243,6 @@ UNTESTED: Final = frozenset(
         "server/commands/move_blobs.py",
         "server/commands/move_database.py",
         "server/commands/replay.py",
-        "server/commands/restore.py",
         "server/commands/trash.py",
         "server/commands/worker.py",
         "server/context.py",
