@@ -24,7 +24,7 @@ _MAY_BE_THERE: Final = {"lost+found", "cache", "server.lock", "workers.lock", "p
 _OF_A_START: Final = re.compile(
     r"(backups|blobs(/incoming)?|nodes|nodes/[^/]+)/|nodes/(key(\.lock)?|[^/]+/server\.lock)"
 )
-"""Folders (with a slash) and files that a trial of a backup, or a server that did not start, leaves in one."""
+"""Folders (with a slash) and files that a trial of a backup, or a server that did not start, may leave."""
 _MARGIN: Final = 1.1
 """Room that a restore needs, as a part of the archive."""
 
