@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from server.commands.keygen import keygen
+from server.main import main
 from server.storage.archive import read_key
 
 
@@ -34,3 +35,11 @@ def test_a_key_that_is_there_is_never_overwritten(
     assert said.out == ""
     assert str(tmp_path / "clinic.key") in said.err
     assert Path("clinic.key").read_text() == "the only copy"
+
+
+def test_a_key_in_a_folder_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["keygen", str(tmp_path / "none" / "clinic.key")]) == 1
+    said = capsys.readouterr().err
+    assert (
+        said == f"{tmp_path / 'none'}: No such file or directory. Check the path, its rights and the disk.\n"
+    )

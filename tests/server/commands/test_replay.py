@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from server.commands.replay import _heard, _summary, replay
 from server.live.client import StreamReport
 from server.live.playback import DueBatch
+from server.main import main
 
 NOBODY = "http://127.0.0.1:9"
 
@@ -66,3 +68,13 @@ def test_what_the_therapist_asks_for_is_said_and_nothing_else(capsys: pytest.Cap
     _heard({"type": "ack", "command": "pause"})
     _heard({"type": "command", "command": "pause"})
     assert capsys.readouterr().out == "The therapist asks: pause.\n"
+
+
+@pytest.mark.slow
+def test_a_server_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        free = f"http://127.0.0.1:{s.getsockname()[1]}"
+    assert main(["simulate", "--out", str(tmp_path), "--script", "swings_and_bows"]) == 0
+    assert main(["replay", str(tmp_path / "recording.parquet"), "--to", free, "--code", "ABCDEF"]) == 1
+    assert f"{free} cannot be reached (Connection refused); is the server running" in capsys.readouterr().err

@@ -6,6 +6,7 @@ import datetime as dt
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from defusedxml.ElementTree import fromstring
 
@@ -52,10 +53,10 @@ def home(*bouts: ActivityBout, worn_h: float = 12.0, date: dt.date | None = None
     """Two days, the second of which was not worn."""
     first = ActivityDay(date, 0.0, 86400.0, worn_h, 4000, {}, {}, len(bouts), None)
     days = (first, replace(first, start_s=86400.0, end_s=172800.0, worn_h=0.0))
-    return ActivityResult(  # type: ignore[call-arg]
+    return ActivityResult(
         segment="chest", device_id="A", source="a", rate_hz=50.0, has_gyro=False, started_at=None,
         duration_s=172800.0, height_m=1.7, spans=(), transitions=(), candidates=(), bouts=bouts,
-        steps_s=[], turns=(), hours=(), days=days, periods=(), inclination_deg=[],
+        steps_s=np.empty(0), turns=(), hours=(), days=days, periods=(), inclination_deg=np.empty(0),
     )  # fmt: skip
 
 

@@ -51,7 +51,7 @@ def test_a_take_without_a_stride_still_says_how_many_and_draws_nothing() -> None
 def test_a_probe_stands_beside_the_strides_right_before_it() -> None:
     (probe,) = view(TRAINED).probes
     assert (probe.number, probe.start_s) == (1, 3.0)
-    assert (probe.before.mean, probe.probe.mean) == (pytest.approx(0.62), pytest.approx(0.80))
+    assert [probe.before.mean, probe.probe.mean] == pytest.approx([0.62, 0.80])
 
 
 def test_notes_say_how_far_the_live_values_were_off_and_what_was_left_out() -> None:

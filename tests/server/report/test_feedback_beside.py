@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ METRES = parameter_term(NAME)
 DAY = dt.date(2026, 3, 2)
 
 
-def strides(side: Side, values: list[float | None], counted: bool = True) -> list[AnalysedStride]:
+def strides(side: Side, values: Sequence[float | None], counted: bool = True) -> list[AnalysedStride]:
     return [AnalysedStride(side, float(i), value, counted) for i, value in enumerate(values)]
 
 

@@ -10,7 +10,7 @@ import pytest
 from server.processes.child import start_child
 from server.settings import Settings
 from server.worker import runner
-from server.worker.messages import ChildReady, Order, Stage
+from server.worker.messages import ChildReady, Order, Stage, encode
 from server.worker.runner import Child, ChildDiedError
 
 PATIENCE_S = 60.0
@@ -35,7 +35,7 @@ while head := line.read(8):
 
 @pytest.fixture
 def child(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Child]:
-    ready, stage = (runner.encode(word) for word in (ChildReady(), Stage("reading", 0.5)))
+    ready, stage = (encode(word) for word in (ChildReady(), Stage("reading", 0.5)))
     (tmp_path / "obedient.py").write_text(OBEDIENT.format(ready=ready, stage=stage))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     # a real process on a real line; only its module is another one than server.worker.child
