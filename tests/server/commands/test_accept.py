@@ -52,6 +52,7 @@ def test_an_empty_folder_gets_no_database(tmp_path: Path, capsys: pytest.Capture
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_files_without_their_database_can_be_given_up_for_a_new_beginning(
     clinic: Clinic, capsys: pytest.CaptureFixture[str]
 ) -> None:
