@@ -1,4 +1,4 @@
-"""The live ErKF on feet: rest, blocks, losses, paths that rests contradict, and the end of what it can follow."""
+"""The live ErKF on feet: rest, blocks, losses, and paths that a rest contradicts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Means of a control's walk: those that analysis.json keeps are those of its angles."""
+"""Numbers of a walk: the means that analysis.json keeps are those of its angles."""
 
 from __future__ import annotations
 

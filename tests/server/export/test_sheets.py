@@ -1,4 +1,4 @@
-"""Workbook and CSV tables, opened by what they are for; edits count in them."""
+"""The tables of an export, opened by what they are for; edits count in them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,13 @@ import json
 import zipfile
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
-import openpyxl
-import pytest
-
-from core.errors import FormatError, InputError
 from core.events.edits import Edit
 from core.parameters.catalogue import CATALOGUE
 from server.export.content import ExportContent
 from server.export.kinds import write_export
+from server.export.sheets import list_curves, list_cycles, list_events, list_notices
 from server.report.numbers import numbers_of
-from tests.server import analysed
 from tests.server.export.opened import open_walk
 
 
@@ -34,11 +29,6 @@ def left_out() -> tuple[Edit, ExportContent]:
 def tables(content: ExportContent) -> dict[str, list[dict[str, str]]]:
     archive = zipfile.ZipFile(io.BytesIO(write_export("csv", content)))
     return {n: list(csv.DictReader(io.StringIO(archive.read(n).decode()))) for n in archive.namelist()}
-
-
-def sheet(book: Any, name: str) -> list[dict[str, Any]]:
-    header, *rows = book[name].iter_rows(values_only=True)
-    return [dict(zip(header, row, strict=True)) for row in rows]
 
 
 def test_long_and_wide_tables_hold_the_same_numbers_and_every_column_is_explained() -> None:
@@ -135,48 +125,34 @@ def test_levels_of_strides_have_the_mean_of_the_take() -> None:
     assert compared >= 3
 
 
-@pytest.mark.slow
-def test_nothing_that_a_person_typed_becomes_a_formula() -> None:
-    _, content = left_out()
-    assert {r["what"]: r["value"] for r in tables(content)["about.csv"]}["code"] == "'=HYPERLINK(1)"
-    book = openpyxl.load_workbook(io.BytesIO(write_export("xlsx", content)))
-    cells = [c for s in book for row in s.iter_rows() for c in row if c.value is not None]
-    assert {c.data_type for c in cells} == {"s", "n"}
-    assert any(c.value == "=HYPERLINK(1)" for c in cells)
+def test_a_stride_is_a_row_that_says_whether_it_counts() -> None:
+    edit, content = left_out()
+    table = list_cycles(content)
+    assert table.name == "Strides"
+    assert len({len(row) for row in (table.header, *table.rows)}) == 1
+    rows = [dict(zip(table.header, row, strict=True)) for row in table.rows]
+    assert [row["cycle"] for row in rows] == list(range(1, len(content.bundle.strides.strides) + 1))
+    assert {(row["counted"], row["excluded_reason"]) for row in rows} == {
+        (1, None), (0, "first"), (0, "last"), (0, f"manual:{edit.reason}")
+    }  # fmt: skip
+    squats = replace(content, bundle=replace(content.bundle, repetitions=()))
+    assert list_cycles(squats).name == "Squats"
 
 
-@pytest.mark.slow
-def test_the_workbook_holds_the_numbers_of_the_analysis() -> None:
-    content = open_walk()
-    data = write_export("xlsx", content)
-    assert data == write_export("xlsx", open_walk())
-    book = openpyxl.load_workbook(io.BytesIO(data))
-    assert book.sheetnames == [
-        "About",
-        "Parameters",
-        "Strides",
-        "Curves",
-        "Contacts",
-        "Notices",
-        "Dictionary",
-    ]
-    named = {(r["parameter"], r["side"]): r["mean"] for r in sheet(book, "Parameters")}
-    assert named == {
-        (p.name, p.side): None if p.mean is None else pytest.approx(p.mean) for p in content.bundle.parameters
-    }
-    assert [r["cycle"] for r in sheet(book, "Strides")] == [c.number for c in content.cycles]
-    curves = sheet(book, "Curves")
-    assert len(curves) == 101
-    knee = [row["knee_flexion_left_mean_deg"] for row in curves]
-    assert 55.0 < max(knee) < 65.0
+def test_curves_have_101_rows_and_none_without_angles() -> None:
+    walk = open_walk()
+    table = list_curves(walk)
+    assert [row[0] for row in table.rows] == list(range(101))
+    assert "knee_flexion_right_sd_deg" in table.header
+    nothing = list_curves(replace(walk, bundle=replace(walk.bundle, angles=None)))
+    assert (nothing.header, nothing.rows) == (("pct_cycle",), ())
 
 
-def test_what_cannot_be_written_says_why() -> None:
-    with pytest.raises(InputError, match="choose one of xlsx"):
-        write_export("docx", open_walk())
-    files = {name: x for name, x in analysed.files().items() if name != "tracks.parquet"}
-    edit, _ = left_out()
-    with pytest.raises(FormatError, match=r"no tracks\.parquet"):
-        open_walk(edit, files=files)
-    alone = open_walk(files={"analysis.json": analysed.files()["analysis.json"]})
-    assert tables(alone)["strides_long.csv"] == []
+def test_contacts_and_notices_are_told_as_they_are() -> None:
+    walk = open_walk()
+    contacts = list_events(walk)
+    assert contacts.rows[0] == (
+        walk.bundle.events.events[0].time_s, walk.bundle.events.events[0].side, "ic", "foot_contact"
+    )  # fmt: skip
+    (lost, *_) = (row for row in list_notices(walk).rows if row[1] == "gap")
+    assert lost[2:] == ("0.3 s lost.", "pelvis", 1.0)
