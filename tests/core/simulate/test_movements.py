@@ -45,7 +45,8 @@ def test_sensors_put_on_as_agreed_sit_alike_whoever_puts_them_on() -> None:
         assert isinstance(a, SquatSimulation)
         assert isinstance(b, SquatSimulation)
         turned = [
-            a.truth.mounts[s].q_segment_sensor @ b.truth.mounts[s].q_segment_sensor for s in a.truth.mounts
+            a.truth.mounts[s].q_segment_sensor @ b.truth.mounts[s].q_segment_sensor
+            for s in ("pelvis", "thigh_r", "shank_r")
         ]
         assert bool(min(abs(x) for x in turned) > 1.0 - 1e-9) is same
 
