@@ -132,7 +132,10 @@ def test_rest_doubts_and_stuck_sensors_are_told_by_segment_and_an_unchanged_sens
     fill(monitor)
     before = monitor.read_health(())
     assert all(x is y for x, y in zip(before, monitor.read_health(()), strict=True))
-    a, b, c = monitor.read_health(("pelvis",), ("foot_l",), {"foot_l": "sensor_late"})
+    hips, foot = HELLO.streams[0].sensors[0].segment, HELLO.streams[1].sensors[0].segment
+    assert hips is not None
+    assert foot is not None
+    a, b, c = monitor.read_health((hips,), (foot,), {foot: "sensor_late"})
     assert (a.still, a.stuck, a.doubt) == (True, False, None)
     assert (c.still, c.stuck, c.doubt) == (False, True, "sensor_late")
     assert b is before[1]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.errors import Notice
-from core.frames import GRAVITY, Bools, Floats
+from core.frames import GRAVITY, Bools, Floats, Segment
 from core.quality.live_stuck import StuckSensors
 from core.timeline.live import UniformBlock
 
@@ -24,7 +24,7 @@ def signals(n: int = 700) -> tuple[Floats, Floats]:
     return acc, gyr
 
 
-def run(size: int) -> tuple[list[UniformBlock], list[Notice], StuckSensors, list[tuple[str, ...]]]:
+def run(size: int) -> tuple[list[UniformBlock], list[Notice], StuckSensors, list[tuple[Segment, ...]]]:
     acc, gyr = signals()
     here = np.ones((size, 2), np.bool_)
     watch = StuckSensors(("pelvis", "foot_l"), RATE)

@@ -6,9 +6,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from core.errors import ParameterError
-from core.frames import FOOT, SHANK, THIGH, Floats
+from core.frames import FOOT, SHANK, THIGH
 from core.rotation import rotate
 from core.simulate.functional import FunctionalTruth, SwingsAndBows, simulate_swings_and_bows
 
@@ -21,7 +22,7 @@ def truth() -> FunctionalTruth:
     return simulate_swings_and_bows(SHORT, HEIGHT_M, seed=3).truth
 
 
-def part(kind: str) -> Floats:
+def part(kind: str) -> NDArray[np.intp]:
     """Samples of one run, without those in which it grows and fades."""
     (phase,) = (p for p in truth().phases if p.kind == kind)
     t = truth().t_s

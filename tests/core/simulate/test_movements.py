@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from core.errors import ParameterError
@@ -9,6 +10,7 @@ from core.simulate.chest import ChestSimulation
 from core.simulate.movements import MOVEMENTS, ChairTest, simulate_movement
 from core.simulate.patients import PATIENTS
 from core.simulate.squat import Squats, SquatSimulation
+from core.simulate.squat_chain import place_as_agreed
 from core.simulate.tug import ChairSimulation
 
 
@@ -36,19 +38,14 @@ def test_titles_say_how_the_sensors_of_squats_sit() -> None:
             assert not movement.agreed
 
 
-def test_sensors_put_on_as_agreed_sit_alike_whoever_puts_them_on() -> None:
-    agreed, again, anyhow, other = (
-        simulate_movement(name, seed, 1.7)
-        for name, seed in (("squats_agreed", 1), ("squats_agreed", 2), ("squats", 1), ("squats", 2))
-    )
-    for a, b, same in ((agreed, again, True), (anyhow, other, False)):
-        assert isinstance(a, SquatSimulation)
-        assert isinstance(b, SquatSimulation)
-        turned = [
-            a.truth.mounts[s].q_segment_sensor @ b.truth.mounts[s].q_segment_sensor
-            for s in ("pelvis", "thigh_r", "shank_r")
-        ]
-        assert bool(min(abs(x) for x in turned) > 1.0 - 1e-9) is same
+@pytest.mark.parametrize(("name", "agreed"), [("squats_agreed", True), ("squats", False)])
+def test_only_sensors_put_on_as_agreed_sit_where_the_analysis_takes_them(name: str, agreed: bool) -> None:
+    made = simulate_movement(name, 1, 1.7)
+    assert isinstance(made, SquatSimulation)
+    for segment, place in place_as_agreed(1.7, ("right",)).items():
+        mount = made.truth.mounts[segment]
+        turned = abs(float(mount.q_segment_sensor @ place.q_segment_sensor))
+        assert (turned > 1.0 - 1e-9 and np.array_equal(mount.position_m, place.position_m)) is agreed
 
 
 def test_rises_of_the_day_are_of_a_chest_and_at_the_asked_rate() -> None:

@@ -33,7 +33,8 @@ UPRIGHT = orient_pelvis(WALKER, ZERO, ZERO, dict.fromkeys(SIDES, ZERO), ZERO)
 def beside(apart_m: float) -> dict[Side, Floats]:
     """Ankles (3, 3) on both sides of the origin."""
     height = WALKER.anatomy.ankle_height
-    return {s: np.tile([0.0, y, height], (3, 1)) for s, y in (("left", apart_m), ("right", -apart_m))}
+    left, right = (np.tile([0.0, y, height], (3, 1)) for y in (apart_m, -apart_m))
+    return {"left": left, "right": right}
 
 
 def test_the_hips_are_half_a_width_to_either_side() -> None:
