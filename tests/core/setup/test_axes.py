@@ -83,6 +83,16 @@ def test_a_right_sensor_refuses_what_a_wrong_one_needs() -> None:
     assert not refuses_choice(with_gyroscope(CHOICES[REVERSED]), RATE, CHOICES[REVERSED], PARAMS)
 
 
+def test_a_sensor_that_fits_nothing_well_refuses_nothing_that_is_hardly_worse() -> None:
+    wrong = with_gyroscope(CHOICES[REVERSED])
+    fit = fit_axes(wrong, RATE, PARAMS)
+    assert fit is not None
+    assert fit.misfits is not None
+    like = int(np.argsort(np.abs(fit.misfits - fit.stated))[1])
+    assert PARAMS.misfit_mps2 < fit.misfits[like] < PARAMS.distinct * fit.stated
+    assert not refuses_choice(wrong, RATE, CHOICES[like], PARAMS)
+
+
 def test_too_few_averages_say_nothing() -> None:
     seven = replace(PARAMS, least_windows=7)
     assert fit_axes(moved(), RATE, seven) is None

@@ -66,6 +66,21 @@ def test_a_foot_lets_go_half_a_step_before_it_lands_at_the_latest() -> None:
     assert (x.heel_off[1:] >= x.flat[:-1]).all()
 
 
+def test_who_limps_is_flat_before_the_heel_rises_again() -> None:
+    """A long step onto a leg that is left again soon: flat for a hundredth of a second at least."""
+    limps = Walker(
+        variability=STEADY,
+        sides={
+            "left": SideGait(flat_from=0.29, time_factor=1.5),
+            "right": SideGait(flat_from=0.29, time_factor=0.5),
+        },
+    )
+    walk = plan((Stand(2.0), straight(8), Stand(2.0)), limps, np.random.default_rng(0))
+    x = foot_timing(walk, limps, "left")
+    assert x.heel_off[1:] - x.flat[:-1] == pytest.approx(0.01)
+    assert x.flat[-1] - x.contact[-1] == pytest.approx(2 * 0.29 * 1.5 * STEP_S)
+
+
 def test_standing_between_two_contacts_is_told_and_does_not_stretch_the_support() -> None:
     assert STOP.stands[1] == pytest.approx((4.5, 7.5))
     for side in SIDES:
