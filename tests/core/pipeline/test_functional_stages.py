@@ -8,12 +8,15 @@ from dataclasses import replace
 import pytest
 
 from core.formats import parse_manifest
+from core.frames import Protocol
 from core.pipeline import PipelineConfig, TakeAnalysis, analyse, resume
+from core.pipeline.functional_stages import measure_trunk_test, measure_walk_test
 from core.pipeline.recipes import BY_TRUNK, choose_recipe
 from core.recording import GivenLimits
 from core.simulate.scripts import ON_SKIN
-from core.simulate.standing import simulate_sway
+from core.simulate.standing import Sway, simulate_sway
 from core.simulate.tug import simulate_tug
+from core.timeline import synchronise
 from server.report.bundle import load_bundle
 from server.report.exports import analysis_files
 from server.report.model import report_model
@@ -78,3 +81,27 @@ def test_the_manifest_carries_what_a_person_said() -> None:
     read = parse_manifest(json.dumps(said).encode())
     assert read.test_limits == GivenLimits(3.5, 20.0)
     assert parse_manifest(b'{"protocol": "tug"}').complete_from(read).test_limits == read.test_limits
+
+
+def test_without_strides_a_walk_test_has_nothing_to_measure() -> None:
+    bare = TakeAnalysis(simulate_sway(Sway(duration_s=5.0)).recording)
+    assert measure_walk_test(bare, PipelineConfig()) is bare
+
+
+@pytest.mark.parametrize(
+    ("protocol", "name"),
+    [
+        ("tug", "tug_duration_s"),
+        ("five_sit_to_stand", "five_sit_to_stand_s"),
+        ("standing_eyes_open", "sway_rms_mps2"),
+    ],
+)
+def test_each_protocol_of_the_trunk_has_its_own_measures(protocol: Protocol, name: str) -> None:
+    """Of somebody who only stands the tests of a chair have no number, and say why."""
+    stood = replace(simulate_sway().recording, protocol=protocol)
+    taken = TakeAnalysis(stood, uniform=synchronise(stood))
+    found = measure_trunk_test(taken, PipelineConfig()).functional
+    assert found is not None
+    (figure,) = (p for p in found.parameters if p.name == name)
+    assert (figure.mean is None) == (protocol != "standing_eyes_open")
+    assert (figure.reason is None) == (protocol == "standing_eyes_open")

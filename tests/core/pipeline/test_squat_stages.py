@@ -15,6 +15,7 @@ from core.frames import Segment
 from core.parameters.symmetry import compare_sides
 from core.pipeline import SQUAT, PipelineConfig, TakeAnalysis, analyse, resume
 from core.pipeline.recipes import choose_recipe
+from core.pipeline.squat_stages import AGREED, NO_HEIGHT
 from core.recording import ImuStream, Recording, Subject, UniformRecording
 from core.rotation import multiply
 from core.simulate import SquatSimulation, simulate_movement
@@ -46,7 +47,7 @@ def test_the_protocol_decides_the_recipe_and_the_squats_are_the_true_ones() -> N
     a = analysis()
     assert a.problem is None
     assert choose_recipe(a) == SQUAT
-    assert [n.code for n in a.notices] == ["mounting_agreed"]
+    assert a.notices == (AGREED,)
     found = {p.name: p for p in a.parameters}
     depths = np.degrees(made().truth.depths_rad)
     assert {p.side for p in a.parameters} == {"right"}
@@ -77,7 +78,7 @@ def test_the_files_give_the_report_back() -> None:
 def test_a_height_that_nobody_gave_is_told() -> None:
     recording = replace(made().recording, subject=Subject())
     a = analyse(recording)
-    assert [n.code for n in a.notices] == ["mounting_agreed", "height_assumed"]
+    assert a.notices == (AGREED, NO_HEIGHT)
     by_angle = {p.name: p.mean for p in a.parameters}
     known = {p.name: p.mean for p in analysis().parameters}
     assert by_angle["squat_depth_deg"] == pytest.approx(known["squat_depth_deg"], abs=0.5)

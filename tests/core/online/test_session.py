@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from core.body.erkf.live_figure import LinkedBody
 from core.body.tree import PRESETS
 from core.errors import Notice, ParameterError
 from core.frames import SIDES, Segment
-from core.online import LiveFrame, LiveStride, OnlineSession
+from core.online import LiveFrame, LiveStride
+from core.online.session import OnlineSession
 from core.parameters.spatial import NAMES as SPATIAL
 from core.recording import SensorSignals, UniformRecording
 from tests.helpers.live_walks import batches, hello_of, live, recorded
@@ -252,3 +254,43 @@ def test_a_late_sensor_is_told_and_marked_until_calibrated_again() -> None:
     )
     assert frame is not None
     assert not any(h.doubt for h in frame.health)
+
+
+def test_a_walk_has_no_test_to_guide_and_a_timed_one_has() -> None:
+    take = walk(1.0)
+    plain = OnlineSession(hello_of(take))
+    assert plain.guide_test() is None
+    assert plain.segments == tuple(take.sensors)
+    # nothing to go for, and a word that nobody knows
+    plain.command("test", "go")
+    plain.command("dance")
+    assert plain.guide_test() is None
+    assert plain.compare_sensors() == []
+    for protocol, phase in (("standing_eyes_open", "ready"), ("tug", "get_ready")):
+        timed = OnlineSession(hello_of(take), protocol=protocol)  # type: ignore[arg-type]
+        before = timed.guide_test()
+        assert before is not None
+        assert (before.protocol, before.phase) == (protocol, "get_ready")
+        timed.command("test", "go")
+        after = timed.guide_test()
+        assert after is not None
+        # who rises from a chair begins by rising
+        assert after.phase == phase
+        timed.command("test", "repeat")
+        again = timed.guide_test()
+        assert again is not None
+        assert again.phase == "get_ready"
+
+
+def test_a_frame_is_of_the_last_sample_that_is_known() -> None:
+    take = walk(2.0)
+    session = OnlineSession(hello_of(take))
+    frames = [(b.seq, session.push(b)) for b in batches(take)]
+    told = [(seq, f) for seq, f in frames if f is not None]
+    assert told
+    assert [f.seq for _, f in told] == [seq for seq, _ in told]
+    assert all(a.t_s < b.t_s for (_, a), (_, b) in pairwise(told))
+    assert told[-1][1].t_s <= take.t_s[-1]
+    last = told[-1][1]
+    assert (last.method, last.stage) == ("none", "stand")
+    assert {h.segment for h in last.health if h.still} == set(take.sensors)
