@@ -283,7 +283,6 @@ UNTESTED: Final = frozenset(
         "server/pages/programme.py",
         "server/pages/report_rows.py",
         "server/pages/sensitivity.py",
-        "server/pages/sign_in.py",
         "server/pages/study.py",
         "server/pages/takes.py",
         "server/pages/texts.py",
