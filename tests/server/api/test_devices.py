@@ -25,7 +25,6 @@ MEASURED = DeviceCheck(
     0.002,
     np.array([0.0, 0.6, 0.8]),
     9.7,
-    9.7 / GRAVITY,
     2e-4,
     1e-3,
 )
