@@ -14,6 +14,7 @@ from server.api.downloads import attachment, write_disposition
     [
         ("walk.csv", "walk.csv"),
         ("two words.csv", "two words.csv"),
+        ("a/b.csv", "a/b.csv"),
         ("Gänge.csv", "G_nge.csv"),
         ('a"; x="b.csv', "a_; x=_b.csv"),
         ("a\\b%2e.csv", "a_b_2e.csv"),

@@ -6,11 +6,14 @@ from dataclasses import replace
 
 import pytest
 
+from core.frames import Side
 from server.pages import figures
 from server.pages.figures import draw_beginning, draw_contact
-from server.services import histories, patients, reports, sessions
+from server.report.bundle import read_poses
+from server.services import analyses, histories, patients, reports, sessions
 from server.storage.blobs import Blob
 from server.viewer.client import client_version
+from server.viewer.still import draw_still
 from tests.server import analysed
 from tests.server.clinic import Clinic
 
@@ -29,11 +32,16 @@ async def test_a_contact_of_the_affected_side_is_drawn_with_its_caption(
         (this,) = histories.list_analysed(c, pid)
     reviewed = clinic.app.state.reviewed
     strides = reviewed.read_bundle(this.found, this.edits).strides
-    for side in ("left", "right"):
+    poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))
+    sides: tuple[Side, ...] = ("left", "right")
+    for side in sides:
         drawn = draw_contact(reviewed, this, strides, replace(patient, affected_side=side))
         assert drawn is not None
         assert drawn["caption"] == f"Contact, {side} foot"
-        assert drawn["svg"].lstrip().startswith("<svg")
+        mine = [x for x in strides.strides if x.side == side and x.excluded_reason is None]
+        middle = mine[len(mine) // 2]
+        assert len(mine) > 3
+        assert drawn["svg"] == draw_still(poses, middle.start_s, side, drawn["caption"])
     counted = [s for s in strides.strides if s.excluded_reason is None]
     any_side = draw_contact(reviewed, this, strides, patient)
     assert any_side is not None

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import datetime as dt
+import json
 import re
 
 import pytest
 from sqlalchemy import update
 
-from server.services import live
+from server.auth.identity import Identity
+from server.auth.roles import Role
+from server.pages.patients import FILTERS, list_patients
+from server.services import live, patients, programmes, recordings, sessions
 from server.storage.live_tables import live_take
 from server.storage.tables import now
+from tests.server import analysed
 from tests.server.clinic import Clinic
 from tests.server.pages.test_patient import API, rows_of, text_of, walked
 
@@ -64,3 +69,31 @@ async def test_lists_show_a_live_take_from_its_code_to_its_end(clinic: Clinic) -
     with clinic.db.write() as c:
         live.end(c, None, take.id, "closed", count=0)
     assert await states() == ["No recording yet"] * 2
+
+
+async def test_a_row_says_what_it_is_looked_for_by(clinic: Clinic) -> None:
+    today = now().date()
+    with clinic.db.write() as c:
+        here, planned, nobody = (patients.create(c, None, code=f"K-{k}").id for k in range(3))
+        visit = sessions.create(c, None, here, performed_on=today).id
+        programmes.start(c, None, planned, starts_on=today)
+
+    def kinds(*, results: bool = True) -> dict[str, set[str]]:
+        who = Identity(clinic.user("viewer"), "viewer", "", Role.VIEWER, "")
+        with clinic.db.read() as c:
+            found = patients.list_patients(c, who, search="K-")
+            rows = list_patients(c, clinic.app.state.reviewed, found, results=results)
+        return {row["id"]: set(row["kinds"]) for row in rows}
+
+    assert kinds() == {here: {"today"}, planned: {"programme"}, nobody: set()}
+    state = clinic.app.state
+    with recordings.receive(clinic.db, state.blobs, clinic.settings, None, visit, "walk.txt") as upload:
+        upload.write(b"x")
+        upload.keep()
+    assert kinds()[here] == {"today", "check"}, "sensors are to be checked"
+    files = dict(analysed.files())
+    poor = json.loads(files["analysis.json"]) | {"parameters": []}
+    analysed.finish(clinic, here, visit, files | {"analysis.json": json.dumps(poor).encode()})
+    assert kinds()[here] == {"today", "check"}, "no strides"
+    assert kinds(results=False)[here] == {"today"}
+    assert {key for key, _ in FILTERS if key} == {"today", "check", "programme"}
