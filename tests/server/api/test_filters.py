@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from server.jobs.queue import COMPARE_FILTERS
@@ -32,11 +34,12 @@ async def test_a_comparison_is_asked_for_once_and_read_with_its_files(clinic: Cl
     done = analysed.finish(clinic, patient, session, analysed.files())
     here = f"{API}/sessions/{session}/filter-runs"
     async with clinic.client("clinician") as client:
-        for wrong in (
+        refused: tuple[dict[str, Any], ...] = (
             {"filters": []},
             {"filters": ["no_such_filter"]},
             {"filters": ["mahony_2008"], "speed": 2},
-        ):
+        )
+        for wrong in refused:
             assert (await client.post(here, json=wrong)).status_code == 422, wrong
         asked = {"filters": ["mahony_2008"]}
         missing = await client.post(here, json=asked | {"reference": "none.sto"})

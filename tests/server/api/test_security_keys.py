@@ -35,6 +35,7 @@ async def test_a_key_is_added_listed_and_removed_with_password_and_code(clinic: 
         assert await ask("POST", options, password="wrong", code=codes[-1]) == (403, "wrong_password")
         assert await ask("POST", options, password=PASSWORD, code="000000") == (403, "wrong_code")
         assert await ask("PUT", "/second-factor/keys-only", on=True, **both()) == (409, "no_key")
+        assert await ask("PUT", "/second-factor/keys-only", on=False, **both()) == (204, "")
         asked = (await client.post(ACCOUNT + options, json=both())).json()["options"]
         key = SoftKey()
         body = {"name": " blue ", "key": key.create(asked, HERE)}
@@ -64,5 +65,5 @@ async def test_a_key_is_added_listed_and_removed_with_password_and_code(clinic: 
     ]
     assert done == [
         "user.security_key_removed", "user.codes_again", "user.keys_only",
-        "user.security_key_refused", "user.security_key_added",
+        "user.security_key_refused", "user.security_key_added", "user.codes_again",
     ]  # fmt: skip

@@ -81,6 +81,7 @@ async def test_set_up_makes_the_first_administrator_once(tmp_path: Path) -> None
             assert (account["name"], account["role"]) == ("anna", "admin")
             again = await client.post(f"/api/v1/set-up/{token}", json=body)
             assert (again.status_code, again.json()["code"]) == (404, "link_not_valid")
+            assert (await client.post("/api/v1/sign-in", json=body)).status_code == 200
         with clinic.db.write() as c:
             other = one_time.issue_set_up(c)
             assert not one_time.is_valid(c, other, "set_up")

@@ -34,8 +34,10 @@ def test_an_answer_has_every_member_of_its_source(
 
 
 def test_a_condition_is_answered_as_it_was_walked_and_in_words() -> None:
-    walked = replace(USUAL, pace="fast", aid="cane", feedback=True, protocol="treadmill", belt_speed_mps=1.25)
+    walked = replace(
+        USUAL, pace="fast", aid="stick", feedback=True, protocol="treadmill", belt_speed_mps=1.25
+    )
     said = make_answer(schemas.Condition, walked)
-    assert (said.protocol, said.belt_speed_mps, said.pace, said.aid) == ("treadmill", 1.25, "fast", "cane")
+    assert (said.protocol, said.belt_speed_mps, said.pace, said.aid) == ("treadmill", 1.25, "fast", "stick")
     assert said.words == walked.words
     assert "1.25" in said.words

@@ -41,7 +41,8 @@ class Child:
 
     async def hear(self) -> Order:
         async with asyncio.timeout(10):
-            return decode_order(await read_message(self.reader))
+            order: Order = decode_order(await read_message(self.reader))
+        return order
 
     def say(self, report: Report) -> None:
         self.writer.write(frame(encode(report)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from server.report.bundle import read_poses
@@ -45,6 +46,9 @@ def check(clinic: Clinic) -> None:
     assert norm is not None
     assert len(norm.frames) == len(motion.t_s)
     assert found["norm"]() is norm
+    height_m = norm.batches["pelvis"].position[norm.frames >= 0][..., 2]
+    assert np.ptp(height_m) < 0.08, "the pelvis of a healthy walk hardly rises"
+    assert 0.85 < height_m.mean() < 0.95
     # rad, not degrees: no joint of a walk turns by more than a third of a turn
     assert all(abs(x).max() < 2.1 for mine in curves.values() for x in mine.values())
     without = replace(
