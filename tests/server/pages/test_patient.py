@@ -1,22 +1,14 @@
-"""A patient's page and the list of patients: visits with their takes, speed and change, notes by date."""
+"""A patient's page: visits with their takes, speed and change, notes by date."""
 
 from __future__ import annotations
 
-import datetime as dt
 import json
 import re
 from collections.abc import Sequence
 from typing import Any
 
 import pytest
-from sqlalchemy import update
 
-from server.auth import accounts
-from server.auth.identity import Identity
-from server.auth.roles import Role
-from server.services import live, notes, patients
-from server.storage.live_tables import live_take
-from server.storage.tables import now
 from tests.server import analysed
 from tests.server.clinic import Clinic
 
@@ -101,21 +93,6 @@ async def test_a_take_is_compared_with_the_day_before_and_not_with_the_take_befo
     assert "Changed since 2 Mar 2026" in html
 
 
-async def test_the_list_says_speed_change_and_what_to_look_at(clinic: Clinic) -> None:
-    await walked(
-        clinic, "V-3", [("2026-03-02", 0.60, {}), ("2026-04-06", 0.90, {}), ("2026-04-06", 1.00, {})]
-    )
-    await walked(clinic, "V-4", [("2026-03-02", 0.80, {}), ("2026-04-06", 1.30, {"feedback": True})])
-    html = await text_of(clinic, "/patients")
-    rows = {row.split()[0]: row for row in rows_of(html)}
-    assert re.search(r"0\.95 \+0\.35 changed", rows["V-3"])
-    assert re.search(r"0\.80 first in this condition", rows["V-4"]), "a training with feedback is no speed"
-    assert re.search(r'data-show="".*?All <span class="dim num">\d+', html, re.DOTALL)
-    hidden = await text_of(clinic, "/patients", "assistant")
-    assert "0.95" not in hidden
-    assert "Since the visit before" not in hidden
-
-
 async def test_notes_stand_by_date_beside_those_of_visits_and_go_with_the_patient(clinic: Clinic) -> None:
     patient, _ = await walked(clinic, "V-5", [("2026-03-02", 0.60, {"note": "Tired after six minutes."})])
     async with clinic.client("clinician") as client:
@@ -145,29 +122,6 @@ async def test_notes_stand_by_date_beside_those_of_visits_and_go_with_the_patien
         ).status_code == 403
 
 
-async def test_a_note_is_removed_by_who_wrote_it_or_an_administrator(clinic: Clinic) -> None:
-    with clinic.db.write() as c:
-        other = accounts.create(c, "colleague", None, Role.CLINICIAN, "x").id
-        patient = patients.create(c, None, code="V-NOTES").id
-        colleague = Identity(other, "colleague", "", Role.CLINICIAN, "")
-        theirs = notes.add(c, colleague, patient, "Written by a colleague.").id
-    async with clinic.client("clinician") as client:
-        mine = (await client.post(f"{API}/patients/{patient}/notes", json={"content": "My own."})).json()[
-            "id"
-        ]
-        html = (await client.get(f"/patients/{patient}")).text
-        assert f'commandfor="remove-note-{mine}"' in html
-        assert "Remove this note?" in html
-        assert theirs not in html
-        refused = await client.delete(f"{API}/notes/{theirs}")
-        assert (refused.status_code, refused.json()["code"]) == (403, "not_yours")
-        assert "colleague wrote this note" in refused.json()["detail"]
-        assert (await client.delete(f"{API}/notes/{mine}")).status_code == 204
-    async with clinic.client("admin") as client:
-        assert theirs in (await client.get(f"/patients/{patient}")).text
-        assert (await client.delete(f"{API}/notes/{theirs}")).status_code == 204
-
-
 async def test_who_may_not_plan_or_map_is_not_led_there(clinic: Clinic) -> None:
     patient, session = await walked(clinic, "V-ROLES", [("2026-03-02", 0.60, {})])
     async with clinic.client("viewer") as client:
@@ -178,37 +132,3 @@ async def test_who_may_not_plan_or_map_is_not_led_there(clinic: Clinic) -> None:
     async with clinic.client("clinician") as client:
         assert "Plan a programme" in (await client.get(f"/patients/{patient}")).text
         assert "Change mapping" in (await client.get(f"/sessions/{session}/data")).text
-
-
-async def test_lists_show_a_live_take_from_its_code_to_its_end(clinic: Clinic) -> None:
-    async with clinic.client("clinician") as client:
-        patient = (await client.post(f"{API}/patients", json={"code": "V-LIVE"})).json()["id"]
-        body = {"title": "Training", "performed_on": "2026-11-28"}
-        session = (await client.post(f"{API}/patients/{patient}/sessions", json=body)).json()["id"]
-
-    async def states() -> list[str]:
-        (in_list,) = [r for r in rows_of(await text_of(clinic, "/patients")) if r.startswith("V-LIVE")]
-        (of_visit,) = rows_of(await text_of(clinic, f"/patients/{patient}"))
-        words = ("No recording yet", "Waiting for the tablet", "Live now")
-        return [w for row in (in_list, of_visit) for w in words if row.endswith(w)]
-
-    assert await states() == ["No recording yet"] * 2
-    with clinic.db.write() as c:
-        take, code = live.open_take(c, None, session)
-    assert await states() == ["Waiting for the tablet"] * 2
-    assert "Waiting for the tablet" in await text_of(clinic, f"/sessions/{session}")
-    with clinic.db.write() as c:
-        c.execute(update(live_take).values(code_expires_at=now() - dt.timedelta(seconds=1)))
-    assert await states() == ["No recording yet"] * 2
-    with clinic.db.write() as c:
-        c.execute(update(live_take).values(code_expires_at=now() + dt.timedelta(minutes=1)))
-        live.pair(c, code)
-    assert await states() == ["Waiting for the tablet"] * 2
-    with clinic.db.write() as c:
-        live.note_start(c, take.id, "replay")
-    assert await states() == ["Live now"] * 2
-    assert f'href="/sessions/{session}/live"' in await text_of(clinic, "/patients", "clinician")
-    assert f'href="/sessions/{session}/live"' not in await text_of(clinic, "/patients", "viewer")
-    with clinic.db.write() as c:
-        live.end(c, None, take.id, "closed", count=0)
-    assert await states() == ["No recording yet"] * 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import os
+from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,13 @@ from tests.server.live.test_client import given
 from tests.server.serving import serve
 
 pytestmark = pytest.mark.anyio
+
+
+@pytest.fixture(scope="module")
+async def port(clinic: Clinic) -> AsyncIterator[int]:
+    async with serve(clinic.app) as number:
+        yield number
+
 
 PIECES = [b"\x1a\x45\xdf\xa3" + bytes(1000), b"two" * 500, b"three" * 400]
 BEGAN_US = 5_000_000
