@@ -1,8 +1,8 @@
 """Mutation check: how many random faults of one line the quick tests notice.
 
 `python -m validation.mutations --out FILE` draws mutations of core and server by cosmic-ray (`pip install
-cosmic-ray`), each in a module drawn by its length. On each it runs the quick tests nearest to it: the module's
-own, those that import it, its package, or what imports it. With `--tree` another checkout, for which the same
+cosmic-ray`), each in a module drawn by its length. On each it runs the quick tests nearest to it: its own,
+those that import the module, its package, or what imports it. With `--tree` another checkout, for which the same
 packages are installed, is judged by its own tests on those mutations whose line it has. What FILE has already
 is not repeated.
 """
