@@ -199,7 +199,10 @@ def take_mean_out(slow: Floats, rate_hz: float, params: JointParams, pad: int | 
 def find_usable(valid: Bools, rate_hz: float) -> Bools:
     """Samples (k, n) near which none of valid (n, k) was lost."""
     near = round(NEAR_GAP_S * rate_hz)
-    return np.array([np.convolve(~x, np.ones(2 * near + 1), "same") <= 0.5 for x in valid.T], np.bool_)
+    around = np.ones(2 * near + 1)
+    # of a part shorter than that "same" would give too many
+    lost = [np.convolve(~x, around)[near : near + len(x)] for x in valid.T]
+    return np.asarray(np.array(lost) <= 0.5)
 
 
 def cut_terms(terms: SensorTerms, start_s: float, end_s: float) -> TermsPart:

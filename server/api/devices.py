@@ -1,14 +1,15 @@
-"""The clinic's sensors by serial number, without a word of who wore them."""
+"""The clinic's sensors by serial number, without a word of who wore them; what is not defined is null."""
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter
 from starlette.responses import Response
 
-from server.api.device_schemas import DeviceAnswer, DeviceCheckAnswer
 from server.api.downloads import BINARY, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -34,6 +35,42 @@ COLUMNS = (
     "gyro_bias_x_rad_s", "gyro_bias_y_rad_s", "gyro_bias_z_rad_s", "bias_error_rad_s", "up_x", "up_y", "up_z",
     "rest_norm_mps2", "gravity_scale", "gyro_noise_rad_s_rthz", "acc_noise_mps2_rthz", "reason",
 )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class DeviceCheckAnswer:
+    """What one take showed of a sensor, in its own axes, or why nothing.
+
+    `rest_s`: the window, from the sensor's first sample. `bias_error`: what the wearer may have turned at.
+    `up`: the vertical. `rthz`: per √Hz.
+    """
+
+    day: dt.date
+    segment: str
+    rate_hz: float
+    rest_s: tuple[float, float] | None
+    gyro_bias_rad_s: list[float] | None
+    bias_error_rad_s: float | None
+    up: list[float] | None
+    rest_norm_mps2: float | None
+    gravity_scale: float | None
+    gyro_noise_rad_s_rthz: float | None
+    acc_noise_mps2_rthz: float | None
+    reason: str | None
+
+
+@dataclass(frozen=True)
+class DeviceAnswer:
+    """A sensor: where it was worn last, what is said of it and why, its newest checks, oldest first."""
+
+    device_id: str
+    last_worn_on: dt.date
+    last_segment: str
+    takes: int
+    state: Literal["steady", "changed", "unknown"]
+    words: str
+    reasons: list[str]
+    checks: list[DeviceCheckAnswer]
 
 
 @router.get("/devices", response_model=list[DeviceAnswer])

@@ -30,6 +30,7 @@ from server.auth.sessions import Logins
 from server.auth.tokens import token_hash
 from server.context import Config, Db, Failures, OpenLogins, OpenTrail, address_of
 from server.http.json_body import StrictJsonRoute
+from server.http.local_path import local_path
 from server.http.problems import SENTENCES, Problem
 from server.storage.refusal import refusal_of
 from server.trail import AuditTrail
@@ -232,14 +233,6 @@ def sign_in_once(token: str, request: Request, db: Db, logins: OpenLogins, trail
     response = RedirectResponse("/patients", status_code=303)
     set_token(response, request, session)
     return response
-
-
-def local_path(path: str | None) -> str:
-    """Return where to go after signing in: a path of this server, else the patients."""
-    # browsers read // and /\\ as the start of another host, and drop control characters first
-    if not path or not path.isprintable() or not path.startswith("/") or path[1:2] in {"/", "\\"}:
-        return "/patients"
-    return path
 
 
 def _open(

@@ -49,8 +49,6 @@ from server.storage.blobs import StoreAway
 from server.storage.tables import now
 from web.words import number
 
-"""Protocols that say how a person walks."""
-
 PURPOSE_WORDS: Final = {
     "recording": "Measuring and storing",
     "research": "Use in research",

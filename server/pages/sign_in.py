@@ -14,6 +14,7 @@ from server.auth.identity import Identity
 from server.auth.passwords import MIN_LENGTH
 from server.auth.roles import Action
 from server.context import Db
+from server.http.local_path import local_path
 from server.http.templates import render
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -28,8 +29,7 @@ def go_home(who: Annotated[Identity, require(Action.READ_PATIENT)]) -> Response:
 @router.get("/sign-in", dependencies=[require(Action.SIGN_IN)])
 def show_sign_in(request: Request, next: Annotated[str, Query(max_length=2000)] = "/patients") -> Response:  # noqa: A002 - the name in the address
     """Ask for name and password."""
-    local = next if next.startswith("/") and next[1:2] not in {"/", "\\"} else "/patients"
-    return render(request, "sign-in.html", {"next": local})
+    return render(request, "sign-in.html", {"next": local_path(next)})
 
 
 @router.get("/set-up/{token}", dependencies=[require(Action.SET_UP)])

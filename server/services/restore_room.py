@@ -22,9 +22,9 @@ from server.storage.migrate import MigrationError, exists, require_current
 _MAY_BE_THERE: Final = {"lost+found", "cache", "server.lock", "workers.lock", "part-locks"}
 """What an empty data folder may hold."""
 _OF_A_START: Final = re.compile(
-    r"(blobs(/incoming)?|nodes|nodes/[^/]+)/|nodes/(key(\.lock)?|[^/]+/server\.lock)"
+    r"(backups|blobs(/incoming)?|nodes|nodes/[^/]+)/|nodes/(key(\.lock)?|[^/]+/server\.lock)"
 )
-"""Folders (with a slash) and files that a server which did not start may have left in one."""
+"""Folders (with a slash) and files that a trial of a backup, or a server that did not start, may leave."""
 _MARGIN: Final = 1.1
 """Room that a restore needs, as a part of the archive."""
 

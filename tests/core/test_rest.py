@@ -12,6 +12,7 @@ from core.frames import Floats
 from core.recording import SensorSignals, Subject, UniformRecording
 from core.rest import (
     RestParams,
+    count_runs,
     drop_false_rests,
     find_rest_windows,
     find_runs,
@@ -42,6 +43,17 @@ def with_walk(signals: SensorSignals, start_s: float, end_s: float) -> SensorSig
 def take(**sensors: SensorSignals) -> UniformRecording:
     n = len(next(iter(sensors.values())).acc)
     return UniformRecording(np.arange(n) / RATE, RATE, sensors, Subject(), "walk", {})  # type: ignore[arg-type]
+
+
+def test_runs_are_counted_across_blocks() -> None:
+    mask = np.array([[1, 0], [1, 1], [0, 1], [1, 1], [1, 0], [1, 1]], np.bool_)
+    expected = [[1, 0], [2, 1], [0, 2], [1, 3], [2, 0], [3, 1]]
+    for size in (1, 2, 4, 6):
+        before = np.zeros(2, np.int64)
+        found = [count_runs(mask[k : k + size], before) for k in range(0, len(mask), size)]
+        assert np.concatenate(found).tolist() == expected
+        assert count_runs(mask[:0], before).shape == (0, 2)
+        assert before.tolist() == expected[-1]
 
 
 @pytest.mark.parametrize(("start", "end"), [(5.0, 20.0), (0.0, 15.0), (3.0, 17.0)])

@@ -246,7 +246,6 @@ async def fill(clinic: Clinic, hostile: Hostile) -> Mapping[str, str]:
 
 
 NOT_SHOWN: Final = {
-    "filter_run.reference_name",  # on the page of a run that is done
     "security_key.host", "security_key.name",  # where the site has TLS
     "web_node.address", "web_node.name",  # where several web servers serve
 }  # fmt: skip

@@ -39,15 +39,6 @@ def test_what_it_leaves_out_and_compares_with_is_said(make_bundle: MakeBundle) -
     assert profile.index.startswith("GDI*, sagittal: left ")
 
 
-def test_why_there_is_no_profile_score_is_said_in_german(make_bundle: MakeBundle) -> None:
-    profile = report_model(make_bundle()).profile
-    assert profile is not None
-    said = load_catalogue("de").translate(profile.note)
-    missing = next(s for s in said.split(". ") if "GPS" in s)
-    assert missing.startswith("Es gibt keinen GPS (nicht gemessen: "), missing
-    assert "Beckenrotation" in missing, missing
-
-
 def test_estimated_angles_are_not_scored(make_bundle: MakeBundle) -> None:
     bundle = make_bundle(estimator=section(estimated_angles=["knee_flexion_l", "knee_flexion_r"]))
     profile = report_model(bundle).profile

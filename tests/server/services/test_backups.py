@@ -18,7 +18,7 @@ from sqlalchemy import insert, select
 from server import audit
 from server.main import main
 from server.services import backups, checks, erasure, identities, patients, recordings, report_links, sessions
-from server.services.backups import MANIFEST, BackupError, MadeBackup, choose_kept, list_backups, make_backup
+from server.services.backups import MANIFEST, BackupError, MadeBackup, choose_kept, make_backup
 from server.services.restore_room import RestoreError
 from server.services.restoring import RestoredClinic, restore, try_restore
 from server.services.reviewed import ReviewedAnalyses
@@ -35,7 +35,6 @@ from server.storage.tables import audit as audit_table
 from server.storage.tables import login_session, now, user
 from tests.faults.clinic import Clinic, find_room
 from tests.helpers.engines import on_both_engines, tell_commands
-from tests.helpers.marks import sqlite_only
 
 CUT = "is damaged or was cut"
 _put_back: list[Database] = []
@@ -378,30 +377,6 @@ def test_days_weeks_and_months_are_kept() -> None:
     assert min(kept).date() == dt.date(2025, 7, 31)
     # tomorrow's rule keeps what today's kept, as long as each is the newest of its time
     assert choose_kept(kept) == set(kept)
-
-
-@pytest.mark.slow
-@sqlite_only
-def test_commands_make_prune_try_and_restore(
-    clinic: Clinic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    disk, key = tmp_path / "disk", str(tmp_path / "clinic.key")
-    old = [disk / f"sagittal-20200101T0{i}0000Z.tar" for i in (1, 2)]
-    for path in (*old, disk / "holiday.jpg"):
-        path.touch()
-    assert main(["keygen", key]) == 0
-    data = ["--data", str(clinic.folder)]
-    assert main(["backup", str(disk), "--key", key, "--prune", *data]) == 0
-    assert not old[0].exists()
-    assert (disk / "holiday.jpg").exists()
-    made = list_backups(disk)[0]
-    assert main(["restore", str(made.path), "--test", "--key", key, *data]) == 0
-    assert "It could be restored" in capsys.readouterr().out
-    assert main(["restore", str(made.path), "--key", key, *data]) == 1
-    assert "is not empty" in capsys.readouterr().err
-    assert main(["restore", str(made.path), "--key", key, "--data", str(tmp_path / "new")]) == 0
-    with closing(Database(tmp_path / "new" / "sagittal.db")) as db, db.read() as c:
-        assert c.execute(select(user.c.name)).scalars().all() == ["ada"]
 
 
 @pytest.mark.postgres

@@ -1,0 +1,98 @@
+"""Words about sensors that disagree: numbers, signs, and what was done."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import radians
+
+import pytest
+
+from core.agreement.exchange import SensorExchange
+from core.agreement.lags import SensorDrift, SensorLag
+from core.agreement.params import ExchangeParams, LagParams, SlipParams
+from core.agreement.slips import SensorSlip
+from core.agreement.tell import (
+    list_sensors,
+    say_exchange,
+    say_lag,
+    say_slip,
+    tell_drift,
+    tell_exchange,
+    tell_lag,
+    tell_left_over,
+    tell_slip,
+)
+
+LATE = SensorLag(("shank_r", "foot_r"), 0.0404, 0.0012, told=True, sure=True)
+SLIP = SensorSlip("thigh_l", 17.2, 2.4, -radians(15.0), radians(1.2), (0.0, 0.0, 1.0))
+
+
+def test_a_lag_is_said_in_milliseconds_with_its_direction() -> None:
+    assert say_lag(LATE) == "The clock of shank_r and foot_r is 40 ± 1 ms late"
+    early = replace(LATE, sensors=("foot_l",), lag_s=-0.0404, sure=False)
+    assert say_lag(early) == "The clock of foot_l seems 40 ± 1 ms early"
+
+
+def test_what_was_done_about_a_lag_is_said() -> None:
+    told = tell_lag(LATE, LagParams())
+    assert (told.code, told.sensor, told.severity) == ("sensor_late", "shank_r", "warning")
+    assert "its samples were shifted by that. Synchronise" in told.message
+    little = tell_lag(replace(LATE, lag_s=-0.025), LagParams(warn_s=0.025))
+    assert little.severity == "info"
+    assert "Synchronise" not in little.message
+    assert tell_lag(replace(LATE, lag_s=-0.0251), LagParams(warn_s=0.025)).severity == "warning"
+    left = tell_lag(LATE, LagParams(repair=False))
+    assert "It was left so" in left.message
+    unsure = tell_lag(replace(LATE, sure=False), LagParams())
+    assert unsure.code == "clocks_disagree"
+    assert "nothing was shifted" in unsure.message
+
+
+@pytest.mark.parametrize(("change_s", "which"), [(0.030, "slow"), (-0.030, "fast")])
+def test_a_drift_has_a_direction(change_s: float, which: str) -> None:
+    drift = SensorDrift("foot_l", change_s, 0.004, 10.0, 70.0)
+    told = tell_drift(drift, LagParams())
+    assert (told.code, told.sensor) == ("clock_drifts", "foot_l")
+    assert told.message.startswith(
+        f"The clock of foot_l runs {which}, by 30 ± 4 ms over the walk; its samples"
+    )
+    assert "it was left so" in tell_drift(drift, LagParams(repair=False)).message
+
+
+def test_an_exchange_names_its_pairs() -> None:
+    found = SensorExchange((("thigh_l", "thigh_r"), ("foot_l", "foot_r")), 1.5, None)
+    assert say_exchange(found) == (
+        "The joints show that sensors are exchanged: thigh_l with thigh_r and foot_l with foot_r."
+    )
+    told = tell_exchange(found, ExchangeParams())
+    assert (told.code, told.sensor) == ("sensors_exchanged", "thigh_l")
+    assert "the right way round" in told.message
+    assert "Nothing was changed" in tell_exchange(found, ExchangeParams(repair=False)).message
+
+
+def test_a_slip_is_said_in_degrees_with_its_moment() -> None:
+    assert say_slip(SLIP) == "The sensor on thigh_l slipped by 15 ± 1° about 17 s."
+    at_rest = say_slip(replace(SLIP, at_rest=True))
+    assert at_rest.startswith("The sensor on thigh_l slipped by 15 ± 1° before the walk at 20 s, or its leg")
+
+
+def test_what_follows_from_a_slip_is_said() -> None:
+    shank = tell_slip(replace(SLIP, segment="shank_l"), SlipParams())
+    assert (shank.code, shank.sensor, shank.t_s) == ("sensor_slipped", "shank_l", 17.2)
+    assert "within 2 s of that; what came after was turned back" in shank.message
+    assert "From 15 s on it is left out" in tell_slip(SLIP, SlipParams()).message
+    assert "From 0 s on" in tell_slip(replace(SLIP, at_s=1.0), SlipParams()).message
+    assert "It is left out, as if" in tell_slip(replace(SLIP, at_rest=True), SlipParams()).message
+    assert "It was left so" in tell_slip(SLIP, SlipParams(repair=False)).message
+
+
+def test_what_is_left_after_the_repair_is_doubtful() -> None:
+    told = tell_left_over(replace(LATE, lag_s=-0.0404))
+    assert (told.code, told.sensor) == ("clocks_disagree", "shank_r")
+    assert "After the repair shank_r and foot_r still seems 40 ms off" in told.message
+
+
+def test_sensors_are_listed_as_in_a_sentence() -> None:
+    assert list_sensors(["a"]) == "a"
+    assert list_sensors(["a", "b"]) == "a and b"
+    assert list_sensors(("a", "b", "c")) == "a, b and c"

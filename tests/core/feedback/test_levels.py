@@ -1,0 +1,121 @@
+"""Levels of one take: where they begin, when they become harder or easier, and where they end."""
+
+from __future__ import annotations
+
+import pytest
+
+from core.feedback.baseline import Baseline
+from core.feedback.cue import Zone
+from core.feedback.levels import Ladder
+from core.feedback.prescription import LEVELS, Progression
+from core.feedback.zones import Zones
+
+ZONES = Zones(mean=0.60, sd=0.05)
+LOW = Zones(mean=0.60, sd=0.05, worse="low")
+RULE = Progression(window=4, share=0.7, away_share=0.5)
+
+
+def ladder(
+    baseline: Baseline | None = None, zones: Zones = LOW, rule: Progression = RULE, level: int | None = None
+) -> Ladder:
+    made = Ladder(zones, rule, baseline or Baseline())
+    if level is not None:
+        made.move(level)
+    return made
+
+
+def walk(made: Ladder, *zones: Zone) -> int:
+    for zone in zones:
+        made.add_stride(zone)
+    made.follow_rule()
+    return made.level
+
+
+@pytest.mark.parametrize(
+    ("baseline", "start", "level"),
+    [
+        (Baseline(last_level=2, mean=0.40), 5, 2),
+        (Baseline(last_level=0, mean=0.40), 5, 0),
+        (Baseline(mean=0.40), 5, 5),
+        (Baseline(mean=0.40), None, 3),
+        (Baseline(), None, 0),
+    ],
+)
+def test_it_begins_where_the_last_training_ended_else_by_the_record_else_by_the_person(
+    baseline: Baseline, start: int | None, level: int
+) -> None:
+    made = Ladder(LOW, Progression(start_level=start), baseline)
+    assert made.level == level
+    assert made.known == (baseline != Baseline() or start is not None)
+
+
+def test_the_side_of_the_person_comes_from_before_or_from_the_first_strides() -> None:
+    assert Ladder(ZONES, RULE, Baseline(mean=0.40)).zones.worse == "low"
+    assert Ladder(ZONES, RULE, Baseline(mean=0.70)).zones.worse == "high"
+    assert Ladder(LOW, RULE, Baseline(mean=0.70)).zones.worse == "low", "what the record says stays"
+    unknown = Ladder(ZONES, RULE, Baseline())
+    assert not unknown.known
+    unknown.end_first_strides([0.74, 0.76])
+    assert (unknown.zones.worse, unknown.level, unknown.known) == ("high", 2, True)
+
+
+def test_first_strides_do_not_move_a_level_that_is_known() -> None:
+    made = Ladder(ZONES, Progression(start_level=1), Baseline())
+    assert not made.known, "the side is not"
+    made.end_first_strides([0.30])
+    assert (made.level, made.zones.worse, made.known) == (1, "low", True)
+
+
+def test_a_full_window_in_the_zone_makes_it_harder_and_a_new_one_begins() -> None:
+    made = ladder(level=3)
+    assert walk(made, "in", "in", "in") == 3, "the window is not full"
+    assert made.window_n == 3
+    assert walk(made, "low") == 2
+    assert (made.window_n, made.share("in")) == (0, None)
+
+
+def test_the_share_itself_is_not_enough() -> None:
+    exact = Progression(window=4, share=0.75, away_share=0.5)
+    assert walk(ladder(rule=exact, level=3), "in", "in", "in", "low") == 3
+    assert walk(ladder(rule=exact, level=3), "in", "in", "in", "in") == 2
+    assert walk(ladder(level=3), "low", "low", "in", "in") == 3
+    assert walk(ladder(level=3), "low", "low", "low", "in") == 4
+
+
+def test_only_strides_on_the_worse_side_make_it_easier() -> None:
+    assert walk(ladder(level=3), "high", "high", "high", "high") == 3
+    assert walk(ladder(level=3), "near_low", "near_low", "near_low", "near_low") == 3
+    assert walk(ladder(zones=ZONES, level=3), "low", "low", "low", "low") == 3, "no side is known"
+
+
+def test_only_the_last_window_counts() -> None:
+    made = ladder(level=3)
+    assert walk(made, "low", "low", "in", "in") == 3
+    assert walk(made, "in", "in") == 2
+
+
+def test_levels_end_at_the_hardest_and_the_easiest() -> None:
+    made = ladder()
+    assert walk(made, "in", "in", "in", "in") == 0
+    assert made.window_n == 4, "the level did not change, so the strides stay"
+    made.move(LEVELS + 5)
+    assert made.level == LEVELS
+    made.move(-100)
+    assert made.level == 0
+
+
+def test_a_rule_that_is_off_leaves_it_to_people() -> None:
+    made = ladder(rule=Progression(automatic=False, window=2), level=3)
+    assert walk(made, "in", "in", "in") == 3
+    made.move(-1)
+    assert made.level == 2
+
+
+def test_zones_are_those_of_the_level() -> None:
+    made = ladder(level=2)
+    assert made.limits == pytest.approx((0.45, 0.65))
+    assert (made.zone(0.46), made.zone(0.44), made.zone(0.39)) == ("in", "near_low", "low")
+    made.add_stride("in")
+    made.add_stride("low")
+    assert made.share("in") == made.share("low") == 0.5
+    assert made.share("high") == 0.0

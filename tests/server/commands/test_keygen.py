@@ -1,0 +1,45 @@
+"""`sagittal keygen`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from server.commands.keygen import keygen
+from server.main import main
+from server.storage.archive import read_key
+
+
+def test_the_new_key_is_said_with_its_public_half_which_alone_is_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "clinic.key"
+    assert keygen(path) == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"{path} holds the clinic's key. Without it no encrypted backup can be read")
+    public = said.rsplit("Public key, which only encrypts: ", 1)[1].strip()
+    assert public.startswith("age1")
+    assert "AGE-SECRET-KEY" not in said
+    assert "AGE-SECRET-KEY" in path.read_text()
+    assert read_key(path)
+
+
+def test_a_key_that_is_there_is_never_overwritten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("clinic.key").write_text("the only copy")
+    assert keygen(Path("clinic.key")) == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert str(tmp_path / "clinic.key") in said.err
+    assert Path("clinic.key").read_text() == "the only copy"
+
+
+def test_a_key_in_a_folder_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["keygen", str(tmp_path / "none" / "clinic.key")]) == 1
+    said = capsys.readouterr().err
+    assert (
+        said == f"{tmp_path / 'none'}: No such file or directory. Check the path, its rights and the disk.\n"
+    )

@@ -1,0 +1,23 @@
+"""What pages load beside their HTML."""
+
+from __future__ import annotations
+
+import pytest
+
+from server.auth.roles import PUBLIC
+from server.pages.assets import STATIC, Assets
+from tests.server.clinic import Clinic
+
+pytestmark = pytest.mark.anyio
+
+
+async def test_browsers_keep_a_file_and_ask_whether_it_is_still_the_same(clinic: Clinic) -> None:
+    path = "/static/js/forms.js"
+    async with clinic.client() as client:
+        first = await client.get(path)
+        again = await client.get(path, headers={"if-none-match": first.headers["etag"]})
+        nothing = [await client.get(f"/static/{p}") for p in ("nothing.js", "..%2f__init__.py", "")]
+    assert first.content == (STATIC / "js/forms.js").read_bytes()
+    assert (first.headers["cache-control"], again.status_code, again.content) == ("no-cache", 304, b"")
+    assert {a.status_code for a in nothing} == {404}
+    assert Assets.action in PUBLIC

@@ -1,0 +1,36 @@
+"""The page of accounts."""
+
+from __future__ import annotations
+
+import pyotp
+import pytest
+
+from server.auth import second_factor
+from server.auth.identity import Identity
+from server.auth.passwords import MIN_LENGTH
+from server.auth.roles import Role
+from server.pages.words import ROLE_WORDS
+from server.services import care_teams
+from tests.server.clinic import Clinic
+
+pytestmark = pytest.mark.anyio
+
+
+async def test_accounts_stand_with_role_and_second_factor_for_administrators_alone(clinic: Clinic) -> None:
+    person, key = clinic.user("assistant", "hanna"), clinic.settings.second_factor_key
+    who = Identity(clinic.user("admin"), "admin", "", Role.ADMIN, "")
+    async with clinic.client("admin") as client:
+        before = (await client.get("/users")).text
+        with clinic.db.write() as c:
+            made = second_factor.begin(c, key, person, "hanna")
+            second_factor.confirm(c, key, person, pyotp.TOTP(made.secret).now())
+            care_teams.switch_on(c, who, begin_with_past=False)
+        after = (await client.get("/users")).text
+    assert "hanna" in before
+    assert all(words in before for words in ROLE_WORDS.values())
+    assert f'minlength="{MIN_LENGTH}"' in before
+    assert before.count("Remove second factor") == 0
+    assert f"/api/v1/users/{person}/second-factor" in after
+    assert before != after
+    async with clinic.client("clinician") as client:
+        assert (await client.get("/users")).status_code == 403

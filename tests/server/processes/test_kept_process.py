@@ -1,0 +1,121 @@
+"""A process that is always there: what it gets and says, and who comes after it."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from collections.abc import AsyncIterator, Iterable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from server.processes import kept_process
+from server.processes.kept_process import KeptProcess
+from server.settings import Settings
+
+pytestmark = pytest.mark.anyio
+
+PATIENCE_S = 60.0
+ECHO = """
+import socket, struct, sys
+
+line = socket.socket(fileno=int(sys.argv[1])).makefile("rwb")
+while head := line.read(8):
+    message = line.read(struct.unpack("!Q", head)[0])
+    if message != b"be silent":
+        line.write(head + message)
+        line.flush()
+"""
+"""Says what it hears, without our libraries."""
+
+
+class Kept:
+    """A kept process with all that it said, and how often it was mourned."""
+
+    def __init__(self, folder: Path, greetings: Iterable[bytes]) -> None:
+        self.heard: asyncio.Queue[bytes] = asyncio.Queue()
+        self.deaths = asyncio.Semaphore(0)
+        self.process = KeptProcess(
+            "echo_for_tests",
+            Settings(data_dir=folder),
+            lambda: greetings,
+            self.heard.put_nowait,
+            self.deaths.release,
+        )
+
+    async def next(self) -> bytes:
+        return await asyncio.wait_for(self.heard.get(), PATIENCE_S)
+
+
+@asynccontextmanager
+async def keep(folder: Path, monkeypatch: pytest.MonkeyPatch, *greetings: bytes) -> AsyncIterator[Kept]:
+    (folder / "echo_for_tests.py").write_text(ECHO)
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+    kept = Kept(folder, greetings)
+    kept.process.start()
+    try:
+        yield kept
+    finally:
+        await kept.process.stop()
+
+
+async def test_it_is_greeted_heard_replaced_when_killed_and_gone_when_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with keep(tmp_path, monkeypatch, b"good", b"morning") as kept:
+        assert not kept.process.is_connected
+        kept.process.send(b"lost, for there is nobody yet")
+        assert [await kept.next(), await kept.next()] == [b"good", b"morning"]
+        kept.process.send(b"and you")
+        assert await kept.next() == b"and you"
+        assert kept.process.backlog_bytes == 0
+        first = kept.process.pid
+        assert first is not None
+        kept.process.is_warm = True
+        os.kill(first, signal.SIGKILL)
+        await asyncio.wait_for(kept.deaths.acquire(), PATIENCE_S)
+        assert not kept.process.is_warm
+        # the first death is made good at once
+        assert [await kept.next(), await kept.next()] == [b"good", b"morning"]
+        second = kept.process.pid
+        assert second not in {None, first}
+    assert kept.process.pid is None
+    assert not kept.process.is_connected
+    assert kept.deaths.locked()  # nobody mourns who was stopped
+
+
+async def test_who_owes_an_answer_and_is_silent_is_replaced_but_only_when_warm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept_process, "HUNG_S", 0.0)
+    async with keep(tmp_path, monkeypatch, b"hello") as kept:
+        await kept.next()
+        first = kept.process.pid
+        kept.process.is_warm = True
+        kept.process.end_if_hung()  # it owes nothing
+        kept.process.send(b"be silent")
+        kept.process.expect_answer()
+        kept.process.is_warm = False
+        kept.process.end_if_hung()  # it compiles
+        assert kept.process.pid == first
+        kept.process.is_warm = True
+        kept.process.end_if_hung()
+        await asyncio.wait_for(kept.deaths.acquire(), PATIENCE_S)
+        await kept.next()
+        assert kept.process.pid != first
+
+
+async def test_an_answer_settles_what_is_owed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept_process, "HUNG_S", 0.0)
+    async with keep(tmp_path, monkeypatch) as kept:
+        while not kept.process.is_connected:
+            await asyncio.sleep(0.01)
+        first = kept.process.pid
+        kept.process.is_warm = True
+        kept.process.expect_answer()
+        kept.process.send(b"here")
+        await kept.next()
+        kept.process.end_if_hung()
+        assert kept.process.pid == first

@@ -1,0 +1,83 @@
+"""The kinds of job of this version, and what becomes of a recording that was looked into."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from core.errors import FormatError
+from server.jobs.attempt import Attempt
+from server.jobs.queue import BESIDE, COMPARE_FILTERS, EXPORT, SENSITIVITY, TUNE
+from server.services import recordings
+from server.services.errors import Conflict
+from server.settings import Settings
+from server.storage.blob_source import open_source
+from server.worker import tasks
+from server.worker.task import TASKS, load
+from tests.faults.clinic import Clinic
+
+load(Settings(data_dir=Path()).task_modules)
+
+
+@pytest.fixture
+def clinic(tmp_path: Path) -> Iterator[Clinic]:
+    made = Clinic(tmp_path / "home", lease_s=30.0, database_url="")
+    yield made
+    made.db.close()
+
+
+def quiet(*said: object) -> None:
+    """A worker that listens to nobody."""
+
+
+ATTEMPT = Attempt(quiet, quiet)
+
+
+def test_every_kind_of_job_has_its_task_and_tables_alone_keep_no_files() -> None:
+    known = {recordings.INSPECT, recordings.ANALYSE, *BESIDE}
+    assert known <= set(TASKS)
+    assert {kind for kind in known if TASKS[kind].keeps_files} == {
+        recordings.ANALYSE, COMPARE_FILTERS, SENSITIVITY, EXPORT
+    }  # fmt: skip
+    assert TASKS[TUNE].publish is tasks._publish_tuning
+    assert all(TASKS[kind].kind == kind for kind in known)
+
+
+def test_what_was_found_in_a_recording_stays_with_it(clinic: Clinic) -> None:
+    task = TASKS[recordings.INSPECT]
+    with clinic.db.write() as c:
+        recordings.inspect(c, clinic.queue, None, clinic.session.id)
+    claim = clinic.queue.claim("test", [recordings.INSPECT])
+    assert claim is not None
+    results = {tasks.FOUND: b'{"sensors": []}'}
+    assert clinic.queue.finish(claim, lambda c: task.publish(c, claim, results, {}))
+    with clinic.db.read() as c:
+        found = recordings.require_current(c, clinic.session.id)
+    assert found.state == "ready"
+    assert found.inspection == {"sensors": []}
+
+
+def test_a_text_is_no_recording_and_is_refused_by_its_reader(clinic: Clinic) -> None:
+    (stored,) = clinic.blobs.files()
+    source = open_source(clinic.blobs, stored.space, "a.txt", 7, stored.name)
+    with pytest.raises(FormatError) as refused:
+        TASKS[recordings.INSPECT].run([source], {"manifest": None}, ATTEMPT)
+    assert refused.value.code == "unknown_format"
+
+
+def test_what_was_found_in_files_that_were_changed_since_is_not_kept(clinic: Clinic) -> None:
+    task = TASKS[recordings.INSPECT]
+    with clinic.db.write() as c:
+        recordings.inspect(c, clinic.queue, None, clinic.session.id)
+    claim = clinic.queue.claim("test", [recordings.INSPECT])
+    assert claim is not None
+    with recordings.receive(
+        clinic.db, clinic.blobs, clinic.settings, None, clinic.session.id, "b.txt"
+    ) as upload:
+        upload.write(b"more signals")
+        upload.keep()
+    with pytest.raises(Conflict) as refused, clinic.db.write() as c:
+        task.publish(c, claim, {tasks.FOUND: b"{}"}, {})
+    assert refused.value.code == "files_changed"
