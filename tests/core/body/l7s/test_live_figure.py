@@ -73,6 +73,7 @@ def test_what_cannot_be_followed_ends_it_from_that_sample_on_however_the_samples
     found: list[BodyBlock] = []
     for a, b in ((0, 3), (3, 9), (9, 20)):
         turned = {s: x[a:b] for s, x in given.turned.items()}
-        acc, gyr, valid, filled = (x[a:b] for x in (given.acc, given.gyr, given.valid, given.filled))
-        found.append(parts.push(MeasuredBlock(acc, gyr, valid, turned, filled)))
+        k = slice(a, b)
+        part = MeasuredBlock(given.acc[k], given.gyr[k], given.valid[k], turned, given.filled[k])
+        found.append(parts.push(part))
     np.testing.assert_array_equal(np.concatenate([x.p for x in found]), block.p)
