@@ -64,7 +64,7 @@ class StuckParams:
     clipped_share: float = 0.05
     acc_floor: float = 1.9 * GRAVITY
     gyr_floor: float = float(np.radians(245.0))
-    frozen_s: float = 0.05
+    frozen_s: float = 0.03
     fewest: int = 3
     jump_gyr: float = 1.0
     resting_s: float = 5.0

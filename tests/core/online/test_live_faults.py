@@ -104,6 +104,8 @@ def test_what_the_tests_compare_with_counts() -> None:
         ("comfortable", "feet", "foot_l", "hole", 15.3, 0.3),
         # a stride of 1.42 instead of 1.27 m
         ("arc", "feet", "foot_l", "burst", 28.88, 0.15),
+        # sideways 0.29 instead of 0.04 m
+        ("hemiparetic", "feet", "foot_r", "freeze", 19.21, 0.03),
         # lengths of both feet off by up to 1.9 m
         ("comfortable", "all", "foot_l", "freeze", 15.3, 0.3),
         ("comfortable", "all", "foot_l", "freeze", 15.5, 0.2),
