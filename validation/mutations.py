@@ -2,9 +2,9 @@
 
 `python -m validation.mutations --out FILE` draws mutations of core and server by cosmic-ray (`pip install
 cosmic-ray`), each in a module drawn by its length. On each it runs the quick tests nearest to it: its own,
-those that import the module, its package, or what imports it. With `--tree` another checkout, for which the same
-packages are installed, is judged by its own tests on those mutations whose line it has. What FILE has already
-is not repeated.
+those that import the module, its package, or what imports it. With `--tree` another checkout, for which the
+same packages are installed, is judged by its own tests on those mutations whose line it has. What FILE has
+already is not repeated.
 """
 
 from __future__ import annotations
