@@ -1,0 +1,124 @@
+"""Find a take on which a parameter matters: `python -m tests.core.pipeline.find_parameter_changes [take[:stage,…] …]`.
+
+Proposes a line of `parameters.csv` for every parameter that has none.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from core.pipeline import PipelineConfig
+from tests.core.pipeline.parameter_changes import (
+    Parameter,
+    StagedTake,
+    list_changes,
+    list_parameters,
+    replace_value,
+)
+from tests.core.pipeline.parameter_table import Row, read_rows, write_rows
+from tests.core.pipeline.parameter_takes import TAKES, stage_take
+
+
+def separate(value: Any) -> Any:
+    """The same configuration of objects that no two places share."""
+    if not dataclasses.is_dataclass(value) or isinstance(value, type):
+        return value
+    return dataclasses.replace(
+        value, **{f.name: separate(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    )
+
+
+@contextmanager
+def noting_reads(config: PipelineConfig) -> Iterator[set[str]]:
+    """Names of the fields that are read of a separate configuration, leaves and what holds them."""
+    names: dict[int, str] = {}
+    kinds: set[type] = set()
+
+    def name(value: Any, path: str) -> None:
+        names[id(value)] = path
+        kinds.add(type(value))
+        for f in dataclasses.fields(value):
+            below = getattr(value, f.name)
+            if dataclasses.is_dataclass(below):
+                name(below, f"{path}.{f.name}".removeprefix("."))
+
+    name(config, "")
+    read: set[str] = set()
+
+    def note(self: object, attribute: str) -> Any:
+        path = names.get(id(self))
+        if path is not None and not attribute.startswith("__"):
+            read.add(f"{path}.{attribute}".removeprefix("."))
+        return object.__getattribute__(self, attribute)
+
+    for kind in kinds:
+        kind.__getattribute__ = note  # type: ignore[assignment,method-assign]
+    try:
+        yield read
+    finally:
+        for kind in kinds:
+            del kind.__getattribute__  # type: ignore[attr-defined]
+
+
+def find_reads(take: StagedTake, stage: str) -> set[str]:
+    """Names of the parameters that a stage reads of the take's configuration."""
+    config = separate(take.config)
+    with noting_reads(config) as read:
+        take.observe(stage, config)
+    return read
+
+
+def find_change(take: StagedTake, stage: str, parameter: Parameter) -> object | None:
+    """The first other value that changes what the stage gives; None = none does."""
+    usual = take.observe_usual(stage)
+    for new in list_changes(parameter):
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                seen = take.observe(stage, replace_value(take.config, parameter.path, new))
+        except Exception as error:  # noqa: BLE001  a value beyond what the stage can work with shows nothing
+            print(f"  {parameter.name} = {new!r}: {type(error).__name__}: {error}")
+            continue
+        if seen != usual:
+            return new
+    return None
+
+
+def search(names: list[str]) -> None:
+    """Complete the table by what these takes show."""
+    for text in names:
+        name, _, only = text.partition(":")
+        rows = {row.parameter: row for row in read_rows()}
+        try:
+            take = stage_take(name)
+            stages = take.list_stages()
+        except Exception as error:  # noqa: BLE001
+            print(f"{name}: {error!r}", flush=True)
+            continue
+        new_rows = []
+        for stage in only.split(",") if only else stages:
+            read, missing, found = find_reads(take, stage), [], 0
+            for parameter in list_parameters():
+                if parameter.name in rows or parameter.name.partition("[")[0] not in read:
+                    continue
+                new = find_change(take, stage, parameter)
+                if new is None:
+                    missing.append(parameter.name)
+                    continue
+                new_rows.append(Row(parameter.name, name, stage, new))
+                rows[parameter.name] = new_rows[-1]
+                found += 1
+            if found or missing:
+                print(f"{name} {stage}: {found} found, unmoved: {' '.join(missing)}", flush=True)
+        write_rows({row.parameter: row for row in (*read_rows(), *new_rows)}.values())
+
+
+if __name__ == "__main__":
+    search(sys.argv[1:] or list(TAKES))
+    known = {row.parameter for row in read_rows()}
+    print("Without effect:", *(p.name for p in list_parameters() if p.name not in known), sep="\n  ")
