@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from core.agreement.joints import LEG_JOINTS, JointKind
-from core.agreement.params import JointParams
+from core.agreement.params import JointBandParams
 from core.agreement.terms import find_thinning, find_usable, low_pass_terms, take_mean_out
 from core.body.corrected import correct_signals
 from core.body.model import BodyModel
@@ -73,7 +73,7 @@ class ArmParams:
         rad. noise_mps2 : least spread of the difference.
     stride_s : the whole walk counts as so much independent evidence. longest_s : so much walking is looked
         at. least_s : with less a joint says nothing. worst_misfit : of a joint's acceleration over its size,
-        above which it says nothing. joints : how accelerations are compared.
+        above which it says nothing. joints : which part of accelerations is compared.
     """
 
     place_sd: Mapping[str, tuple[float, float, float]] = field(
@@ -101,7 +101,7 @@ class ArmParams:
     longest_s: float = 30.0
     least_s: float = 3.0
     worst_misfit: float = 0.9
-    joints: JointParams = field(default_factory=JointParams)
+    joints: JointBandParams = field(default_factory=JointBandParams)
 
 
 @dataclass(frozen=True, eq=False)

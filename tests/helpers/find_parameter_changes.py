@@ -1,6 +1,8 @@
-"""Find a take on which a parameter matters: `python -m tests.core.pipeline.find_parameter_changes [take[:stage,…] …]`.
+"""Find takes on which parameters matter: `python -m tests.helpers.find_parameter_changes [take[:stage,…] …]`.
 
-Proposes a line of `parameters.csv` for every parameter that has none.
+Writes a line of `tests/data/pipeline_parameters.csv` for every parameter that has none and moves something. A
+line may as well be written by hand: parameter, take (tests/helpers/parameter_takes.py), stage, other value as
+JSON; the sweep of tests/core/pipeline/test_config.py says whether it holds.
 """
 
 from __future__ import annotations
@@ -8,20 +10,24 @@ from __future__ import annotations
 import dataclasses
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Final
 
 from core.pipeline import PipelineConfig
-from tests.core.pipeline.parameter_changes import (
+from tests.helpers.parameter_changes import (
+    DirectCall,
     Parameter,
     StagedTake,
     list_changes,
     list_parameters,
     replace_value,
 )
-from tests.core.pipeline.parameter_table import Row, read_rows, write_rows
-from tests.core.pipeline.parameter_takes import TAKES, stage_take
+from tests.helpers.parameter_table import Row, read_rows, write_rows
+from tests.helpers.parameter_takes import TAKES, stage_take
+
+FURTHEST: Final = 3
+"""So many of the furthest values without effect, and the nearer ones are not tried."""
 
 
 def separate(value: Any) -> Any:
@@ -65,7 +71,7 @@ def noting_reads(config: PipelineConfig) -> Iterator[set[str]]:
             del kind.__getattribute__  # type: ignore[attr-defined]
 
 
-def find_reads(take: StagedTake, stage: str) -> set[str]:
+def find_reads(take: StagedTake | DirectCall, stage: str) -> set[str]:
     """Names of the parameters that a stage reads of the take's configuration."""
     config = separate(take.config)
     with noting_reads(config) as read:
@@ -73,20 +79,29 @@ def find_reads(take: StagedTake, stage: str) -> set[str]:
     return read
 
 
-def find_change(take: StagedTake, stage: str, parameter: Parameter) -> object | None:
-    """The first other value that changes what the stage gives; None = none does."""
-    usual = take.observe_usual(stage)
-    for new in list_changes(parameter):
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")
-                seen = take.observe(stage, replace_value(take.config, parameter.path, new))
-        except Exception as error:  # noqa: BLE001  a value beyond what the stage can work with shows nothing
-            print(f"  {parameter.name} = {new!r}: {type(error).__name__}: {error}")
-            continue
-        if seen != usual:
-            return new
+def find_change(take: StagedTake | DirectCall, stage: str, parameter: Parameter) -> object | None:
+    """The nearest other value that changes what the stage gives; None = the furthest do not."""
+    changes = list_changes(parameter)
+    quiet = 0
+    for new in reversed(changes):
+        told = _tells(take, stage, parameter, new)
+        if told:
+            return next(new for new in changes if _tells(take, stage, parameter, new))
+        quiet += told is not None
+        if quiet == FURTHEST:
+            break
     return None
+
+
+def _tells(take: StagedTake | DirectCall, stage: str, parameter: Parameter, new: object) -> bool | None:
+    """Whether a value changes something; None where the stage cannot work with it."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            seen = take.observe(stage, replace_value(take.config, parameter.path, new))
+    except Exception:  # noqa: BLE001  a value beyond what the stage can work with shows nothing
+        return None
+    return seen != take.observe_usual(stage)
 
 
 def search(names: list[str]) -> None:

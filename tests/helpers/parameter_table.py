@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
-from tests.core.pipeline.parameter_changes import list_parameters
+from tests.data import HERE
+from tests.helpers.parameter_changes import list_parameters
 
-TABLE: Final = Path(__file__).with_name("parameters.csv")
+TABLE: Final = HERE / "pipeline_parameters.csv"
 COLUMNS: Final = ("parameter", "take", "stage", "value")
 
 
@@ -24,13 +25,20 @@ class Row:
     stage: str
     value: object
 
+    @property
+    def path(self) -> tuple[str, ...]:
+        """As `Parameter.path`."""
+        return tuple(re.findall(r"\[[^]]*]|[^.[]+", self.parameter))
+
 
 def read_rows() -> list[Row]:
     """All rows of the table; none where there is no table yet."""
     if not TABLE.exists():
         return []
     with TABLE.open(encoding="utf-8", newline="") as f:
-        return [Row(r["parameter"], r["take"], r["stage"], _read_value(r["value"])) for r in csv.DictReader(f)]
+        return [
+            Row(r["parameter"], r["take"], r["stage"], _read_value(r["value"])) for r in csv.DictReader(f)
+        ]
 
 
 def write_rows(rows: Iterable[Row]) -> None:

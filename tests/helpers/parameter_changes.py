@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from enum import Enum
 from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
@@ -102,7 +101,16 @@ def _propose(default: object, hint: object) -> list[object]:
     if isinstance(default, bool):
         return [not default]
     if isinstance(default, int):
-        near = (default + 1, default - 1, 2 * default, default // 2, 4 * default, default // 10, default // 30, 0)
+        near = (
+            default + 1,
+            default - 1,
+            2 * default,
+            default // 2,
+            4 * default,
+            default // 10,
+            default // 30,
+            0,
+        )
         return list(dict.fromkeys(n for n in near if n != default))
     if isinstance(default, float):
         return [default * f for f in FACTORS] if default else [0.1, -0.1, 1.0]
@@ -147,7 +155,7 @@ def _feed(seen: Any, value: object) -> None:
         held = getattr(value, "__dict__", None) or {
             n: getattr(value, n) for n in getattr(type(value), "__slots__", ())
         }
-        _feed(seen, {k: v for k, v in sorted(held.items())})
+        _feed(seen, dict(sorted(held.items())))
     else:
         raise TypeError(f"cannot hash a {type(value).__name__}")
 
@@ -198,6 +206,32 @@ class StagedTake:
             else:
                 self._ahead.insert(0, stage)
                 return
+
+
+class DirectCall:
+    """One function of the chain on input made by hand, as if it were the only stage of a take."""
+
+    STAGE: Final = "call"
+
+    def __init__(self, call: Callable[[PipelineConfig], object]) -> None:
+        self.config = PipelineConfig()
+        self._call = call
+
+    def list_stages(self) -> list[str]:
+        """Its only one."""
+        return [self.STAGE]
+
+    def observe(self, stage: str, config: PipelineConfig) -> str:
+        """Digest of what the function gives."""
+        assert stage == self.STAGE
+        try:
+            return digest(self._call(config))
+        except SagittalError as error:
+            return digest(error.code, error.message, error.sensor, error.t_s)
+
+    def observe_usual(self, stage: str) -> str:
+        """The same with the default parameters."""
+        return self.observe(stage, self.config)
 
 
 def _run_one(before: TakeAnalysis, stage: PipelineStage) -> tuple[TakeAnalysis | None, str]:
