@@ -92,7 +92,7 @@ class ArmParams:
         }
     )
     wander_sd: Mapping[str, float] = field(
-        default_factory=lambda: {"pelvis": 0.005, "thigh": 0.02, "shank": 0.01, "foot": 0.005}
+        default_factory=lambda: {"thigh": 0.02, "shank": 0.01, "foot": 0.005}
     )
     turn_sd: float = radians(8.0)
     ahead_sd: float = radians(20.0)
@@ -333,7 +333,7 @@ def _view_sides(
         bent = [x for joint, x in flexions.items() if segment in joint and segment != "pelvis"]
         usable = find_usable(valid[:, i, None], rate)[0] & walked
         wander = _accelerate(turned[segment], bent, rate, thin, params)
-        sides[segment] = _Side(M, wander, params.wander_sd[_kind(segment)], usable[::thin])
+        sides[segment] = _Side(M, wander, params.wander_sd.get(_kind(segment), 0.0), usable[::thin])
     return sides, rate / thin
 
 

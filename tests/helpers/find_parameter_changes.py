@@ -24,9 +24,9 @@ from tests.helpers.parameter_changes import (
     replace_value,
 )
 from tests.helpers.parameter_table import Row, read_rows, write_rows
-from tests.helpers.parameter_takes import TAKES, stage_take
+from tests.helpers.parameter_takes import CALLS, TAKES, stage_take
 
-FURTHEST: Final = 3
+FURTHEST: Final = 5
 """So many of the furthest values without effect, and the nearer ones are not tried."""
 
 
@@ -88,7 +88,7 @@ def find_change(take: StagedTake | DirectCall, stage: str, parameter: Parameter)
         if told:
             return next(new for new in changes if _tells(take, stage, parameter, new))
         quiet += told is not None
-        if quiet == FURTHEST:
+        if quiet == FURTHEST and isinstance(new, float):
             break
     return None
 
@@ -134,6 +134,6 @@ def search(names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    search(sys.argv[1:] or list(TAKES))
+    search(sys.argv[1:] or [*TAKES, *CALLS])
     known = {row.parameter for row in read_rows()}
     print("Without effect:", *(p.name for p in list_parameters() if p.name not in known), sep="\n  ")

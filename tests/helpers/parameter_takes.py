@@ -23,15 +23,15 @@ from core.simulate import (
 from core.simulate.chest import ChestStyle, Day, PostureHold, simulate_day
 from core.simulate.daily import OFF, DailyItem, record_daily_life, simulate_daily_life
 from core.simulate.magnetics import Dipole
-from core.simulate.patients import PATIENTS
 from core.simulate.script import Arc, Script, Stand, Straight
 from core.simulate.scripts import ON_SKIN
 from core.simulate.setup import Dropout, Lag
-from core.simulate.standing import Sway, simulate_sway
+from core.simulate.standing import simulate_sway
 from core.simulate.tug import simulate_chair_rises, simulate_tug
 from core.simulate.walker import Walker
 from core.timeline import synchronise
 from tests.core.pipeline.test_squat import from_table
+from tests.helpers.parameter_calls import CALLS
 from tests.helpers.parameter_changes import DirectCall, StagedTake, replace_value
 from tests.helpers.perturbations import delay_sensor, find_middle, slip_sensor
 from tests.helpers.setup_mistakes import TURNS, change_axes, exchange_labels
@@ -96,11 +96,6 @@ def stick_rarely(acc: Floats, gyr: Floats) -> None:
     acc[k:, 2] = np.repeat(acc[k::10, 2], 10)[: len(acc) - k]
 
 
-def stick_accelerometer(acc: Floats, gyr: Floats) -> None:
-    """An accelerometer that shows one value."""
-    acc[900:] = (0.0, 9.8, 0.0)
-
-
 def freeze(acc: Floats, gyr: Floats) -> None:
     """A sensor that repeats one sample for a while."""
     silence(acc, 900, 1050)
@@ -123,6 +118,11 @@ def clip_force(acc: Floats, gyr: Floats) -> None:
     """An accelerometer of 2 g."""
     limit = 2.0 * 9.80665
     acc[:] = np.clip(acc, -limit, limit)
+
+
+def roll(acc: Floats, gyr: Floats) -> None:
+    """A foot that never stands quite still."""
+    acc[600:] *= 1.2
 
 
 def slip(segment: Segment, by_deg: float, at_s: float | None = None, name: str = "comfortable") -> Recording:
@@ -159,6 +159,16 @@ def begin_late(recording: Recording, segment: Segment, start_s: float) -> Record
     return replace(recording, streams={**recording.streams, **late.streams})
 
 
+def miss(recording: Recording, start_s: float, end_s: float) -> Recording:
+    """Every stream without a part of it."""
+    streams = {}
+    for device, x in recording.streams.items():
+        kept = (x.t_s < start_s) | (x.t_s >= end_s)
+        gyr = x.gyr if x.gyr is None else x.gyr[kept]
+        streams[device] = x.change(t_s=x.t_s[kept], acc=x.acc[kept], gyr=gyr, mag=None, quat=None)
+    return replace(recording, streams=streams)
+
+
 def declare(recording: Recording) -> Recording:
     """A walk whose mountings are written down, wrongly for some."""
     return replace(recording, mounting={s: "strap, x forward" for s in recording.segments.values() if s})
@@ -185,7 +195,8 @@ def live_a_day(*items: DailyItem, has_gyro: bool = True, seed: int = 5) -> Recor
 
 DAY: Final = (
     DailyItem("stand", 10.0), DailyItem("walk", 30.0, 100.0), DailyItem("sit", 60.0),
-    DailyItem("stand", 20.0), DailyItem("walk", 40.0), DailyItem("sit", 30.0), DailyItem("lie", 60.0), DailyItem("sit", 20.0),
+    DailyItem("stand", 20.0), DailyItem("walk", 40.0), DailyItem("sit", 30.0), DailyItem("lie", 60.0),
+    DailyItem("sit", 20.0),
     DailyItem("stand", 10.0), DailyItem("bow", 4.0), DailyItem("stand", 20.0), DailyItem("walk", 20.0),
     DailyItem("sit", 40.0),
 )  # fmt: skip
@@ -205,9 +216,6 @@ PAUSES: Final[Script] = (
     Straight(1.92, 0.64, 0.54), Stand(0.7), Straight(6.4, 0.64, 0.54), Stand(3.5), Straight(5.12, 0.64, 0.8),
     Stand(3.0),
 )  # fmt: skip
-UNEVEN: Final[Script] = (
-    Stand(5.0), Straight(6.4, 0.64, 0.54), Straight(2.0, 0.4, 0.9), Straight(6.4, 0.64, 0.54), Stand(3.0),
-)  # fmt: skip
 LEGS: Final[tuple[Segment, ...]] = ("pelvis", "shank_l", "shank_r")
 
 TAKES: Final[dict[str, Take]] = {
@@ -222,74 +230,40 @@ TAKES: Final[dict[str, Take]] = {
     "sway": Take(lambda: replace(simulate_sway().recording, protocol="standing_eyes_open")),
     "lossy": Take(lambda: walk(packet_loss=0.05, dropouts=(Dropout("shank_r", 9.0, 12.0),))),
     "late_shank": Take(lambda: walk(lags=(Lag("shank_r", 0.04),))),
-    "late_little": Take(lambda: walk(lags=(Lag("shank_r", 0.014),))),
     "late_leg": Take(lambda: walk(lags=(Lag("thigh_l", 0.04), Lag("shank_l", 0.04), Lag("foot_l", 0.04)))),
     "late_foot": Take(lambda: walk(worn=FEET, lags=(Lag("foot_l", 0.05),))),
-    "very_late_foot": Take(lambda: walk(worn=FEET, lags=(Lag("foot_l", 0.09),))),
     "drifting_shank": Take(lambda: drift("shank_r", 0.04)),
-    "drifting_thigh": Take(lambda: drift("thigh_l", 0.03)),
     "slipped_shank": Take(lambda: slip("shank_r", 15.0, 17.0)),
-    "slipped_thigh": Take(lambda: slip("thigh_l", 9.0, 17.0)),
-    "slipped_foot": Take(lambda: slip("foot_l", 15.0, 17.0)),
-    "slipped_much": Take(lambda: slip("foot_l", 40.0, 17.0)),
-    "slipped_standing": Take(lambda: slip("shank_r", 15.0, 27.0)),
     "slipped_turning": Take(lambda: slip("shank_r", 15.0, None, "fast_with_turns")),
     "exchanged_thighs": Take(lambda: exchange_labels(walk(), {"thigh_l": "thigh_r", "thigh_r": "thigh_l"})),
-    "exchanged_shanks": Take(lambda: exchange_labels(walk(), {"shank_l": "shank_r", "shank_r": "shank_l"})),
-    "exchanged_legs": Take(
-        lambda: exchange_labels(
-            walk(),
-            {f"{s}_{a}": f"{s}_{b}" for s in ("thigh", "shank", "foot") for a, b in ("lr", "rl")},  # type: ignore[misc]
-        )
-    ),
-    "mixed_up": Take(
-        lambda: exchange_labels(
-            walk(), {"pelvis": "shank_l", "shank_l": "foot_r", "foot_r": "thigh_l", "thigh_l": "pelvis"}
-        )
-    ),
     "mirrored_force": Take(lambda: change_axes(walk(), "shank_l", acc=-np.eye(3))),
     "turned_rates": Take(lambda: change_axes(walk(), "shank_l", gyr=TURNS[5])),
-    "turned_thigh": Take(lambda: change_axes(walk(), "thigh_r", gyr=TURNS[9])),
-    "mirrored_rates": Take(lambda: change_axes(walk(), "foot_l", gyr=-np.eye(3))),
-    "slow_rates": Take(lambda: change_axes(walk(), "shank_r", gyr=0.55)),
     "magnets": Take(lambda: walk(dipoles=(Dipole((4.0, 0.3, 0.5), (0.3, 0.0, 0.2)),))),
     "saturated": Take(lambda: walk(gyr_range=radians(250.0), acc_range=2.0 * 9.80665)),
     "stuck_axis": Take(lambda: spoil("shank_r", stick_axis)),
     "stuck_rarely": Take(lambda: spoil("shank_r", stick_rarely)),
-    "stuck_force": Take(lambda: spoil("thigh_l", stick_accelerometer)),
     "frozen": Take(lambda: spoil("shank_r", freeze)),
     "looped": Take(lambda: spoil("shank_r", loop)),
     "clipped": Take(lambda: spoil("foot_r", clip)),
     "clipped_force": Take(lambda: spoil("foot_r", clip_force)),
     "begun_late": Take(lambda: begin_late(walk(), "shank_l", 2.0)),
     "mid_walk": Take(lambda: shorten(walk(), 7.0, 20.0)),
-    "mid_walk_back": Take(lambda: shorten(walk(worn=("pelvis", "thigh_l", "thigh_r", "shank_l")), 7.0, 20.0)),
-    "declared": Take(lambda: declare(walk())),
     "swings": Take(lambda: simulate_swings_and_bows(SwingsAndBows(swings=6, bows=4)).recording),
     "single_feet": Take(lambda: walk(worn=("foot_l", "foot_r"))),
     "no_filter": Take(walk, {"poses.estimator": "stance_foot_anchor"}),
     "pauses": Take(lambda: walk(PAUSES)),
-    "uneven": Take(lambda: walk(UNEVEN)),
     "shanks": Take(lambda: walk(worn=LEGS)),
     "shanks_mixed": Take(
         lambda: walk(worn=LEGS), {"consensus.presets": ("gouwanda", "catalfamo", "maqbool")}
     ),
     "walk_by_consensus": Take(walk, {"detector": "consensus"}),
-    "feet_by_pitch": Take(lambda: walk(worn=FEET), {"detector": "foot_pitch"}),
     **{
         name: Take(lambda name=name: simulate_scenario(name, 1, worn=(*FEET, "shank_l", "shank_r")).recording)  # type: ignore[misc]
-        for name in (*PATIENTS, "festination", "slow", "fast_with_turns", "figure_of_eight")
+        for name in ("festination", "severe_shuffle")
     },
     "by_gouwanda": detect_by("gouwanda", leaving="deepest", contact="neg_peak"),
-    "by_catalfamo": detect_by("catalfamo"),
     "by_maqbool": detect_by("maqbool"),
     "by_mariani": detect_by("mariani", contact="neg_peak"),
-    "by_perez_ibarra": detect_by("perez_ibarra"),
-    "shuffle_gouwanda": detect_by("gouwanda", "severe_shuffle"),
-    "shuffle_catalfamo": detect_by("catalfamo", "severe_shuffle"),
-    "shuffle_maqbool": detect_by("maqbool", "severe_shuffle"),
-    "shuffle_mariani": detect_by("mariani", "severe_shuffle"),
-    "shuffle_perez_ibarra": detect_by("perez_ibarra", "severe_shuffle"),
     "back_turning": Take(lambda: simulate_scenario("fast_with_turns", 1, worn=("pelvis",)).recording),
     "back_pauses": Take(lambda: walk(PAUSES, worn=("pelvis",))),
     "back_parkinson": Take(lambda: simulate_scenario("parkinson", 1, worn=("pelvis",)).recording),
@@ -297,9 +271,6 @@ TAKES: Final[dict[str, Take]] = {
     "walk_10m": Take(lambda: replace(walk(worn=FEET), protocol="walk_10m")),
     "walk_6min": Take(
         lambda: replace(walk(worn=FEET), protocol="walk_6min", test_limits=GivenLimits(5.0, 20.0))
-    ),
-    "short_sway": Take(
-        lambda: replace(simulate_sway(Sway(duration_s=15.0)).recording, protocol="standing_eyes_open")
     ),
     "day": Take(lambda: live_a_day(*DAY)),
     "day_without_gyro": Take(lambda: live_a_day(*DAY, has_gyro=False, seed=2)),
@@ -320,6 +291,64 @@ TAKES: Final[dict[str, Take]] = {
             protocol="activity",
         )
     ),
+    "day_of_stairs": Take(
+        lambda: live_a_day(
+            DailyItem("stand", 10.0),
+            DailyItem("walk", 40.0),
+            DailyItem("stairs_up", 30.0),
+            DailyItem("walk", 20.0),
+            DailyItem("stairs_down", 30.0),
+            DailyItem("stand", 10.0),
+            DailyItem("sit", 30.0),
+            DailyItem("stand", 10.0),
+            DailyItem("bow", 4.0),
+            DailyItem("stand", 10.0),
+            DailyItem("bow", 4.0),
+            DailyItem("stand", 10.0),
+            DailyItem("sit", 30.0),
+            DailyItem("stand", 10.0),
+        )
+    ),
+    "day_of_sitting": Take(
+        lambda: miss(
+            live_a_day(
+                DailyItem("stand", 10.0),
+                DailyItem("sit", 60.0),
+                DailyItem("stand", 20.0),
+                DailyItem("sit", 60.0),
+                DailyItem("stand", 20.0),
+            ),
+            40.0,
+            45.0,
+        )
+    ),
+    "day_of_errands": Take(
+        lambda: live_a_day(
+            DailyItem("stand", 10.0),
+            DailyItem("walk", 40.0),
+            DailyItem("stand", 10.0),
+            DailyItem("walk", 3.2),
+            DailyItem("stand", 10.0),
+            DailyItem("walk", 4.2),
+            DailyItem("stand", 10.0),
+            DailyItem("walk", 5.2),
+            DailyItem("stand", 10.0),
+        )
+    ),
+    "standing": Take(lambda: declare(shorten(walk((Stand(9.0), *WALK[1:])), 0.0, 8.8))),
+    "whole_test": Take(
+        lambda: replace(walk(worn=FEET), protocol="walk_6min"), {"functional.walks.seconds": 20.0}
+    ),
+    "slipped_first": Take(lambda: edit(walk(), lambda u: slip_sensor(u, "shank_r", radians(15.0), 4.8))),
+    "turn_first": Take(
+        lambda: shorten(
+            walk((Stand(5.0), Arc(1.0, pi, 0.5, 0.56), Straight(12.8, 0.64, 0.54), Stand(3.0)), worn=LEGS),
+            0.0,
+            16.0,
+        )
+    ),
+    "rolling": Take(lambda: spoil("foot_l", roll)),
+    "doubted": Take(lambda: walk(packet_loss=0.05), {"poses.erkf.reaccept_s": 0.01, "poses.erkf.gate": 0.1}),
     "night": Take(
         lambda: live_a_day(
             DailyItem("stand", 10.0),
@@ -333,10 +362,6 @@ TAKES: Final[dict[str, Take]] = {
         )
     ),
 }
-
-
-CALLS: Final[dict[str, Callable[[PipelineConfig], object]]] = {}
-"""What no take reaches in a short time: a function, and input made for it."""
 
 
 @lru_cache(4)
