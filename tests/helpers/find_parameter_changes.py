@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from typing import Any, Final
 
 from core.pipeline import PipelineConfig
+from tests.helpers.parameter_calls import CALLS
 from tests.helpers.parameter_changes import (
     DirectCall,
     Parameter,
@@ -24,7 +25,7 @@ from tests.helpers.parameter_changes import (
     replace_value,
 )
 from tests.helpers.parameter_table import Row, read_rows, write_rows
-from tests.helpers.parameter_takes import CALLS, TAKES, stage_take
+from tests.helpers.parameter_takes import TAKES, stage_take
 
 FURTHEST: Final = 5
 """So many of the furthest values without effect, and the nearer ones are not tried."""
@@ -68,7 +69,7 @@ def noting_reads(config: PipelineConfig) -> Iterator[set[str]]:
         yield read
     finally:
         for kind in kinds:
-            del kind.__getattribute__  # type: ignore[attr-defined]
+            del kind.__getattribute__
 
 
 def find_reads(take: StagedTake | DirectCall, stage: str) -> set[str]:

@@ -69,7 +69,10 @@ def refine_contacts(config: PipelineConfig) -> object:
     for q, speed, acc in feet:
         state = FootContactState.start(RATE, config.events, config.contacts)
         told.append(advance_foot_contacts(state, q, np.ones(len(q), np.bool_), speed, acc))
-    tilted = {"foot_l": foot_pitch(T, 2.0, 8, 1.1) - 0.3, "foot_r": foot_pitch(T, 2.0, 8, 1.1, 0.5) - 0.1}
+    tilted: dict[Segment, Floats] = {
+        "foot_l": foot_pitch(T, 2.0, 8, 1.1) - 0.3,
+        "foot_r": foot_pitch(T, 2.0, 8, 1.1, 0.5) - 0.1,
+    }
     return told, detect_contacts(orientations(RATE, tilted), config.events, config.contacts)
 
 
@@ -90,11 +93,9 @@ def detect_swings(config: PipelineConfig) -> object:
         swinging(0.7 * T),
     ):
         made = shanks(np.asarray(rate))
-        q, valid = (
-            {s: x[s.replace("foot", "shank")] for s in ("shank_l", "shank_r", "foot_l", "foot_r")}
-            for x in (made.q, made.valid)
-        )
-        both = replace(made, q=q, valid=valid)
+        q, valid = made.q["shank_l"], made.valid["shank_l"]
+        limbs: tuple[Segment, ...] = ("shank_l", "shank_r", "foot_l", "foot_r")
+        both = replace(made, q=dict.fromkeys(limbs, q), valid=dict.fromkeys(limbs, valid))
         for preset in config.consensus.gyro_peaks.by_name.values():
             found += [gyro_peak_events(both, RATE, preset)]
     return found
@@ -145,7 +146,7 @@ def hear_standings(config: PipelineConfig) -> object:
         "shank_l": StandingTurn(0.3, 0.3, ahead), "thigh_l": StandingTurn(0.1, 0.1, ahead),
         "shank_r": StandingTurn(0.0, 0.1, ahead), "thigh_r": StandingTurn(0.0, 0.1, ahead),
     }  # fmt: skip
-    return [_has_slipped(s, turns, config.agreement.slips) for s in turns]  # type: ignore[arg-type,attr-defined]
+    return [_has_slipped(s, turns, config.agreement.slips) for s in turns]  # type: ignore[arg-type]
 
 
 def lose_samples(config: PipelineConfig) -> object:
@@ -242,9 +243,13 @@ def question_slips(config: PipelineConfig) -> object:
     motion = LevelMotion(q, np.tile([[0.0], [0.0], [GRAVITY]], len(T)), swing)
     valid = np.ones(len(T), np.bool_)
     small, large = PlaceStep(7.0, radians(9.5), 5.0, 0.03), PlaceStep(7.0, radians(15.0), 20.0, 0.01)
+    asked: tuple[tuple[PlaceStep, dict[Segment, LevelMotion]], ...] = (
+        (small, {}),
+        (large, {"shank_l": motion}),
+    )
     return [
         question_strides("shank_l", step, across, motions, valid, RATE, 3.0, params)
-        for step, motions in ((small, {}), (large, {"shank_l": motion}))
+        for step, motions in asked
     ]
 
 
@@ -285,10 +290,10 @@ def pause_between_swings(config: PipelineConfig) -> object:
     """One leg swings, pauses, and swings again while the other stands."""
     swings = np.where(((T > 2.0) & (T < 6.5)) | ((T > 9.0) & (T < 13.0)), 1.5, 0.0) * np.sin(5.0 * T)
     valid, still = np.ones(len(T), np.bool_), np.zeros((len(T), 3))
-    moved = np.stack((0.0 * T, swings, 0.0 * T), axis=1)
+    rates = np.stack((0.0 * T, swings, 0.0 * T), axis=1)
     worn: dict[Segment, SensorSignals] = {
-        s: SensorSignals(s, still + GRAVITY, gyr, None, valid, ~valid)
-        for s, gyr in (("thigh_l", moved), ("thigh_r", still))
+        "thigh_l": SensorSignals("A", still + GRAVITY, rates, None, valid, ~valid),
+        "thigh_r": SensorSignals("B", still + GRAVITY, still, None, valid, ~valid),
     }
     take = UniformRecording(T, RATE, worn, Subject(), "walk", {})
     return find_functional_movements(take, config.calibration.functional)
