@@ -26,8 +26,18 @@ Window = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class RestParams:
-    """What counts as rest (docs/science/calibration.md, "Rest", "False rests").
+class QuietParams:
+    """What counts as quiet (docs/science/calibration.md, "Rest")."""
+
+    window_s: float = 1.0
+    gyro_limit: float = radians(6.0)
+    acc_std_limit: float = 0.25
+    shortest_s: float = 1.0
+
+
+@dataclass(frozen=True)
+class RestParams(QuietParams):
+    """What counts as rest of a person (docs/science/calibration.md, "Rest", "False rests").
 
     Parameters
     ----------
@@ -37,16 +47,12 @@ class RestParams:
         swayed for 2 s at the start of a real take had 2.9 °/s, and its heading was lost.
     """
 
-    window_s: float = 1.0
-    gyro_limit: float = radians(6.0)
-    acc_std_limit: float = 0.25
-    shortest_s: float = 1.0
     drift: float = radians(1.0)
     drift_rate: float = radians(1.0)
     bias: float = radians(1.0)
 
 
-STANDING: Final = RestParams(window_s=0.5, shortest_s=0.5)
+STANDING: Final = QuietParams(window_s=0.5, shortest_s=0.5)
 """A short standing within a walk, which says nothing of the gyroscope (our choice: the shortest stop,
 core/events/bouts.py)."""
 
@@ -66,9 +72,9 @@ class Quietness:
     quiet: Bools
 
 
-def measure_quietness(signals: SensorSignals, rate_hz: float, params: RestParams | None = None) -> Quietness:
+def measure_quietness(signals: SensorSignals, rate_hz: float, params: QuietParams | None = None) -> Quietness:
     """Measure how quiet a sensor is in the window around every sample; borders hold the nearest window."""
-    params = params or RestParams()
+    params = params or QuietParams()
     width = max(2, round(params.window_s * rate_hz))
     if len(signals.valid) < width:
         never = np.full(len(signals.valid), np.inf)
@@ -93,14 +99,14 @@ def measure_quietness(signals: SensorSignals, rate_hz: float, params: RestParams
 
 def find_rest_windows(
     recording: UniformRecording,
-    params: RestParams | None = None,
+    params: QuietParams | None = None,
     segments: Iterable[Segment] | None = None,
 ) -> tuple[Window, ...]:
     """Windows in which all sensors (or those of `segments`) are at rest together, in order of time.
 
     The quarter window at each end of a run that may already hold the onset of movement is left out.
     """
-    params = params or RestParams()
+    params = params or QuietParams()
     chosen = tuple(recording.sensors if segments is None else segments)
     if not chosen:
         return ()
@@ -133,9 +139,9 @@ def measure_turn(acc: Floats, rate_hz: float) -> tuple[float, float]:
     return turned, (len(acc) - edge) / rate_hz
 
 
-def find_windows(quiet: Bools, rate_hz: float, params: RestParams | None = None) -> tuple[Window, ...]:
+def find_windows(quiet: Bools, rate_hz: float, params: QuietParams | None = None) -> tuple[Window, ...]:
     """Turn a mask (n,) of quiet window centres into rest windows of at least `shortest_s`."""
-    params = params or RestParams()
+    params = params or QuietParams()
     n = len(quiet)
     reach = round(0.25 * params.window_s * rate_hz)
     found = []

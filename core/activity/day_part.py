@@ -25,7 +25,7 @@ from core.activity.transitions import (
     tell_lying,
 )
 from core.activity.wear import Wear, describe_period, find_forward, find_upright, find_wear, group_periods
-from core.events.bouts import walking_bouts
+from core.events.bouts import plain_bouts
 from core.events.turns import Turn
 from core.frames import Bools, Floats
 from core.rest import Window, find_runs
@@ -157,7 +157,7 @@ def _mark(ranges: Sequence[tuple[int, int]], n: int) -> Bools:
 
 def _mark_walking(steps: Floats, frames: Frames, params: ActivityParams) -> Bools:
     """Frames (f,) from the first to the last step of a bout."""
-    bouts = walking_bouts(steps.tolist(), params=params.bouts)
+    bouts = plain_bouts(steps.tolist(), params.bouts)
     return _mark([(_index(b.first_s, frames), _index(b.end_s, frames)) for b in bouts], len(frames.valid))
 
 

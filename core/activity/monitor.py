@@ -25,7 +25,7 @@ from core.activity.stairs import KIND_OF, LEVEL, StepKind, calibrate_stairs
 from core.activity.totals import HOUR_S, sum_days, sum_hours
 from core.body.model import NOMINAL_HEIGHT_M
 from core.errors import Notice, SignalError
-from core.events.bouts import Bout, walking_bouts
+from core.events.bouts import Bout, plain_bouts
 from core.events.turns import Turn
 from core.frames import Floats, Segment
 from core.plurals import plural
@@ -199,7 +199,7 @@ def _put_together(
     kinds = np.concatenate([p.step_kinds for p in parts]) if parts else np.empty(0, int)
     far = np.diff(steps, prepend=-np.inf) > 0.5 * params.steps.step_s[0]
     steps, kinds = steps[far], kinds[far]
-    found = walking_bouts(steps.tolist(), params=params.bouts)
+    found = plain_bouts(steps.tolist(), params.bouts)
     walked = np.zeros(len(steps), np.bool_)
     for w in found:
         walked[_within(steps, w.first_s, w.end_s)] = True

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from core.events.bouts import BoutParams
-from core.events.lumbar import LumbarParams
+from core.events.bouts import WalkParams
+from core.events.lumbar import StepTimeParams
 from core.events.turns import TurnParams
 
 THIGH_SHARE: Final = 0.245
@@ -131,6 +131,6 @@ class ActivityParams:
     upright: UprightParams = field(default_factory=UprightParams)
     transitions: TransitionParams = field(default_factory=TransitionParams)
     stairs: StairParams = field(default_factory=StairParams)
-    steps: LumbarParams = field(default_factory=LumbarParams)
-    bouts: BoutParams = field(default_factory=BoutParams)
+    steps: StepTimeParams = field(default_factory=StepTimeParams)
+    bouts: WalkParams = field(default_factory=WalkParams)
     turns: TurnParams = field(default_factory=TurnParams)

@@ -19,7 +19,7 @@ import numpy as np
 from core.activity.frames import FRAME_HZ, PER_MINUTE, Frames, Singles, Slab
 from core.activity.params import ActivityParams
 from core.errors import SignalError
-from core.events.lumbar import LumbarParams, detect_steps, find_moving, split_about_vertical
+from core.events.lumbar import StepTimeParams, find_moving, find_step_times, split_about_vertical
 from core.events.turns import Turn, find_turns
 from core.frames import GRAVITY, Bools, Floats, Segment
 from core.recording import SensorSignals, Subject, UniformRecording
@@ -336,10 +336,10 @@ def _find_steps_and_turns(
         offset = (window.first + part.start) / rate
         thin = rate // STEP_RATE if rate % STEP_RATE == 0 else 1
         alone = _take_alone(_cut_out(signals, part), rate, thin, segment)
-        found = detect_steps(alone, params.steps)
+        found = find_step_times(alone, segment, params.steps)
         centre = offset + 0.5 * (thin - 1) / rate
-        steps += [s.time_s + centre for s in found.steps]
-        if found.steps and window.gyr.any():
+        steps += [t + centre for t in found]
+        if found and window.gyr.any():
             whole = _cut_out(signals, part)
             _, yaw_rate = split_about_vertical(whole, rate, params.steps)
             turns += [
@@ -349,7 +349,7 @@ def _find_steps_and_turns(
     return steps, turns
 
 
-def _stretches(moving: Bools, rate: int, params: LumbarParams) -> list[tuple[int, int]]:
+def _stretches(moving: Bools, rate: int, params: StepTimeParams) -> list[tuple[int, int]]:
     """Runs of movement long enough for a bout of steps, those with short pauses joined."""
     joined: list[tuple[int, int]] = []
     for a, b in find_runs(moving):

@@ -9,34 +9,54 @@ from core.fusion.attitude import AttitudeParams
 
 
 @dataclass(frozen=True)
-class JointParams:
-    """How the two sources of a joint's acceleration are compared (docs/science/agreement.md, "One idea").
+class JointBandParams:
+    """Which part of a joint's acceleration is looked at (docs/science/agreement.md, "One idea").
 
     Parameters
     ----------
     band_hz : of the acceleration. Below 0.5 Hz lies the error of the tilt, above 6 Hz the flesh: with bands
         up to 12 Hz clean knees seem 5 to 13 ms late (neura_walk, qmt_fullbody); 4 and 6 Hz give the same.
     working_hz : signals are thinned to about this rate; eight samples of the fastest component.
-    widest_s : lags looked at, either side.
-    chunk_s, window_chunks : products are summed by chunk, a window is so many of them.
-    least_chunks : of a window without a lost sample.
-    windows : a longer take has its windows further apart, up to half a window; so many are enough.
-    least_power : RMS of the joint's acceleration below which nobody moves, m/s².
-    place_sd_m : how far from its sensor a joint may be; with noise_mps2 a weak prior that keeps solvable what
-        hardly moves.
-    attitude : of the tilt; 0.2/s forgets a wrong bias sooner than the orientation of the figure needs.
     """
 
     band_hz: tuple[float, float] = (0.5, 6.0)
     working_hz: float = 50.0
-    widest_s: float = 0.16
+
+
+@dataclass(frozen=True)
+class JointSumParams(JointBandParams):
+    """How the two sources of that acceleration are compared, window by window.
+
+    Parameters
+    ----------
+    chunk_s, window_chunks : products are summed by chunk, a window is so many of them.
+    least_chunks : of a window without a lost sample.
+    least_power : RMS of the joint's acceleration below which nobody moves, m/s².
+    place_sd_m : how far from its sensor a joint may be; with noise_mps2 a weak prior that keeps solvable what
+        hardly moves.
+    """
+
     chunk_s: float = 1.0
     window_chunks: int = 6
     least_chunks: int = 5
-    windows: int = 120
     least_power: float = 0.5
     place_sd_m: float = 0.4
     noise_mps2: float = 1.0
+
+
+@dataclass(frozen=True)
+class JointParams(JointSumParams):
+    """The same of sensors whose clocks may differ and whose tilt is not known.
+
+    Parameters
+    ----------
+    widest_s : lags looked at, either side.
+    windows : a longer take has its windows further apart, up to half a window; so many are enough.
+    attitude : of the tilt; 0.2/s forgets a wrong bias sooner than the orientation of the figure needs.
+    """
+
+    widest_s: float = 0.16
+    windows: int = 120
     attitude: AttitudeParams = field(default_factory=lambda: AttitudeParams(kp=0.2))
 
 

@@ -12,7 +12,7 @@ from typing import Final, Protocol
 import numba
 import numpy as np
 
-from core.agreement.params import JointParams
+from core.agreement.params import JointBandParams, JointParams
 from core.filtering import low_pass
 from core.frames import GRAVITY, Bools, Floats
 from core.fusion.attitude import AttitudeParams, AttitudeState, advance
@@ -164,13 +164,13 @@ def find_terms(signals: SensorSignals, rate_hz: float, params: JointParams) -> S
     return SensorTerms(motion, M, usable[::thin], rate_hz / thin)
 
 
-def find_thinning(rate_hz: float, params: JointParams) -> int:
+def find_thinning(rate_hz: float, params: JointBandParams) -> int:
     """Every how many samples one is taken for the terms."""
     return max(1, int(rate_hz / params.working_hz + 0.3))
 
 
 def low_pass_terms(
-    q: Floats, acc: Floats, gyr: Floats, rate_hz: float, params: JointParams, pad: int | None = None
+    q: Floats, acc: Floats, gyr: Floats, rate_hz: float, params: JointBandParams, pad: int | None = None
 ) -> tuple[Floats, Floats]:
     """Terms (k, 12, m) of k sensors below the band's upper edge, thinned, and their level force (k, 3, n).
 
@@ -190,7 +190,7 @@ def low_pass_terms(
     return slow, level
 
 
-def take_mean_out(slow: Floats, rate_hz: float, params: JointParams, pad: int | None = None) -> Floats:
+def take_mean_out(slow: Floats, rate_hz: float, params: JointBandParams, pad: int | None = None) -> Floats:
     """Terms (k, m, 3, 4) within the band, from those below its upper edge (k, 12, m) at their own rate."""
     slow = slow - low_pass(slow, params.band_hz[0], rate_hz, pad)
     return np.ascontiguousarray(slow.transpose(0, 2, 1)).reshape(len(slow), -1, 3, TERMS)

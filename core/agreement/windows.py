@@ -13,7 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.agreement.params import JointParams
+from core.agreement.params import JointParams, JointSumParams
 from core.agreement.terms import TERMS, SensorTerms, TermsPart
 from core.frames import Bools, Floats, Segment
 from core.inner import inner_njit
@@ -152,7 +152,7 @@ class JointSums:
             x[:-1] = x[1:]
             x[-1] = 0
 
-    def solve(self, starts: NDArray[np.int64], chunk: int, params: JointParams) -> Floats:
+    def solve(self, starts: NDArray[np.int64], chunk: int, params: JointSumParams) -> Floats:
         """Windows (m, 11) from these chunks on: middle in chunks, lag in samples, certain, misfit, places,
         turn; m of those that can be used."""
         width = params.window_chunks

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from core.agreement.joints import LEG_JOINTS, JointKind
-from core.agreement.params import JointParams
+from core.agreement.params import JointBandParams
 from core.agreement.terms import find_thinning, find_usable, low_pass_terms, take_mean_out
 from core.body.corrected import correct_signals
 from core.body.model import BodyModel
@@ -73,7 +73,7 @@ class ArmParams:
         rad. noise_mps2 : least spread of the difference.
     stride_s : the whole walk counts as so much independent evidence. longest_s : so much walking is looked
         at. least_s : with less a joint says nothing. worst_misfit : of a joint's acceleration over its size,
-        above which it says nothing. joints : how accelerations are compared.
+        above which it says nothing. joints : which part of accelerations is compared.
     """
 
     place_sd: Mapping[str, tuple[float, float, float]] = field(
@@ -92,7 +92,7 @@ class ArmParams:
         }
     )
     wander_sd: Mapping[str, float] = field(
-        default_factory=lambda: {"pelvis": 0.005, "thigh": 0.02, "shank": 0.01, "foot": 0.005}
+        default_factory=lambda: {"thigh": 0.02, "shank": 0.01, "foot": 0.005}
     )
     turn_sd: float = radians(8.0)
     ahead_sd: float = radians(20.0)
@@ -101,7 +101,7 @@ class ArmParams:
     longest_s: float = 30.0
     least_s: float = 3.0
     worst_misfit: float = 0.9
-    joints: JointParams = field(default_factory=JointParams)
+    joints: JointBandParams = field(default_factory=JointBandParams)
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,7 +333,7 @@ def _view_sides(
         bent = [x for joint, x in flexions.items() if segment in joint and segment != "pelvis"]
         usable = find_usable(valid[:, i, None], rate)[0] & walked
         wander = _accelerate(turned[segment], bent, rate, thin, params)
-        sides[segment] = _Side(M, wander, params.wander_sd[_kind(segment)], usable[::thin])
+        sides[segment] = _Side(M, wander, params.wander_sd.get(_kind(segment), 0.0), usable[::thin])
     return sides, rate / thin
 
 

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from core.agreement.joints import LEG_JOINTS, JointKind, list_worn_joints
-from core.agreement.params import JointParams
+from core.agreement.params import JointSumParams
 from core.agreement.terms import find_thinning, find_usable, low_pass_terms, take_mean_out
 from core.agreement.windows import JointSums
 from core.calibration.forward import JointMeasure
@@ -43,7 +43,7 @@ class JointTurnParams:
     )
     doubt: float = 0.05
     worst_misfit: float = 0.9
-    joints: JointParams = field(default_factory=JointParams)
+    joints: JointSumParams = field(default_factory=JointSumParams)
 
 
 def measure_joint_turns(

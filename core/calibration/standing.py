@@ -12,6 +12,7 @@ from core.errors import SignalError
 from core.frames import SHANK, THIGH, Bools, Floats, Segment
 from core.recording import SensorSignals, UniformRecording
 from core.rest import (
+    QuietParams,
     RestParams,
     Window,
     drop_false_rests,
@@ -130,7 +131,7 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
         at = int(np.argmin(q.gyro))
         quietest.append((float(q.gyro[at]), segment, float(recording.t_s[at])))
     rate, segment, at_s = max(quietest)
-    short = RestParams(params.window_s / 2, params.gyro_limit, params.acc_std_limit, params.shortest_s / 2)
+    short = QuietParams(params.window_s / 2, params.gyro_limit, params.acc_std_limit, params.shortest_s / 2)
     limit = np.degrees(params.gyro_limit)
     if find_rest_windows(recording, short):
         code, what = "rest_too_short", f"the sensors are still together for less than {params.shortest_s:g} s"

@@ -16,7 +16,7 @@ import numpy as np
 from core.errors import CalibrationError, Notice
 from core.frames import R_NEUTRAL, Floats, Segment
 from core.recording import SensorSignals, UniformRecording
-from core.rest import RestParams, Window, find_rest_windows, find_runs, index_window
+from core.rest import QuietParams, Window, find_rest_windows, find_runs, index_window
 from core.rotation import conjugate, exp, from_matrix, mean, multiply, rotate, to_matrix
 from core.rotation.compiled import turn
 
@@ -38,7 +38,7 @@ class TableTopParams:
         that on the table is on the body, rad.
     """
 
-    rest: RestParams = field(default_factory=RestParams)
+    rest: QuietParams = field(default_factory=QuietParams)
     longest_s: float = 60.0
     edge_s: float = 1.0
     still_s: float = 1.0

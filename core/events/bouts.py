@@ -21,15 +21,38 @@ from core.rest import Window
 
 
 @dataclass(frozen=True)
-class BoutParams:
+class WalkParams:
     """When contacts are walking.
 
     Parameters
     ----------
     break_s : longest time between two contacts of a bout. min_strides : least strides of a bout, those of
         both feet counted (mobgap).
+    """
+
+    break_s: float = 3.0
+    min_strides: int = 4
+
+
+@dataclass(frozen=True)
+class RowParams(WalkParams):
+    """And when its steps follow each other.
+
+    Parameters
+    ----------
     long_share : a step that takes so many times the median step of its bout is a break. Our choice: the steps
         of the virtual patients stay below 1.7, a start or end of gait included.
+    """
+
+    long_share: float = 2.0
+
+
+@dataclass(frozen=True)
+class BoutParams(RowParams):
+    """And when somebody stops.
+
+    Parameters
+    ----------
     long_s : shortest such step, so that quick walking has none. Our choice.
     stand_s : time of standing in a break from which it is a stop; with one foot known a stride more, as it
         stands in each. Our choice: both feet are never at rest together for so long in walking (ipol_walks,
@@ -38,9 +61,6 @@ class BoutParams:
         that the quiet window of 1 s cannot see (core/rest.py) and a step.
     """
 
-    break_s: float = 3.0
-    min_strides: int = 4
-    long_share: float = 2.0
     long_s: float = 1.0
     stand_s: float = 0.5
     near_s: float = 2.0
@@ -100,9 +120,7 @@ def walking_bouts(
     params = params or BoutParams()
     found = []
     ended = -inf
-    for run in _runs(contacts, params.break_s):
-        if len(run) - feet < (params.min_strides if feet == 2 else params.min_strides // 2):
-            continue
+    for run in _walks(contacts, feet, params):
         steps = np.diff(run)
         typical = float(np.median(steps))
         limit = max(params.long_s, params.long_share * typical)
@@ -127,6 +145,14 @@ def walking_bouts(
     return tuple(found)
 
 
+def plain_bouts(contacts: Sequence[float], params: WalkParams) -> tuple[Bout, ...]:
+    """Walking bouts of contacts of two feet, of which neither breaks nor rests are asked."""
+    return tuple(
+        Bout(run[0], run[0], run[-1], len(run), float(np.median(np.diff(run))))
+        for run in _walks(contacts, 2, params)
+    )
+
+
 def find_bouts(
     events: GaitEvents,
     rests: Sequence[Window] | None = None,
@@ -141,15 +167,16 @@ def find_bouts(
     return walking_bouts(contacts, leavings, rests, max(1, feet), params, standing)
 
 
-def _runs(contacts: Sequence[float], break_s: float) -> list[list[float]]:
-    """Successive contacts without a break."""
+def _walks(contacts: Sequence[float], feet: int, params: WalkParams) -> list[list[float]]:
+    """Successive contacts without a long break, enough of them for walking."""
     runs: list[list[float]] = []
     for t in contacts:
-        if runs and t - runs[-1][-1] <= break_s:
+        if runs and t - runs[-1][-1] <= params.break_s:
             runs[-1].append(t)
         else:
             runs.append([t])
-    return runs
+    least = params.min_strides if feet == 2 else params.min_strides // 2
+    return [run for run in runs if len(run) - feet >= least]
 
 
 def _overlap(one: Window, other: Window) -> float:

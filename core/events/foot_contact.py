@@ -39,8 +39,6 @@ class FootContactParams:
         deepest value in the `leaving_s` before the lowest pitch. Chosen on the three sets together.
     push_s : further from the lowest pitch the push-off belongs to something else. Our choice.
     least_rad_s : a shallower slap or push-off is none. Our choice: 29°/s.
-    stop_share : where there is neither slap nor acceleration, a foot lands where its pitch rate falls under
-        this share of its fastest. Our choice.
     lead_s, lag_s : mean distance from the pitch rule's contact and foot-off to the refined ones on the three
         sets; stands in until the refined time is known, and where there is none.
     still_rad_s, still_s : a foot slower than this for so long is at rest. Our choice.
@@ -69,7 +67,6 @@ class FootContactParams:
     leaving_s: float = 0.3
     push_s: float = 0.12
     least_rad_s: float = 0.5
-    stop_share: float = 0.2
     lead_s: float = 0.03
     lag_s: float = 0.025
     still_rad_s: float = 0.5

@@ -46,6 +46,10 @@ HELD_IC: Final = 8
 LEFT_AT: Final = 10
 SUMS: Final = 11
 
+STOP_SHARE: Final = 0.2
+"""Where there is neither slap nor acceleration, a foot lands where its pitch rate falls under this share of
+its fastest (our choice). No take is without acceleration, so it is no parameter."""
+
 
 class ContactRule(NamedTuple):
     """`FootContactParams` at a sample rate; whole numbers are samples."""
@@ -53,7 +57,6 @@ class ContactRule(NamedTuple):
     rate_hz: float
     contact_share: float
     leaving_share: float
-    stop_share: float
     least_rad_s: float
     push_s: float
     lead_s: float
@@ -81,11 +84,11 @@ class ContactRule(NamedTuple):
 
 @inner_njit()
 def _read_rule(x):  # type: ignore[no-untyped-def]
-    """The rule in an array (27,): a tuple would take longer to hand over than the block to go through."""
+    """The rule in an array (26,): a tuple would take longer to hand over than the block to go through."""
     return ContactRule(
         x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12], x[13], x[14], x[15],
-        x[16], x[17], int(x[18]), int(x[19]), int(x[20]), int(x[21]), int(x[22]), int(x[23]), int(x[24]),
-        int(x[25]), int(x[26]),
+        x[16], int(x[17]), int(x[18]), int(x[19]), int(x[20]), int(x[21]), int(x[22]), int(x[23]), int(x[24]),
+        int(x[25]),
     )  # fmt: skip
 
 
@@ -183,7 +186,7 @@ def _landing(pitch, acc, top, first, last, moves, rate_hz, rule):  # type: ignor
         return hardest - 0.5 * rule.apart, rule.flat_sd_s
     if peak < rule.least_rad_s:
         return np.nan, rule.late_sd_s
-    level = rule.stop_share * peak
+    level = STOP_SHARE * peak
     j = min(top, last - 1)
     while j > first and _rate(pitch, j, rate_hz) < level:
         j -= 1

@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 
 from core.errors import Notice, SignalError
-from core.events.bouts import Bout, BoutParams, walking_bouts
+from core.events.bouts import Bout, BoutParams, RowParams, plain_bouts, walking_bouts
 from core.events.periodicity import Periodicity, PeriodicityParams, step_times
 from core.events.steps import Step, Steps
 from core.filtering import low_pass, smooth_gaussian
@@ -35,8 +35,8 @@ TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 
 
 @dataclass(frozen=True)
-class LumbarParams:
-    """Parameters of the detector.
+class StepTimeParams:
+    """Parameters of when a trunk makes steps.
 
     Parameters
     ----------
@@ -50,13 +50,6 @@ class LumbarParams:
         has at most 0.07 (core/calibration/walking.py).
     merge_s : pauses shorter than this do not divide the take into parts of their own step time.
     step_s : step times that count as walking.
-    side_share, side_steps : agreement of the alternating yaw (0 to 1) and number of steps without a break
-        from which sides are told. Our choice.
-    side_rad : least mean of the alternating yaw in a straight part that is judged by itself. In two of the
-        four people of ipol_walks it alternates by 1.2° and less, in one of them the other way round.
-    side_reach : steps at the ends of a walk that are told with the straight part beside them. Our choice.
-    turning_rad_s : yaw rate below 0.5 Hz from which the body turns, and its swing cannot be told from that.
-        Our choice: that of a turn (core/events/turns.py).
     row_steps : maxima that stand together; fewer are a shift of weight or a push from outside. Our choice: a
         stride, three contacts.
     bout_score : least mean score of a bout in a take that has walking somewhere. Our choice: noise has 0.2,
@@ -72,16 +65,34 @@ class LumbarParams:
     moving: float = 0.2
     merge_s: float = 2.0
     step_s: tuple[float, float] = (0.25, 1.3)
+    row_steps: int = 3
+    min_rate_hz: float = 20.0
+    periodicity: PeriodicityParams = field(default_factory=PeriodicityParams)
+    bout_score: float = 0.25
+    bouts: RowParams = field(default_factory=RowParams)
+
+
+@dataclass(frozen=True)
+class LumbarParams(StepTimeParams):
+    """And of which foot makes them.
+
+    Parameters
+    ----------
+    side_share, side_steps : agreement of the alternating yaw (0 to 1) and number of steps without a break
+        from which sides are told. Our choice.
+    side_rad : least mean of the alternating yaw in a straight part that is judged by itself. In two of the
+        four people of ipol_walks it alternates by 1.2° and less, in one of them the other way round.
+    side_reach : steps at the ends of a walk that are told with the straight part beside them. Our choice.
+    turning_rad_s : yaw rate below 0.5 Hz from which the body turns, and its swing cannot be told from that.
+        Our choice: that of a turn (core/events/turns.py).
+    """
+
+    bouts: BoutParams = field(default_factory=BoutParams)
     side_share: float = 0.6
     side_steps: int = 4
     side_rad: float = float(np.radians(1.5))
     side_reach: int = 3
     turning_rad_s: float = float(np.radians(15.0))
-    row_steps: int = 3
-    min_rate_hz: float = 20.0
-    periodicity: PeriodicityParams = field(default_factory=PeriodicityParams)
-    bout_score: float = 0.25
-    bouts: BoutParams = field(default_factory=BoutParams)
 
 
 def trunk_sensor(recording: UniformRecording) -> Segment | None:
@@ -110,34 +121,10 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
     segment = trunk_sensor(recording)
     if segment is None:
         raise SignalError("no_trunk_sensor", "Steps of the trunk need a sensor on the pelvis or the chest.")
-    rate = recording.rate_hz
-    if rate < params.min_rate_hz:
-        raise SignalError(
-            "sample_rate_too_low",
-            f"Steps need at least {params.min_rate_hz:g} Hz, the recording has {rate:g} Hz. Record at a"
-            " higher rate.",
-            sensor=segment,
-        )
-    signals = recording.sensors[segment]
-    up, norm = _mean_up(signals, rate, params)
-    vertical, yaw_rate = _split_along(signals, up, norm)
-    moving = find_moving(vertical, signals.valid, rate, params)
-    if not moving.any():
-        return _nothing(segment, "no_walking", "The trunk hardly moved: no steps were found.")
-    if signals.gyr.any():
-        rhythm = step_times(vertical, signals.gyr, rate, params.periodicity)
-    else:
-        horizontal = signals.acc - (vertical + norm)[:, None] * up
-        rhythm = step_times(vertical, None, rate, params.periodicity, horizontal)
-    if not rhythm.walks(params.step_s, params.periodicity):
-        return _nothing(
-            segment,
-            "non_periodic",
-            f"The movement of the trunk has no rhythm of steps (best score {rhythm.score.max():.2f}; needed"
-            f" for several seconds: {params.periodicity.row_score:g}): no steps are reported. Record at least"
-            " ten steps straight ahead.",
-        )
-    times = _steps(vertical, moving, rhythm, rate, params)
+    found = _find_rows(recording, segment, params)
+    if isinstance(found, Steps):
+        return found
+    times, rhythm, yaw_rate = found
     rests = find_rest_windows(recording, segments=(segment,))
     standing = find_rest_windows(recording, STANDING, (segment,))
     bouts = tuple(
@@ -145,6 +132,7 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
         for b in walking_bouts(times, rests=rests, params=params.bouts, standing=standing)
         if _repeats(b, rhythm, params)
     )
+    rate = recording.rate_hz
     if not bouts:
         return _nothing(
             segment,
@@ -175,28 +163,77 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
     return Steps(tuple(steps), bouts, segment, tuple(notices), {"score": float(rhythm.score.max())})
 
 
+def find_step_times(recording: UniformRecording, segment: Segment, params: StepTimeParams) -> list[float]:
+    """Times of the steps that `detect_steps` finds of a sensor, whose feet and stops nobody asks for.
+
+    Raises
+    ------
+    SignalError : `sample_rate_too_low`.
+    """
+    found = _find_rows(recording, segment, params)
+    if isinstance(found, Steps):
+        return []
+    times, rhythm, _ = found
+    bouts = [b for b in plain_bouts(times, params.bouts) if _repeats(b, rhythm, params)]
+    return [t for b in bouts for t in times if b.first_s <= t <= b.end_s]
+
+
+def _find_rows(
+    recording: UniformRecording, segment: Segment, params: StepTimeParams
+) -> Steps | tuple[list[float], Periodicity, Floats]:
+    """Times of steps in rows, s, their rhythm and the yaw rate, rad/s; why there are none."""
+    rate = recording.rate_hz
+    if rate < params.min_rate_hz:
+        raise SignalError(
+            "sample_rate_too_low",
+            f"Steps need at least {params.min_rate_hz:g} Hz, the recording has {rate:g} Hz. Record at a"
+            " higher rate.",
+            sensor=segment,
+        )
+    signals = recording.sensors[segment]
+    up, norm = _mean_up(signals, rate, params)
+    vertical, yaw_rate = _split_along(signals, up, norm)
+    moving = find_moving(vertical, signals.valid, rate, params)
+    if not moving.any():
+        return _nothing(segment, "no_walking", "The trunk hardly moved: no steps were found.")
+    if signals.gyr.any():
+        rhythm = step_times(vertical, signals.gyr, rate, params.periodicity)
+    else:
+        horizontal = signals.acc - (vertical + norm)[:, None] * up
+        rhythm = step_times(vertical, None, rate, params.periodicity, horizontal)
+    if not rhythm.walks(params.step_s, params.periodicity):
+        return _nothing(
+            segment,
+            "non_periodic",
+            f"The movement of the trunk has no rhythm of steps (best score {rhythm.score.max():.2f}; needed"
+            f" for several seconds: {params.periodicity.row_score:g}): no steps are reported. Record at least"
+            " ten steps straight ahead.",
+        )
+    return _steps(vertical, moving, rhythm, rate, params), rhythm, yaw_rate
+
+
 def split_about_vertical(
-    signals: SensorSignals, rate_hz: float, params: LumbarParams | None = None
+    signals: SensorSignals, rate_hz: float, params: StepTimeParams | None = None
 ) -> tuple[Floats, Floats]:
     """Vertical acceleration free of gravity (n,) in m/s² and yaw rate (n,) in rad/s, left positive.
 
     Up is where the specific force points on average over several steps: an upright trunk needs no filter.
     """
-    return _split_along(signals, *_mean_up(signals, rate_hz, params or LumbarParams()))
+    return _split_along(signals, *_mean_up(signals, rate_hz, params or StepTimeParams()))
 
 
 def _split_along(signals: SensorSignals, up: Floats, norm: Floats) -> tuple[Floats, Floats]:
     return np.einsum("ni,ni->n", signals.acc, up) - norm, np.einsum("ni,ni->n", signals.gyr, up)
 
 
-def _mean_up(signals: SensorSignals, rate_hz: float, params: LumbarParams) -> tuple[Floats, Floats]:
+def _mean_up(signals: SensorSignals, rate_hz: float, params: StepTimeParams) -> tuple[Floats, Floats]:
     """Where up is (n, 3), sensor axes, and the mean specific force (n,) along it, m/s²."""
     force = np.stack([smooth_gaussian(a, params.up_s * rate_hz) for a in signals.acc.T], axis=1)
     norm = np.maximum(find_lengths(force), 1e-9)
     return force / norm[:, None], norm
 
 
-def find_moving(vertical: Floats, valid: Bools, rate_hz: float, params: LumbarParams) -> Bools:
+def find_moving(vertical: Floats, valid: Bools, rate_hz: float, params: StepTimeParams) -> Bools:
     """Samples at which the trunk moves vertically as in walking and the sensor is there."""
     from scipy.ndimage import uniform_filter1d
 
@@ -206,14 +243,14 @@ def find_moving(vertical: Floats, valid: Bools, rate_hz: float, params: LumbarPa
     return np.asarray((spread > params.moving**2) & valid)
 
 
-def _good(rhythm: Periodicity, params: LumbarParams) -> Bools:
+def _good(rhythm: Periodicity, params: StepTimeParams) -> Bools:
     low, high = params.step_s
     in_range = (rhythm.step_s >= low) & (rhythm.step_s <= high)
     return np.asarray(in_range & (rhythm.score >= params.periodicity.least))
 
 
 def _steps(
-    vertical: Floats, moving: Bools, rhythm: Periodicity, rate_hz: float, params: LumbarParams
+    vertical: Floats, moving: Bools, rhythm: Periodicity, rate_hz: float, params: StepTimeParams
 ) -> list[float]:
     """Times of the maxima of every moving part, at the scale of its own step time."""
     good = _good(rhythm, params)
@@ -232,7 +269,7 @@ def _steps(
     return times
 
 
-def _repeats(bout: Bout, rhythm: Periodicity, params: LumbarParams) -> bool:
+def _repeats(bout: Bout, rhythm: Periodicity, params: StepTimeParams) -> bool:
     """Is there enough of a rhythm in a bout?"""
     reach = 0.5 * params.periodicity.hop_s
     here = (rhythm.t_s >= bout.start_s - reach) & (rhythm.t_s <= bout.end_s + reach)

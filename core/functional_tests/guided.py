@@ -29,7 +29,7 @@ from core.functional_tests.walks import LENGTH, measure_six_minutes, measure_ten
 from core.measure import MeasuredGait
 from core.parameters.live_stride import LiveStride
 from core.recording import GivenLimits, SensorSignals, Subject, UniformRecording
-from core.rest import RestParams, find_rest_windows, measure_quietness
+from core.rest import QuietParams, find_rest_windows, measure_quietness
 from core.timeline.live import UniformBlock
 
 CHAIR_TESTS: Final = ("tug", "five_sit_to_stand")
@@ -38,7 +38,7 @@ WALK_TESTS: Final = ("walk_10m", "walk_6min")
 GUIDED: Final[tuple[str, ...]] = (*CHAIR_TESTS, *WALK_TESTS, *STANDING_TESTS)
 """Protocols that the live page guides."""
 
-REST: Final = RestParams()
+REST: Final = QuietParams()
 """Being quiet is the rest of a file."""
 
 

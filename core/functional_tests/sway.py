@@ -15,11 +15,11 @@ from core.functional_tests.trunk import find_trunk_sensor
 from core.parameters.catalogue import list_names
 from core.parameters.catalogue.entry import SWAY
 from core.recording import GivenLimits, UniformRecording
-from core.rest import RestParams, Window, find_rest_windows, index_window
+from core.rest import QuietParams, Window, find_rest_windows, index_window
 
 NAMES: Final = list_names(SWAY, "take")
 
-STANDING_QUIETLY: Final = RestParams(
+STANDING_QUIETLY: Final = QuietParams(
     window_s=1.0, gyro_limit=radians(20.0), acc_std_limit=0.5, shortest_s=2.0
 )
 """Standing that sways is no rest of the gyroscope; a step ends it (our choice)."""

@@ -7,7 +7,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeVar, get_args
+from typing import Any, Final, Literal, TypeVar, get_args
 
 from core.activity.params import ActivityParams
 from core.agreement import AgreementParams
@@ -33,6 +33,34 @@ Settings = TypeVar("Settings")
 Detector = Literal["foot_contact", "foot_pitch", "consensus"]
 """Whose contacts count: the refined ones of the feet, the published foot-pitch rule's, or what most detectors
 agree on."""
+
+REMOVED: Final = frozenset(
+    {
+        "config.contacts.stop_share",
+        "config.poses.erkf.heading_sd",
+        *(
+            f"config.activity.steps.{b}"
+            for b in ("side_share", "side_steps", "side_rad", "side_reach", "turning_rad_s")
+        ),
+        *(f"config.activity.steps.bouts.{b}" for b in ("long_s", "stand_s", "near_s")),
+        *(f"config.activity.bouts.{b}" for b in ("long_share", "long_s", "stand_s", "near_s")),
+        *(
+            f"config.{a}.rest.{b}"
+            for a in ("quality", "squat.table_top")
+            for b in ("drift", "drift_rate", "bias")
+        ),
+        *(
+            f"config.{a}.joints.{b}"
+            for a in ("poses.arms", "calibration.joint_turns")
+            for b in ("widest_s", "windows", "attitude")
+        ),
+        *(
+            f"config.poses.arms.joints.{b}"
+            for b in ("chunk_s", "window_chunks", "least_chunks", "least_power", "place_sd_m", "noise_mps2")
+        ),
+    }
+)
+"""What was a parameter and never changed a result: stored settings may name it, and mean the same without."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +127,8 @@ def override_config(defaults: Settings, overrides: Mapping[str, Any], path: str 
 
     Parameters
     ----------
-    overrides : by stage, {"fusion": {"attitude": {"kp": 0.5}}}; a list for a tuple.
+    overrides : by stage, {"fusion": {"attitude": {"kp": 0.5}}}; a list for a tuple. What was `REMOVED` is
+        passed over.
 
     Raises
     ------
@@ -108,6 +137,8 @@ def override_config(defaults: Settings, overrides: Mapping[str, Any], path: str 
     names = {f.name for f in dataclasses.fields(defaults)}  # type: ignore[arg-type] # all are dataclasses
     values: dict[str, Any] = {}
     for name, value in overrides.items():
+        if f"{path}.{name}" in REMOVED:
+            continue
         if name not in names:
             raise ParameterError(
                 "unknown_parameter", f"There is no {path}.{name}; expected one of {', '.join(sorted(names))}."

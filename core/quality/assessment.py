@@ -16,7 +16,7 @@ from core.quality.inspection import measure_losses
 from core.quality.signals import magnetic_share, measure_stream, saturation
 from core.quality.suspicion import list_suspicions
 from core.recording import Recording, SensorSignals, UniformRecording
-from core.rest import RestParams, Window, find_rest_windows, find_runs, index_window
+from core.rest import QuietParams, Window, find_rest_windows, find_runs, index_window
 from core.rotation import find_lengths
 
 Level = Literal["good", "usable", "poor"]
@@ -55,7 +55,7 @@ class QualityParams:
     interpolated: float = 0.02
     acc_floor: float = 1.9 * GRAVITY
     gyr_floor: float = float(np.radians(245.0))
-    rest: RestParams = field(default_factory=RestParams)
+    rest: QuietParams = field(default_factory=QuietParams)
 
 
 @dataclass(frozen=True)

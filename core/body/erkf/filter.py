@@ -16,6 +16,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import radians
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +45,9 @@ from core.errors import EstimationError, ParameterError, SignalError
 from core.frames import Bools, Floats
 from core.held_samples import SampleSeries
 from core.memory import make_pages
+
+HEADING_SD: Final = radians(10.0)
+"""Of a measured heading, rad (our choice). No stage measures one, so it is no parameter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -352,7 +357,7 @@ def noise_of(params: ErkfParams, rate_hz: float) -> Noise:
         tilt=on(params.tilt_sd),
         centre=on(params.joint_centre_sd),
         axis=on(params.joint_axis_sd),
-        heading=float(params.heading_sd),
+        heading=HEADING_SD,
         gap_acc=float(params.gap_acc_sd),
         gap_gyr=float(params.gap_gyr_sd),
         patch_acc=float(params.patch_acc_sd),

@@ -43,7 +43,7 @@ class ErkfParams:
         0.1 m upward). gate : largest χ² of a zero velocity. reaccept_s : contact refused for so long is
         accepted after all; then `reaccept_m` is added to the foot's uncertainty
         (docs/science/erkf.md, "Zero velocity").
-    tilt_sd : of the direction of f. joint_centre_sd : m. joint_axis_sd, heading_sd : rad.
+    tilt_sd : of the direction of f. joint_centre_sd : m. joint_axis_sd : rad.
     gap_acc_sd, gap_gyr_sd : in place of acc_sd and gyr_sd while an IMU is lost.
     patch_s : more than this between two samples, filled by a straight line, is a patch. patch_acc_sd,
         patch_gyr_sd : beside acc_sd and gyr_sd in it (docs/science/erkf.md, "Lost packets").
@@ -69,7 +69,6 @@ class ErkfParams:
     tilt_sd: float | None = 0.1
     joint_centre_sd: float | None = 0.01
     joint_axis_sd: float | None = None
-    heading_sd: float = radians(10.0)
     gap_acc_sd: float = 20.0
     gap_gyr_sd: float = 5.0
     patch_s: float = 0.025

@@ -1,4 +1,4 @@
-"""The configuration: every parameter of every stage is in it, in its hash, and of some stage."""
+"""The configuration: every parameter of every stage is in it, in its hash, of some stage, and matters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ import core
 from core.errors import ParameterError
 from core.events.consensus import ConsensusParams
 from core.pipeline import SQUAT, TRUNK_ONLY, WALK, PipelineConfig
+from core.pipeline.config import REMOVED, override_config
 from core.pipeline.recipes import ACTIVITY, BY_TRUNK
+from tests.helpers.parameter_changes import list_parameters, replace_value
+from tests.helpers.parameter_table import read_rows
 
 ELSEWHERE = ("core.online", "core.simulate", "core.fusion.self_calibrating")
 """Samples as they come have a configuration of their own (`OnlineParams`), so have a simulation and a filter
@@ -97,3 +100,35 @@ def test_a_detector_that_does_not_exist_is_named() -> None:
         ConsensusParams(presets=("marianni",))
     with pytest.raises(ParameterError, match="not one of foot_contact, foot_pitch, consensus"):
         PipelineConfig(detector="best")  # type: ignore[arg-type]
+
+
+def test_every_parameter_has_a_row_that_says_what_it_changes() -> None:
+    """`python -m tests.helpers.find_parameter_changes` looks for a row of a new one."""
+    names = {p.name for p in list_parameters()}
+    rows = read_rows()
+    assert len({row.parameter for row in rows}) == len(rows)
+    assert {row.parameter for row in rows} == names
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("name", sorted({row.take for row in read_rows()}))
+def test_every_parameter_changes_what_a_stage_gives(name: str) -> None:
+    from tests.helpers.parameter_takes import stage_take  # slow imports
+
+    take = stage_take(name)
+    unmoved = [
+        row.parameter
+        for row in read_rows()
+        if row.take == name
+        and take.observe(row.stage, replace_value(take.config, row.path, row.value))
+        == take.observe_usual(row.stage)
+    ]
+    assert unmoved == []
+
+
+def test_stored_settings_that_name_a_removed_parameter_mean_the_same_without() -> None:
+    stored = {"contacts": {"stop_share": 0.3, "step_m": 0.2}, "quality": {"rest": {"bias": 0.1}}}
+    chosen = override_config(PipelineConfig(), stored)
+    assert chosen == override_config(PipelineConfig(), {"contacts": {"step_m": 0.2}})
+    there = {f"config.{p.name}".split("[")[0] for p in list_parameters()}
+    assert not [name for name in REMOVED if any(f"{x}.".startswith(f"{name}.") for x in there)]
