@@ -254,15 +254,21 @@ def question_slips(config: PipelineConfig) -> object:
 
 
 def watch_sensors(config: PipelineConfig) -> object:
-    """A sensor that only turns, one of its axes stuck, and one that repeats a sample nearly of rest."""
+    """A sensor that only turns, one of its axes stuck, and one that repeats a sample nearly of rest.
+
+    The second also goes on from a repeated rest as if it had been turning, and repeats a moving sample.
+    """
     noise = np.random.default_rng(4).normal(0.0, 0.02, (4, len(T), 3))
     valid = np.ones(len(T), np.bool_)
     turning, frozen = noise[0], noise[1]
     turning[:, 0] += 2.0 * np.sin(3.0 * T)
     turning[300:, 1] = 0.011
     frozen[600:690] = 0.1
+    frozen[500:504], frozen[504, 0] = 0.02, 3.0
+    frozen[550:553] = 2.0
     acc = np.array([0.0, 0.0, GRAVITY]) + noise[2:]
     acc[1, 600:690] = (0.0, 0.0, GRAVITY + 1.0)
+    acc[1, 500:504] = acc[1, 550:553] = (0.0, 0.0, GRAVITY)
     worn: dict[Segment, SensorSignals] = {
         "shank_l": SensorSignals("A", acc[0], turning, None, valid, ~valid),
         "shank_r": SensorSignals("B", acc[1], frozen, None, valid, ~valid),

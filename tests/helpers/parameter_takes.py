@@ -30,11 +30,11 @@ from core.simulate.standing import simulate_sway
 from core.simulate.tug import simulate_chair_rises, simulate_tug
 from core.simulate.walker import Walker
 from core.timeline import synchronise
-from tests.core.pipeline.test_squat import from_table
 from tests.helpers.parameter_calls import CALLS
 from tests.helpers.parameter_changes import DirectCall, StagedTake, replace_value
 from tests.helpers.perturbations import delay_sensor, find_middle, slip_sensor
 from tests.helpers.setup_mistakes import TURNS, change_axes, exchange_labels
+from tests.helpers.table_top import from_table
 
 WALK: Final[Script] = (
     Stand(5.0), Straight(9.0, 0.64, 0.54), Arc(1.0, pi, 0.5, 0.56), Straight(7.0, 0.64, 0.54), Stand(3.0),

@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 
 from core.errors import ParameterError
-from core.frames import Segment
 from core.parameters.symmetry import compare_sides
 from core.pipeline import SQUAT, PipelineConfig, TakeAnalysis, analyse, resume
 from core.pipeline.recipes import choose_recipe
 from core.pipeline.squat_stages import AGREED, NO_HEIGHT
-from core.recording import ImuStream, Recording, Subject, UniformRecording
-from core.rotation import multiply
+from core.recording import Subject, UniformRecording
 from core.simulate import SquatSimulation, simulate_movement
 from core.squat.measures import MEASURES
 from core.squat.params import SquatParams
@@ -26,8 +24,9 @@ from core.timeline import synchronise
 from server.report.bundle import load_bundle
 from server.report.exports import analysis_files
 from server.report.model import report_model
-from tests.core.body.chain.squats import HEIGHT_M, squat_on
-from tests.core.calibration.test_table_top import RATE, WORN, carry
+from tests.core.body.chain.squats import squat_on
+from tests.core.calibration.test_table_top import RATE
+from tests.helpers.table_top import from_table
 from tests.helpers.walks import assert_same_figures
 
 
@@ -183,30 +182,6 @@ def refusal(recording: UniformRecording) -> str:
     with pytest.raises(EstimationError) as caught:
         find_squat_sides(recording)
     return caught.value.code
-
-
-@cache
-def from_table() -> Recording:
-    """Squats of a take that begins on the table: three sensors are put on one after the other."""
-    rng = np.random.default_rng(3)
-    squats = squat_on("right", RATE, repetitions=2)
-    streams: dict[str, ImuStream] = {}
-    segments: dict[str, Segment | None] = {}
-    for i, segment in enumerate(WORN):
-        truth = squats.truth
-        worn = multiply(truth.q[segment][0], truth.mounts[segment].q_segment_sensor)
-        way, done = carry(worn, rng, None, 0.5, move_s=6.0), squats.ideal[segment]
-        lying = np.zeros((round(3.0 * i * RATE), 3))
-        standing = np.zeros((round(3.0 * (2 - i) * RATE), 3))
-        bias = np.radians(0.5) * np.array([1.0, -1.0, 1.0])
-        gyr = np.concatenate((lying + bias, way.gyr, standing + bias, done.gyr + bias))
-        acc = np.concatenate((lying + way.acc[0], way.acc, standing + way.acc[-1], done.acc))
-        noise = rng.normal(0.0, 0.005, (2, *gyr.shape))
-        gyr, acc = gyr + 0.2 * noise[0], acc + noise[1]
-        t = np.arange(len(gyr)) / RATE
-        streams[segment] = ImuStream(segment, segment, t, acc, gyr, None, None, RATE, "counter", segment)
-        segments[segment] = segment
-    return Recording(streams, segments, Subject(HEIGHT_M), "squat")
 
 
 def test_a_take_that_begins_on_the_table_calibrates_itself() -> None:

@@ -37,7 +37,9 @@ def _visits(clinic: Clinic) -> tuple[str, str]:
 
 
 def _texts(html: str, pattern: str) -> list[str]:
-    return [re.sub(r"<[^>]*>|\s+", " ", found).strip() for found in re.findall(pattern, html, re.DOTALL)]
+    return [
+        re.sub(r"<[^>]*>|&nbsp;|\s+", " ", found).strip() for found in re.findall(pattern, html, re.DOTALL)
+    ]
 
 
 def _rows(html: str) -> list[str]:

@@ -82,7 +82,7 @@ async def read_trend(clinic: Clinic, session: str, language: str = "en") -> list
 
 
 def plain(html: str) -> str:
-    return " ".join(re.sub(r"<.*?>", " ", html.replace("\xad", "")).split())
+    return " ".join(re.sub(r"<.*?>", " ", html.replace("\xad", "").replace("&nbsp;", " ")).split())
 
 
 @pytest.mark.slow

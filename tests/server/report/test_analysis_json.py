@@ -12,7 +12,8 @@ import pytest
 from core.body.health import HealthFinding
 from core.parameters.result import Parameter
 from core.pipeline import TakeAnalysis
-from server.report.analysis_json import JUDGED, PATH_JUDGED, parameter_row, summarise_analysis
+from server.report.analysis_json import parameter_row, summarise_analysis
+from server.report.wording import JUDGED, PATH_JUDGED
 from tests.server import analysed
 
 

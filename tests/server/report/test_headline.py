@@ -78,7 +78,7 @@ def test_the_difference_is_that_of_the_values_as_they_are_printed(
     norms = Norms(None, None)
     parameters = both_sides(name, left, right, sd=0.001)
     (row,) = parameter_rows(parameters, norms)
-    by = re.search(r"by ([\d.]+)", row.difference)
+    by = re.search(r"by ([\d.]+)", row.difference or "")
     (told,) = said(norms, *parameters)
     spoken = re.search(r"([\d.]+) (points|s|cm)", told)
     assert by is not None
