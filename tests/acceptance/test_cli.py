@@ -54,7 +54,7 @@ def rows(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(path.read_text("utf-8"))))
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_another_estimator_and_a_config_file(tmp_path: Path) -> None:
     take = tmp_path / "take"
     assert sagittal("simulate", "--out", take, "--script", "comfortable").returncode == 0
@@ -136,7 +136,7 @@ def test_result_files_have_the_documented_columns(analysed: tuple[Path, str]) ->
     assert set(content["provenance"]) >= {"input_sha256", "parameters_sha256", "version"}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_same_input_gives_the_same_bytes(simulated: Path, analysed: tuple[Path, str], tmp_path: Path) -> None:
     again = sagittal("analyse", simulated / "recording.parquet", "--out", tmp_path)
     assert again.returncode == 0

@@ -28,7 +28,7 @@ def walked(belt_speed_mps: float | None) -> TakeAnalysis:
     return analyse(replace(recording(), protocol="treadmill", belt_speed_mps=belt_speed_mps))
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_without_the_belts_speed_every_distance_is_withheld_with_the_reason() -> None:
     found = {p.name: p for p in walked(None).parameters}
     for name in (*NAMES, "total_distance_m"):
@@ -36,7 +36,7 @@ def test_without_the_belts_speed_every_distance_is_withheld_with_the_reason() ->
     assert "treadmill_belt" in {n.code for n in walked(None).notices}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_the_belts_speed_gives_speed_and_stride_length_and_nothing_else() -> None:
     found = {(p.name, p.side): p for p in walked(BELT).parameters}
     assert found["gait_speed_mps", None].mean == pytest.approx(BELT)
@@ -48,7 +48,7 @@ def test_the_belts_speed_gives_speed_and_stride_length_and_nothing_else() -> Non
     assert {found[key].reason for key in found if key[0] in others} == {"treadmill"}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_angles_and_times_are_those_of_the_same_steps_on_the_floor() -> None:
     floor = {(p.name, p.side): p.mean for p in analyse(recording()).parameters}
     belt = {(p.name, p.side): p.mean for p in walked(BELT).parameters}
@@ -57,7 +57,7 @@ def test_angles_and_times_are_those_of_the_same_steps_on_the_floor() -> None:
             assert belt[key] == pytest.approx(floor[key]), key
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_belts_speed_without_a_treadmill_is_refused() -> None:
     with pytest.raises(ParameterError) as caught:
         replace(recording(), belt_speed_mps=BELT)

@@ -7,12 +7,12 @@ import json
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
-from tests.data import HERE
 from tests.helpers.parameter_changes import list_parameters
 
-TABLE: Final = HERE / "pipeline_parameters.csv"
+TABLE: Final = Path(__file__).parent / "pipeline_parameters.csv"
 COLUMNS: Final = ("parameter", "take", "stage", "value")
 
 

@@ -45,19 +45,19 @@ def first_sentence(notice: Notice) -> str:
     return re.sub(r"\d+", "#", notice.message.replace(";", ".").split(". ")[0])
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_listening_begins_where_live_calibration_finds_the_standing() -> None:
     assert find_standings(walk()) == STOOD
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_right_take_is_told_nothing_of() -> None:
     watch, told = listen(walk(), STOOD)
     assert told == []
     assert watch.doubts == {}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_late_sensor_is_told_once_in_the_words_of_a_file() -> None:
     late = delay_sensor(walk(), "shank_r", 0.040)
     watch, told = listen(late, STOOD)
@@ -68,7 +68,7 @@ def test_a_late_sensor_is_told_once_in_the_words_of_a_file() -> None:
     assert watch.doubts == {"shank_r": "sensor_late"}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("swap", [(("shank_l", "shank_r"),), LEGS])
 def test_exchanged_sensors_are_told_once_in_the_words_of_a_file(swap: Swap) -> None:
     wrong = replace(walk(), sensors=undo_exchange(swap, walk().sensors))
@@ -115,7 +115,7 @@ def test_calibrating_again_forgets_what_was_told() -> None:
     assert watch.doubts == {}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_blocks_do_not_matter() -> None:
     take = slip_sensor(delay_sensor(walk(), "foot_r", 0.040), "shank_l", np.radians(15.0), 17.0)
     expected = [n for _, n in listen(take, STOOD)[1]]

@@ -76,7 +76,7 @@ def test_what_is_worn_decides(worn: set[Segment], first: str | None) -> None:
     assert (list_possible_estimators(worn) or (None,))[0] == first
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_seven_sensors_walk_through_the_room_as_the_person_did() -> None:
     made = walk()
     assert made.poses.method == "erkf_smoothed"
@@ -92,7 +92,7 @@ def test_seven_sensors_walk_through_the_room_as_the_person_did() -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_the_floor_stays_at_zero_and_segments_hang_together() -> None:
     poses = walk().poses
     for side in SIDES:
@@ -103,7 +103,7 @@ def test_the_floor_stays_at_zero_and_segments_hang_together() -> None:
     assert np.sqrt(np.mean(np.sum((knee - poses.p["shank_r"]) ** 2, axis=1))) < 0.01
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_feet_are_linked_only_by_a_whole_chain() -> None:
     assert walk().feet is not None
     assert walk().feet.linked  # type: ignore[union-attr]
@@ -118,7 +118,7 @@ def test_feet_are_linked_only_by_a_whole_chain() -> None:
     assert walk("pelvis", "thigh_r", "shank_r").feet is None
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize(("worn", "method"), [(PELVIS_FEET, "l7s_3i"), (FEET, "l7s_2i")])
 def test_few_sensors_give_a_figure_and_all_angles_named_as_estimated(
     worn: tuple[Segment, ...], method: str
@@ -134,7 +134,7 @@ def test_few_sensors_give_a_figure_and_all_angles_named_as_estimated(
     assert ("pelvis_tilt" in estimated_names) == (method == "l7s_2i")
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_failed_thigh_leaves_the_other_leg_as_measured_and_estimates_the_rest() -> None:
     take = failing(simulated("fast_with_turns", 3)[0], "thigh_l", 15.0)
     made = estimated(take)
@@ -149,7 +149,7 @@ def test_a_failed_thigh_leaves_the_other_leg_as_measured_and_estimates_the_rest(
     assert {(base.split("_")[0], side) for base, _, side in names} == {("hip", "l"), ("knee", "l")}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_failed_foot_leaves_one_leg_with_the_pelvis() -> None:
     made = estimated(failing(simulated("fast_with_turns", 3)[0], "foot_l", 15.0))
     assert made.poses.method == "erkf_smoothed"
@@ -159,7 +159,7 @@ def test_a_failed_foot_leaves_one_leg_with_the_pelvis() -> None:
     assert {n.code for n in made.poses.notices} >= {"sensor_failed", "figure_incomplete"}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_short_loss_is_no_failure() -> None:
     take = simulated("lost_sensor", 41)[0]
     made = estimated(take)
@@ -167,7 +167,7 @@ def test_a_short_loss_is_no_failure() -> None:
     assert made.poses.reduced is None
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_another_estimator_runs_on_the_same_take() -> None:
     take = simulated("fast_with_turns", 3)[0]
     for name, method in (("l7s_3i", "l7s_3i"), ("stance_foot_anchor", "stance_foot_anchor")):
@@ -183,7 +183,7 @@ def test_an_estimator_that_lacks_its_sensors_says_which_it_needs() -> None:
     assert caught.value.code == "estimator_impossible"
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_an_unasked_estimator_that_fails_gives_way_to_the_next() -> None:
     sensors = mounted(simulated("fast_with_turns", 3)[0], PoseParams())
     broken = replace(sensors, body=replace(sensors.body, thigh=-0.4))
@@ -195,7 +195,7 @@ def test_an_unasked_estimator_that_fails_gives_way_to_the_next() -> None:
     assert "foot_paths_failed" in {n.code for n in made.poses.notices}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_without_an_answer_of_the_joints_the_next_estimator_is_used() -> None:
     sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
     assert set(sensors.turned_rad) == set(WHOLE)
@@ -213,7 +213,7 @@ def handed_on(sensors: MountedSensors) -> tuple[MountedSensors, dict[Segment, we
     return replace(sensors, orientations=replace(sensors.orientations, q=passed)), watched
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_the_erkf_lets_go_of_orientations_that_nobody_else_reads_and_finds_the_same() -> None:
     sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
     handed, watched = handed_on(sensors)
@@ -226,7 +226,7 @@ def test_the_erkf_lets_go_of_orientations_that_nobody_else_reads_and_finds_the_s
         np.testing.assert_array_equal(made.poses.p[s], p)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_where_the_erkf_fails_the_next_estimator_still_reads_the_orientations() -> None:
     sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
     handed, watched = handed_on(replace(sensors, failure=EstimationError("filter_diverged", "It diverged.")))

@@ -199,7 +199,7 @@ def test_redo_begins_anew_with_the_next_sample() -> None:
     assert second.calibrated.recording.t_s[0] == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_blocks_need_not_be_pushed_while_it_runs() -> None:
     first = walked().found[0]
     calibrator = LiveCalibrator(wearer(walk()))
@@ -215,7 +215,7 @@ def test_blocks_need_not_be_pushed_while_it_runs() -> None:
     assert np.array_equal(mounts[0], mounts[1])
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_person_may_stand_for_long_and_only_the_last_of_it_is_kept() -> None:
     recording, _ = scripted((Stand(60.0), Straight(14.0, 0.6, 0.55), Stand(2.0)))
     found = run(recording).found[0]
@@ -225,7 +225,7 @@ def test_a_person_may_stand_for_long_and_only_the_last_of_it_is_kept() -> None:
     assert found.ok
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_who_moves_before_walking_stands_again() -> None:
     """Shifting from foot to foot for a while is no walk; the standing has to be had anew."""
     still = cut(walk(), 0.0, 4.0)
@@ -245,7 +245,7 @@ def test_who_moves_before_walking_stands_again() -> None:
     assert done.found[0].ok
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_turning_on_the_spot_is_no_walk_and_it_says_so() -> None:
     spin = tuple(Pivot(3.0, 0.6, 0.55) for _ in range(6))
     recording, _ = scripted((Stand(5.0), *spin, Stand(6.0), Straight(14.0, 0.6, 0.55), Stand(2.0)))
@@ -257,7 +257,7 @@ def test_turning_on_the_spot_is_no_walk_and_it_says_so() -> None:
     assert done.found[0].ok
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_walk_round_a_corner_has_twelve_seconds() -> None:
     """Few straight steps, so the time decides."""
     recording, _ = scripted(
@@ -307,7 +307,7 @@ def test_strapping_sensors_on_is_no_walk(seed: int) -> None:
         assert np.allclose(mounted.R_segment_sensor, alone[segment].R_segment_sensor, atol=0.03)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_sensor_turned_between_two_standings_makes_the_second_count() -> None:
     recording, _ = scripted(
         (
@@ -331,7 +331,7 @@ def test_a_sensor_turned_between_two_standings_makes_the_second_count() -> None:
     assert done.found[0].ok
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_take_in_which_hardly_anybody_walks_begins_anew() -> None:
     recording, _ = scripted((Stand(5.0), Straight(2.4, 0.6, 0.55), Stand(125.0)))
     done = run(recording, 500)
@@ -387,7 +387,7 @@ def test_without_any_sensor_it_waits() -> None:
     assert done.found == ()
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_the_standing_width_leans_the_legs() -> None:
     wide = replace(walk(), subject=Subject(1.75, 0.30))
     narrow = replace(walk(), subject=Subject(1.75, None))

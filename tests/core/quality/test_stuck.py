@@ -90,7 +90,7 @@ def comfortable() -> UniformRecording:
     return simulated("comfortable")[0]
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("segment", ["pelvis", "thigh_l", "foot_r"])
 @pytest.mark.parametrize(("spoil", "code"), FAULTS, ids=lambda x: getattr(x, "__name__", ""))
 def test_a_sensor_that_does_not_measure_is_named_and_left_out_from_there(
@@ -246,7 +246,7 @@ def test_real_sensors_all_measure(takes: Callable[[], list[UniformRecording]]) -
         assert mark_stuck(rounded) is rounded
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("script", sweep_after(1, [s for s in SCRIPTS if s != "five_minutes"]))
 def test_simulated_sensors_all_measure(script: str) -> None:
     recording = synchronise(simulate_scenario(script, 0).recording)
@@ -317,7 +317,7 @@ def test_a_take_without_a_sensor_that_measures_stops_with_a_sentence() -> None:
     assert found.parameters == ()
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_dead_gyroscope_is_left_out_of_a_live_take_before_it_starts() -> None:
     """Known while the walk for calibration goes on, in the words that the file gets; the others go on."""
     take = cut(comfortable(), 0.0, 26.0)
@@ -334,7 +334,7 @@ def test_a_dead_gyroscope_is_left_out_of_a_live_take_before_it_starts() -> None:
     assert row.stuck
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_thigh_that_stops_measuring_live_has_no_angles_from_then_on() -> None:
     _, frames = live(spoilt(cut(comfortable(), 0.0, 30.0), "thigh_l", stuck_accelerometer, 22.0))
     assert [n.code for f in frames for n in f.notices if n.code in CODES] == ["channel_stuck"]

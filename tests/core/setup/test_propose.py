@@ -39,7 +39,7 @@ def require(recording: Recording) -> SetupRepair:
     return repair
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_nothing_is_said_of_a_right_set_up_however_sensors_are_turned() -> None:
     recording = take()
     for k, segment in enumerate(s for s in take().segments.values() if s is not None):
@@ -66,7 +66,7 @@ def test_one_sensor_with_wrong_signs_is_found_and_put_right(
     assert look_at(apply_repair(wrong, repair))[0] is None
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_file_with_left_handed_axes_is_told_from_one_with_a_turned_gyroscope() -> None:
     both, gyroscope = require(change_all(LEFT_HANDED, LEFT_HANDED)), require(change_all(1.0, -1.0))
     against = ("-x", "-y", "-z")
@@ -74,7 +74,7 @@ def test_a_file_with_left_handed_axes_is_told_from_one_with_a_turned_gyroscope()
     assert set(gyroscope.corrections.values()) == {SensorCorrection(gyr_axes=against)}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_units_are_proposed_sensor_by_sensor() -> None:
     g, deg = change_axes(take(), "shank_l", acc=1.0 / GRAVITY), change_all(1.0, np.degrees(1.0))
     found = require(g)
@@ -83,7 +83,7 @@ def test_units_are_proposed_sensor_by_sensor() -> None:
     assert [x.gyr_times for x in require(deg).corrections.values()] == [pytest.approx(np.radians(1.0))] * 7
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     "names",
     [

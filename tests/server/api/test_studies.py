@@ -29,7 +29,7 @@ def rows(content: bytes) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(content.decode())))
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 async def test_the_tables_have_every_visit_as_it_counts_by_pseudonyms(clinic: Clinic) -> None:
     first, second = await visit(clinic, "JANE-DOE"), await visit(clinic, "JOHN-DOE")
     async with clinic.client("clinician") as client:

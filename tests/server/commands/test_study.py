@@ -14,7 +14,7 @@ from core.simulate import simulate_scenario
 from server.main import main
 from tests.core.formats import vendor_files as made
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.sweep
 
 
 def test_a_folder_becomes_two_tables_and_a_list_of_failures(

@@ -10,7 +10,7 @@ from server.main import main
 from server.storage.compile_cache import VARIABLE, has_compiled_filters
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_warm_goes_through_every_step_and_leaves_filters(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["warm"]) == 0
     lines = capsys.readouterr().out.splitlines()

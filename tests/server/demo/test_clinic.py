@@ -14,7 +14,7 @@ from server.storage.db import Database
 from server.storage.migrate import upgrade
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_the_clinic_is_full_of_people_who_say_they_are_simulated(tmp_path: Path) -> None:
     settings = Settings(data_dir=tmp_path, min_free_bytes=0)
     upgrade(settings.database)
@@ -36,7 +36,7 @@ def test_the_two_walks_of_the_volunteer_are_not_compared_and_those_of_the_patien
     assert is_comparable(*walked[STROKE])
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("script", "method", "reduced"),
     [
@@ -54,7 +54,7 @@ def test_every_estimator_has_its_visit(script: str, method: str, reduced: str | 
     assert (made.poses.method, made.poses.reduced) == (method, reduced)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_the_newest_walks_have_good_data_but_for_the_sensor_that_stopped() -> None:
     """People who walk unlike others are not mistaken for sensors that sit wrongly."""
     newest = {v.person.code: v for v in reversed(VISITS)}

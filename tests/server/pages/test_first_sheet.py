@@ -85,7 +85,7 @@ def plain(html: str) -> str:
     return " ".join(re.sub(r"<.*?>", " ", html.replace("\xad", "").replace("&nbsp;", " ")).split())
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 async def test_the_trend_follows_visits_walked_alike_from_the_third_on(clinic: Clinic) -> None:
     files = analysed.files()
     two = await add_visits(clinic, "T-2", files, [(0.5, {}), (0.6, {})])
@@ -110,7 +110,7 @@ async def test_the_trend_follows_visits_walked_alike_from_the_third_on(clinic: C
     assert await read_trend(clinic, fed) is None
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 async def test_a_change_since_a_later_visit_than_the_first_says_so(
     clinic: Clinic, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -125,7 +125,7 @@ async def test_a_change_since_a_later_visit_than_the_first_says_so(
     assert found[-1][0].startswith("Gait speed: change since 21 Oct 2026.")
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 async def test_the_takes_of_a_day_are_one_visit_of_the_trend(clinic: Clinic) -> None:
     files = analysed.files()
     first = {"performed_on": "2026-09-23"}
@@ -138,7 +138,7 @@ async def test_the_takes_of_a_day_are_one_visit_of_the_trend(clinic: Clinic) -> 
     assert found[1][1:-2] == ["0.60", "0.70", "0.80"]
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 async def test_a_visit_without_the_number_has_a_dash_and_the_reason(clinic: Clinic) -> None:
     files = analysed.files()
     late = await add_visits(clinic, "T-5", files, [(None, {}), (0.5, {}), (0.58, {})])
@@ -158,7 +158,7 @@ async def test_a_visit_without_the_number_has_a_dash_and_the_reason(clinic: Clin
     assert german[-1][0].endswith("Ganggeschwindigkeit: Veränderung seit 21.10.2026.")
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 async def test_all_that_the_doctor_reads_stands_on_one_sheet_in_german(
     clinic: Clinic, monkeypatch: pytest.MonkeyPatch
 ) -> None:

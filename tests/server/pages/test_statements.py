@@ -129,7 +129,7 @@ async def asked(
     return sent
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 async def test_the_patient_list_takes_as_few_statements_for_500_patients_as_for_two(tmp_path: Path) -> None:
     async with open_clinic(tmp_path / "small") as clinic:
         crowd.fill(clinic, 2, 1)
@@ -141,7 +141,7 @@ async def test_the_patient_list_takes_as_few_statements_for_500_patients_as_for_
     assert len(full) == len(small) == len(theirs) <= MOST_OF_LIST
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("page", PAGES)
 async def test_no_page_takes_more_statements_than_20(
     full: tuple[Clinic, Mapping[str, str]], page: str
@@ -152,7 +152,7 @@ async def test_no_page_takes_more_statements_than_20(
     assert len(sent) <= MOST, "\n\n".join(sent)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 async def test_care_teams_cost_a_list_no_statement(
     full: tuple[Clinic, Mapping[str, str]],
 ) -> None:
@@ -180,7 +180,7 @@ def clinic_patients(clinic: Clinic) -> list[patients.Patient]:
         return patients.list_patients(c, None, limit=1000)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 async def test_a_session_page_takes_as_few_statements_for_200_control_visits_as_for_six(
     tmp_path: Path,
 ) -> None:

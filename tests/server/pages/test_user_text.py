@@ -254,7 +254,7 @@ Pages = Mapping[str, Mapping[str, str]]
 
 
 @pytest.fixture(
-    scope="module", params=[0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, KINDS))]
+    scope="module", params=[0, *(pytest.param(n, marks=pytest.mark.sweep) for n in range(1, KINDS))]
 )
 async def hostile_pages(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, anyio_backend: str

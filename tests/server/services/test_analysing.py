@@ -42,7 +42,7 @@ def work_out(walk: Recording) -> dict[str, object]:
     return files | {"analysis.json": {k: v for k, v in json.loads(told).items() if k not in OF_THE_RUN}}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("worn", ["seven", *WORN])
 def test_blocks_and_files_change_no_byte_of_a_result(
     walk: Recording, worn: str, monkeypatch: pytest.MonkeyPatch

@@ -79,7 +79,7 @@ def is_whole(home: Settings) -> bool:
         return not checks.check(db, open_blobs(home), home) and not home.restoring.exists()
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_move_waits_for_the_last_worker(
     bucket: Bucket,  # noqa: F811
     tmp_path: Path,
@@ -111,7 +111,7 @@ def test_a_move_waits_for_the_last_worker(
     clinic.db.close()
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_mistyped_bucket_binds_nobody(
     bucket: Bucket,  # noqa: F811
     tmp_path: Path,
@@ -133,7 +133,7 @@ def test_a_mistyped_bucket_binds_nobody(
         note_bucket(replace(home, bucket="s3://tpyo"))
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_an_empty_clinic_starts_while_its_bucket_is_away_and_is_bound_by_its_first_file(
     bucket: Bucket,  # noqa: F811
     tmp_path: Path,
@@ -177,7 +177,7 @@ def half_fill(archive: Path, home: Settings, monkeypatch: pytest.MonkeyPatch) ->
             restore(archive, home, None)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_restore_into_a_bucket_may_fail_again_and_again(
     clinic: Clinic, archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -205,7 +205,7 @@ def test_a_restore_into_a_bucket_may_fail_again_and_again(
     assert is_whole(home)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_restore_into_a_bucket_that_dies_twice_anywhere_is_made_again(
     clinic: Clinic, archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -230,7 +230,7 @@ def test_a_restore_into_a_bucket_that_dies_twice_anywhere_is_made_again(
     assert died > 10
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_start_that_is_refused_leaves_room_for_the_restore_that_it_asks_for(
     clinic: Clinic, archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -247,7 +247,7 @@ def test_a_start_that_is_refused_leaves_room_for_the_restore_that_it_asks_for(
     assert is_whole(home)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     "stranger", ["blobs/incoming/a.part", "blobs/bucket.txt", "nodes/a/live/a.log", "nodes/a/b"]
 )
@@ -290,7 +290,7 @@ def test_an_erasure_asks_the_bucket_while_others_may_write(
     assert bucket.objects() == set()
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_an_erasure_whose_database_goes_away_is_finished_later(
     clinic: Clinic,
     bucket: Bucket,  # noqa: F811

@@ -133,7 +133,7 @@ def _count_up(source: Source, writers: int) -> None:
     db.close()
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_fifty_concurrent_writers_lose_no_update(db: Database) -> None:
     add_patient(db, "a")
     with db.write() as c:

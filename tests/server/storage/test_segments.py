@@ -46,7 +46,7 @@ def test_a_log_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert stored(path) == FRAMES
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_log_cut_at_any_byte_recovers_its_longest_valid_prefix(tmp_path: Path) -> None:
     path = tmp_path / "t.log"
     whole_at = ends()
@@ -62,7 +62,7 @@ def test_a_log_cut_at_any_byte_recovers_its_longest_valid_prefix(tmp_path: Path)
             assert len(seen) == whole_at.index(kept) + 1
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_log_with_any_byte_changed_recovers_what_is_before_it(tmp_path: Path) -> None:
     path = tmp_path / "t.log"
     whole_at = ends()

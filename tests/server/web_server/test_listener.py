@@ -93,7 +93,7 @@ def is_alive(port: int) -> bool:
     return False
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_without_free_descriptors_newcomers_are_closed_and_the_log_stays_short(tmp_path: Path) -> None:
     log = tmp_path / "log"
     with a_server(tmp_path / "data", log) as (port, process):

@@ -42,7 +42,7 @@ def take(
     return calibrated, orientations, {s: degrees(x) for s, x in found.items()}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("wrong", [{"thigh_l": 25.0}, {"shank_r": -20.0, "foot_l": 15.0}, {"pelvis": 20.0}])
 def test_a_wrong_forward_axis_is_found_by_its_size_and_sign(wrong: dict[Segment, float]) -> None:
     _, _, without = take(3, {})
@@ -54,7 +54,7 @@ def test_a_wrong_forward_axis_is_found_by_its_size_and_sign(wrong: dict[Segment,
         assert abs(change[segment]) < 4.0
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_good_calibration_is_left_nearly_as_it_is() -> None:
     for seed in (2, 3, 4):
         _, _, found = take(seed, {})
@@ -62,7 +62,7 @@ def test_a_good_calibration_is_left_nearly_as_it_is() -> None:
         assert np.median(list(found.values())) == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_after_turning_everybody_still_faces_ahead_at_rest() -> None:
     calibrated, orientations, found = take(3, {"thigh_l": 25.0})
     calibrated, orientations = turn_forward_axes(
@@ -75,7 +75,7 @@ def test_after_turning_everybody_still_faces_ahead_at_rest() -> None:
         assert degrees(float(apart[0])) < 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_nobody_walking_means_nothing_is_found() -> None:
     recording, _ = simulated("fast_with_turns", 3)
     calibrated = calibration.calibrate(recording)
@@ -84,7 +84,7 @@ def test_nobody_walking_means_nothing_is_found() -> None:
     assert heading_errors(still, estimate_orientations(calibrated), body, WHOLE, ErkfParams.offline()) == {}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_passes_are_repeated_until_a_large_error_is_gone() -> None:
     calibrated, orientations, without = take(3, {})
     body, _ = nominal_body(calibrated.recording.subject.height_m)
@@ -108,7 +108,7 @@ def test_what_was_turned_is_told_as_health() -> None:
     assert told["thigh_r"].value == pytest.approx(20.0)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_an_axis_turned_right_round_is_not_told_as_more_than_half_a_turn() -> None:
     wrong, orientations, _ = take(3, {"shank_r": 180.0})
     body, _ = nominal_body(wrong.recording.subject.height_m)

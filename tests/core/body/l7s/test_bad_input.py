@@ -30,7 +30,7 @@ from core.rotation import about, multiply, rotate
 from core.simulate import simulate_scenario
 from tests.core.body.l7s.test_poses import still_feet
 from tests.core.body.test_estimate import FEET, PELVIS_FEET, estimated
-from tests.helpers.marks import slow_after, sweep_after
+from tests.helpers.marks import sweep_after
 from tests.helpers.walks import cut, lost, only, simulated
 
 SEEN = {"l7s_3i": PELVIS_FEET, "l7s_2i": FEET}
@@ -73,7 +73,7 @@ ACCUSING = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 @pytest.mark.parametrize(
     ("name", "seed"),
@@ -88,7 +88,7 @@ def test_a_right_set_up_is_not_accused(name: str, seed: int, estimator: Estimato
     assert all(f.verdict == "good" for f in made.poses.health)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", ["comfortable", "fast_with_turns", "hemiparetic"])
 def test_exchanged_feet_show_in_where_the_pelvis_falls(name: str) -> None:
     recording = take("l7s_3i", name)
@@ -100,7 +100,7 @@ def test_exchanged_feet_show_in_where_the_pelvis_falls(name: str) -> None:
     assert as_worn[0] < 0.0 < wrong[0]
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_without_a_pelvis_exchanged_feet_shift_what_turns_show_and_nothing_is_said_below_the_limit() -> None:
     recording = take("l7s_2i")
     s = recording.sensors
@@ -113,7 +113,7 @@ def test_without_a_pelvis_exchanged_feet_shift_what_turns_show_and_nothing_is_sa
     assert -0.2 < finding(right("l7s_2i"), "inner_foot_m")[0] < -0.05
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_without_turn_and_pelvis_sides_are_not_measured() -> None:
     value, verdict = finding(right("l7s_2i", "comfortable"), "inner_foot_m")
     assert np.isnan(value)
@@ -121,7 +121,7 @@ def test_without_turn_and_pelvis_sides_are_not_measured() -> None:
     assert "inner_foot_m" not in {f.name for f in right("l7s_3i", "comfortable").poses.health}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_one_sensor_given_for_both_feet_is_told(estimator: Estimator) -> None:
     recording = take(estimator)
@@ -131,7 +131,7 @@ def test_one_sensor_given_for_both_feet_is_told(estimator: Estimator) -> None:
     assert (round(value), verdict) == (50, "bad")
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_foot_with_a_late_clock_is_told(estimator: Estimator) -> None:
     recording = take(estimator)
@@ -152,7 +152,7 @@ def test_a_sensor_taken_for_the_pelvis_that_sits_on_a_thigh_is_told() -> None:
     assert finding(made, "pelvis_tilt_sd_deg")[1] == "bad"
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_sensor_taken_for_a_foot_that_sits_on_the_shank_is_told(estimator: Estimator) -> None:
     shank = simulated("fast_with_turns", 3)[0].sensors["shank_l"]
@@ -169,7 +169,7 @@ def test_pelvis_and_foot_exchanged_are_told() -> None:
     assert finding(made, "feet_out_of_place_pct")[1] == "bad"
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_calibration_finds_forward_of_a_foot_sensor_put_on_backwards(estimator: Estimator) -> None:
     recording, half = take(estimator), about(2, np.pi)
@@ -197,7 +197,7 @@ def test_a_foot_that_faces_backwards_after_calibration_is_refused(estimator: Est
     assert re.search(r"faces 1[78]\d° away", error.value.message)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize(("off_deg", "verdict"), [(0.0, "good"), (20.0, "bad"), (-20.0, "bad")])
 @pytest.mark.parametrize("estimator", BOTH)
 def test_feet_whose_headings_disagree_are_told(
@@ -215,7 +215,7 @@ def test_feet_whose_headings_disagree_are_told(
     assert ("feet_drift_apart" in {n.code for n in poses.notices}) == (verdict != "good")
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_gap_of_half_a_second_of_a_foot_is_told_and_the_rest_stays_finite(estimator: Estimator) -> None:
     made = run(lost(take(estimator), "foot_l", 20.0, 20.5), estimator)
@@ -231,7 +231,7 @@ def test_a_gap_of_half_a_second_of_a_foot_is_told_and_the_rest_stays_finite(esti
     assert again < 2150
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_a_gap_of_the_pelvis_is_bridged_by_the_feet() -> None:
     whole = right("l7s_3i")
     made = run(lost(take("l7s_3i"), "pelvis", 20.0, 20.5), "l7s_3i")
@@ -243,7 +243,7 @@ def test_a_gap_of_the_pelvis_is_bridged_by_the_feet() -> None:
         assert np.abs(apart - apart.mean(axis=0)).max() < 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_loss_that_nobody_noticed_is_told_by_what_does_not_fit(estimator: Estimator) -> None:
     recording = take(estimator)
@@ -253,7 +253,7 @@ def test_a_loss_that_nobody_noticed_is_told_by_what_does_not_fit(estimator: Esti
     assert codes(made) & {"legs_do_not_fit", "zero_velocity_refused"}
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_burst_of_no_numbers_is_a_gap(estimator: Estimator) -> None:
     made = simulate_scenario("fast_with_turns", 3, worn=SEEN[estimator])
@@ -325,7 +325,7 @@ def test_a_length_that_no_leg_has_is_refused(name: str, length: float) -> None:
     assert name in error.value.message
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_without_standing_there_is_an_error_or_a_notice(estimator: Estimator) -> None:
     walking = take(estimator, "comfortable")
@@ -337,22 +337,22 @@ def test_without_standing_there_is_an_error_or_a_notice(estimator: Estimator) ->
     assert error.value.code == "estimator_impossible"
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_treadmill_is_told_because_its_signals_are_those_of_the_floor(estimator: Estimator) -> None:
     made = run(replace(take(estimator), protocol="treadmill"), estimator)
     assert "treadmill_belt" in codes(made)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
-@pytest.mark.parametrize("protocol", slow_after(1, ["squat", "activity", "tug"]))
+@pytest.mark.parametrize("protocol", sweep_after(1, ["squat", "activity", "tug"]))
 def test_a_protocol_in_which_the_pelvis_sinks_is_told(estimator: Estimator, protocol: str) -> None:
     made = run(replace(take(estimator), protocol=protocol), estimator)  # type: ignore[arg-type]
     assert "pelvis_height_assumed" in codes(made)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize(("depth_m", "verdict"), [(0.0, "good"), (0.3, "bad")])
 def test_a_squat_that_no_protocol_announced_is_told(depth_m: float, verdict: Verdict) -> None:
     recording = take("l7s_3i")
@@ -372,8 +372,8 @@ def test_a_squat_that_no_protocol_announced_is_told(depth_m: float, verdict: Ver
     assert ("pelvis_rises" in {n.code for n in poses.notices}) == (depth_m > 0.0)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", slow_after(1, ["slow", "fast_with_turns", "hemiparetic"]))
+@pytest.mark.sweep
+@pytest.mark.parametrize("name", sweep_after(1, ["slow", "fast_with_turns", "hemiparetic"]))
 def test_the_rise_of_the_pelvis_is_the_true_one(name: str) -> None:
     recording, truth = simulated(name, 3)
     height = truth.p["pelvis"][:, 2]

@@ -154,7 +154,7 @@ def test_from_28_degrees_off_it_comes_back(algorithm: Algorithm) -> None:
     assert errors(algorithm, q[-1], take.q[-1]).max() < 2.0
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @every
 def test_it_follows_the_truth_while_turning(algorithm: Algorithm) -> None:
     take = moving()
@@ -162,7 +162,7 @@ def test_it_follows_the_truth_while_turning(algorithm: Algorithm) -> None:
     assert np.sqrt(np.mean(errors(algorithm, q, take.q) ** 2)) < 2.0
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @every
 def test_half_a_second_of_no_numbers_is_survived(algorithm: Algorithm) -> None:
     take = moving()
@@ -181,7 +181,7 @@ def test_half_a_second_of_no_numbers_is_survived(algorithm: Algorithm) -> None:
     assert errors(algorithm, q, take.q)[-500:].mean() < whole + 0.6 * before
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @every
 def test_blocks_of_any_length_and_sensors_alone_give_the_same_bits(algorithm: Algorithm) -> None:
     take = moving()
@@ -202,7 +202,7 @@ def test_blocks_of_any_length_and_sensors_alone_give_the_same_bits(algorithm: Al
     assert np.array_equal(np.array(steps), whole[:50, 1:])
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     "algorithm", [a for a in ALGORITHMS if a.magnetometer != "needed"], ids=lambda a: a.name
 )
@@ -218,7 +218,7 @@ def test_without_a_magnetometer_it_keeps_the_vertical_and_learns_no_bias(algorit
     assert bias is None or np.abs(bias).max() == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("name", "params"),
     [
@@ -243,7 +243,7 @@ def test_a_bias_of_the_gyroscope_is_found(name: str, params: parameters.Algorith
     assert error_deg(q[-1], take.q[-1]).max() < 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_the_bias_of_the_proposed_linear_filter_is_inert() -> None:
     take = moving()
     running = FusionFilter("nazarahari_2020", take.rate_hz, take.rest())
@@ -251,7 +251,7 @@ def test_the_bias_of_the_proposed_linear_filter_is_inert() -> None:
     assert running.bias is None
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_points_of_every_set_agree_with_the_extended_filter() -> None:
     """From a known start: a wide one is where the two differ, by half a degree of one."""
     take = turning(30.0)
@@ -271,7 +271,7 @@ def test_points_of_every_set_agree_with_the_extended_filter() -> None:
         assert error_deg(q, base).max() < (0.05 if name in ("srckf", "srukf1", "srukf2") else 0.2), name
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("name", "params"),
     [
@@ -292,7 +292,7 @@ def test_fuzzy_gains_run_in_any_engine_and_blocks(name: str, params: parameters.
     assert np.array_equal(np.concatenate(found), whole)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_the_process_noise_of_guo_follows_the_innovations() -> None:
     """Started too small it grows, started too large it falls: towards a noisy gyroscope's 0.5 rad/s."""
     take = moving()
@@ -328,7 +328,7 @@ def test_the_process_noise_of_guo_follows_the_innovations() -> None:
         assert np.array_equal(np.concatenate(parts), q)
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_no_bound_is_the_extended_filter_and_a_small_one_diverges() -> None:
     take = moving()
     free = parameters.Nazarahari2021Gains()
@@ -342,7 +342,7 @@ def test_no_bound_is_the_extended_filter_and_a_small_one_diverges() -> None:
     assert caught.value.code == "filter_diverged"
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_to_first_order_four_complementary_filters_are_one() -> None:
     """Equal gains: Mahony, Justa, Wu 2019 and Marantos."""
     take = turning(30.0)
