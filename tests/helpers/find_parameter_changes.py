@@ -1,8 +1,8 @@
 """Find takes on which parameters matter: `python -m tests.helpers.find_parameter_changes [take[:stage,…] …]`.
 
 Writes a line of `tests/helpers/pipeline_parameters.csv` for every parameter that has none and moves
-something. A line may as well be written by hand: parameter, take (tests/helpers/parameter_takes.py), stage, other value as
-JSON; the sweep of tests/core/pipeline/test_config.py says whether it holds.
+something. A line may as well be written by hand: parameter, take (tests/helpers/parameter_takes.py), stage,
+other value as JSON; the sweep of tests/core/pipeline/test_config.py says whether it holds.
 """
 
 from __future__ import annotations
