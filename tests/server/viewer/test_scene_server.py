@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import stat
 import tempfile
 from pathlib import Path
@@ -25,8 +24,7 @@ def test_it_listens_on_a_socket_in_a_folder_of_its_own_and_leaves_nothing() -> N
         path = socket_of(server)
         assert path.parent.name.startswith("sagittal-view-")
         assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
-        with socket.socket(socket.AF_UNIX) as line:
-            line.connect(str(path))
+        assert path.is_socket()
         assert ShareUrlRequest not in server._websock_server._incoming_handlers
     finally:
         stop_scene_server(server)
