@@ -28,7 +28,7 @@ def test_the_command_needs_a_folder_with_recordings(
     assert "does not hold" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_the_command_scores_every_algorithm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name, content in (("a", trial_bytes()), ("b", trial_bytes(rest_s=0.5))):
         (tmp_path / f"{name}.npz").write_bytes(content)

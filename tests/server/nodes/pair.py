@@ -18,7 +18,7 @@ from server.settings import Settings
 from tests.data import ROOT
 from tests.helpers.service import line_with
 
-LEASE_S = 1.5
+LEASE_S = 6.0
 PASSWORD = "a few unrelated words"
 
 

@@ -33,9 +33,9 @@ from tests.helpers.live_takes import HELLO, frame, kept_in
 from tests.helpers.service import new_session
 from tests.server.nodes.pair import PASSWORD, NodePair, RunningNode, describe, find_ports, start_process
 
-pytestmark = [pytest.mark.postgres, pytest.mark.anyio]
+pytestmark = [pytest.mark.postgres, pytest.mark.sweep, pytest.mark.anyio]
 
-PATIENCE_S = 15.0
+PATIENCE_S = 30.0
 
 
 async def until(holds: Callable[[], bool], patience_s: float = PATIENCE_S) -> None:

@@ -89,6 +89,7 @@ def test_errors_grow_over_an_interval_as_written(first: int, size: int, rows: in
     assert F[3:][last, part] == pytest.approx(pushed[last], abs=share * max(np.abs(pushed[last]).max(), 1e-6))
 
 
+@pytest.mark.sweep
 def test_the_field_says_of_heading_iron_and_delay_what_is_written() -> None:
     x, _ = begun()
     _, sums = propagate(x, np.zeros(at.WITH_MAG))
