@@ -15,13 +15,14 @@ import json
 import random
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
 from typing import Final
 
 from tests.data import ROOT
+from tests.lint.conventions import list_imports, name_test
 
 ROOMS: Final = ("core", "server")
 NEED_NAMES: Final = ("core/Variable",)
@@ -88,8 +89,8 @@ def list_tests(tree: Path, module: str) -> list[str]:
     path = Path(module)
     dotted = ".".join(path.with_suffix("").parts)
     package = dotted.rpartition(".")[0]
-    own = tree / "tests" / path.with_name(f"test_{path.name}")
-    nearest = [str(own.relative_to(tree))] if own.exists() else []
+    own = name_test(path)
+    nearest = [str(own)] if (tree / own).exists() else []
     importers = {name for name, imported in _imports_below(tree, ROOMS).items() if dotted in imported}
     tests = _imports_below(tree, ("tests",))
     for wanted in ({dotted}, {package}, importers):
@@ -105,17 +106,8 @@ def _imports_below(tree: Path, folders: tuple[str, ...]) -> dict[str, frozenset[
     for folder in folders:
         for path in (tree / folder).rglob("*.py"):
             name = ".".join(path.relative_to(tree).with_suffix("").parts).removesuffix(".__init__")
-            found[name] = frozenset(_imported(ast.parse(path.read_text("utf-8"))))
+            found[name] = frozenset(list_imports(ast.parse(path.read_text("utf-8"))))
     return found
-
-
-def _imported(tree: ast.Module) -> Iterator[str]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
 def judge(tree: Path, mutation: Mutation, marks: str) -> str:

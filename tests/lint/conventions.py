@@ -138,23 +138,24 @@ def _has_subject(test: Path) -> bool:
 
 def find_untested_modules() -> list[str]:
     """Modules of core and server that no test imports and that have no test file of their own."""
-    imported = {name for path in modules() for name in _imports(modules()[path])}
+    imported = {name for path in modules() for name in list_imports(modules()[path])}
     return sorted(
         str(path.relative_to(ROOT))
         for room in ROOMS
         for path in (ROOT / room).rglob("*.py")
         if path.name != "__init__.py"
         and ".".join(path.relative_to(ROOT).with_suffix("").parts) not in imported
-        and not _own_test(path.relative_to(ROOT)).exists()
+        and not (ROOT / name_test(path.relative_to(ROOT))).exists()
     )
 
 
-def _own_test(module: Path) -> Path:
-    """Where the test of a module (relative path) belongs."""
-    return TESTS / module.with_name(f"test_{module.name}")
+def name_test(module: Path) -> Path:
+    """Where the test of a module belongs; both paths relative."""
+    return Path("tests") / module.with_name(f"test_{module.name}")
 
 
-def _imports(tree: ast.Module) -> Iterator[str]:
+def list_imports(tree: ast.Module) -> Iterator[str]:
+    """Names of the modules that a module imports, and of all that may be one."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
