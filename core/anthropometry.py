@@ -1,6 +1,6 @@
 """Lengths of a body as a tape measures them (docs/science/body-model.md, "Lengths").
 
-What nobody measured is estimated from the others and from body height (`core.body.model.BodyModel`).
+What nobody measured is estimated from the others and from body height (`sagittal.core.body.model.BodyModel`).
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Final
 
-from core.errors import ParameterError
+from sagittal.core.errors import ParameterError
 
 LIMITS: Final[Mapping[str, tuple[float, float]]] = {
     "leg_m": (0.3, 1.3),

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
-from core.frames import Protocol
+from sagittal.core.frames import Protocol
 
 WalkingPace = Literal["comfortable", "slow", "fast"]
 WalkingAid = Literal[

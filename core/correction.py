@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import ParameterError
-from core.frames import GRAVITY, Floats
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import GRAVITY, Floats
 
 AXES: Final = ("x", "y", "z")
 AS_READ: Final[tuple[str, ...]] = AXES

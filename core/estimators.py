@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from core.frames import FOOT, SHANK, SIDES, THIGH, Segment
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Segment
 
 Estimator = Literal["erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
 Requested = Literal["auto", "erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import Floats
+from sagittal.core.frames import Floats
 
 PAD_S: Final = 2.0
 """Both ends of a signal are continued by their point reflection over so long, or its length."""
@@ -43,7 +43,7 @@ def low_pass(x: Floats, cutoff_hz: float, rate_hz: float, pad: int | None = None
     ----------
     pad : samples by which the ends are continued, None = `PAD_S`.
     """
-    from core.signal_kernel import filter_both_ways
+    from sagittal.core.signal_kernel import filter_both_ways
 
     n = x.shape[-1]
     reach = min(n - 1, round(PAD_S * rate_hz) if pad is None else pad)

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Final, Protocol, Self, TypeVar
 
 import numpy as np
 
-from core.frames import Bools, Floats
+from sagittal.core.frames import Bools, Floats
 
 Held = TypeVar("Held", bound="HoldsSamples")
 

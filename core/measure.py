@@ -9,28 +9,28 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from core.angles import JointAngles
-from core.body.feet import FootTracks
-from core.errors import Notice
-from core.events.alternation import AlternationParams, measure_foot_lag
-from core.events.bouts import Bout, BoutParams, find_bouts
-from core.events.edits import Edit, apply_event_edits, apply_stride_edits
-from core.events.flags import StrideParams, add_flag
-from core.events.result import GaitEvents, Strides
-from core.events.steps import Steps
-from core.events.strides import count_strides, stride_list
-from core.events.turns import Turn
-from core.frames import Bools, Floats, Segment
-from core.parameters import Surface, take_figures
-from core.parameters.flats import Flats, find_flats
-from core.parameters.result import Parameter
-from core.parameters.rows import Column
-from core.parameters.smoothness import stride_smoothness
-from core.parameters.spatial import in_place
-from core.parameters.trunk import trunk_regularity
-from core.parameters.uncertainty import state_uncertainty
-from core.parameters.walking import bout_parameters, step_parameters, step_strides, turn_parameters
-from core.rest import Window
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.errors import Notice
+from sagittal.core.events.alternation import AlternationParams, measure_foot_lag
+from sagittal.core.events.bouts import Bout, BoutParams, find_bouts
+from sagittal.core.events.edits import Edit, apply_event_edits, apply_stride_edits
+from sagittal.core.events.flags import StrideParams, add_flag
+from sagittal.core.events.result import GaitEvents, Strides
+from sagittal.core.events.steps import Steps
+from sagittal.core.events.strides import count_strides, stride_list
+from sagittal.core.events.turns import Turn
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.parameters import Surface, take_figures
+from sagittal.core.parameters.flats import Flats, find_flats
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.rows import Column
+from sagittal.core.parameters.smoothness import stride_smoothness
+from sagittal.core.parameters.spatial import in_place
+from sagittal.core.parameters.trunk import trunk_regularity
+from sagittal.core.parameters.uncertainty import state_uncertainty
+from sagittal.core.parameters.walking import bout_parameters, step_parameters, step_strides, turn_parameters
+from sagittal.core.rest import Window
 
 
 @dataclass(frozen=True, eq=False)

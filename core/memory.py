@@ -14,7 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from core.frames import Floats
+from sagittal.core.frames import Floats
 
 
 def make_pages(*shape: int) -> Floats:

@@ -7,7 +7,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import Bools, Floats
+from sagittal.core.frames import Bools, Floats
 
 
 def find_peaks(
@@ -56,7 +56,7 @@ def _keep_apart(peaks: NDArray[np.int64], level: Floats, distance: int) -> Bools
 
 def _measure_prominence(x: Floats, tops: NDArray[np.int64]) -> Floats:
     """How far each of all tops (k,) is above the higher of the lowest points before something higher."""
-    from core.signal_kernel import find_lows
+    from sagittal.core.signal_kernel import find_lows
 
     level, higher = x[tops].astype(np.float64), np.empty((len(tops) + 1, 2))
     left, right = np.empty(len(tops)), np.empty(len(tops))

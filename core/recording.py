@@ -13,13 +13,13 @@ from typing import Final
 
 import numpy as np
 
-from core.anthropometry import BodyMeasures
-from core.errors import Notice, ParameterError, SignalError
-from core.frames import PROTOCOLS, SEGMENTS, Bools, Floats, Protocol, Segment
-from core.held_samples import HoldsSamples, hold_samples
-from core.sample_blocks import LongStream, SampleBlock
-from core.shoe import Shoe
-from core.standing_angles import check_standing
+from sagittal.core.anthropometry import BodyMeasures
+from sagittal.core.errors import Notice, ParameterError, SignalError
+from sagittal.core.frames import PROTOCOLS, SEGMENTS, Bools, Floats, Protocol, Segment
+from sagittal.core.held_samples import HoldsSamples, hold_samples
+from sagittal.core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.shoe import Shoe
+from sagittal.core.standing_angles import check_standing
 
 
 def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], where: str) -> None:
@@ -68,7 +68,8 @@ class Subject:
     ----------
     height_m : body height, 0.5 to 2.5 m.
     standing_width_m : between the middles of the ankles while standing at the beginning, 0 to 0.8 m.
-    standing_angles_deg : joint angles in that standing by goniometer, names as `core.standing_angles.NAMES`.
+    standing_angles_deg : joint angles in that standing by goniometer, names as
+        `sagittal.core.standing_angles.NAMES`.
     shoe : the shape of its sole. measures : lengths of the body by tape.
     """
 

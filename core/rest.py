@@ -16,8 +16,8 @@ from typing import Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import Bools, Floats, Segment
-from core.recording import SensorSignals, UniformRecording
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.recording import SensorSignals, UniformRecording
 
 A = TypeVar("A", Floats, Bools)
 
@@ -80,7 +80,7 @@ def measure_quietness(signals: SensorSignals, rate_hz: float, params: QuietParam
         never = np.full(len(signals.valid), np.inf)
         return Quietness(never, never, np.zeros(len(signals.valid), bool))
     # readers of results do without numba
-    from core.signal_kernel import find_steadiest_rate, measure_norms, measure_windows
+    from sagittal.core.signal_kernel import find_steadiest_rate, measure_norms, measure_windows
 
     n, zero = len(signals.valid), np.zeros(3)
     whole, offset, norm = np.empty(n - width + 1, np.bool_), np.empty(3), np.empty(n)

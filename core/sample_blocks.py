@@ -9,9 +9,9 @@ import datetime as dt
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from core.errors import Notice
-from core.frames import Floats
-from core.held_samples import is_complete
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Floats
+from sagittal.core.held_samples import is_complete
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,11 +16,11 @@ from typing import Final
 
 import numpy as np
 
-from core.events.result import COMPARED
-from core.frames import SIDES, Side
-from core.norms.adults import adult_reference
-from core.norms.place import percentile_of_z
-from core.norms.profile import (
+from sagittal.core.events.result import COMPARED
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.norms.adults import adult_reference
+from sagittal.core.norms.place import percentile_of_z
+from sagittal.core.norms.profile import (
     MODES,
     NINE,
     PROFILES,
@@ -32,11 +32,11 @@ from core.norms.profile import (
     overall_profile,
     side_profile,
 )
-from core.norms.tables import wbds_group
-from core.parameters.anatomical_zero import anatomical_curves
-from core.parameters.kinematic import MEAN_ZERO, NO_STANDING, mean_curve
-from core.parameters.result import CycleCurves, MeanCurve
-from core.parameters.variability import TOO_FEW
+from sagittal.core.norms.tables import wbds_group
+from sagittal.core.parameters.anatomical_zero import anatomical_curves
+from sagittal.core.parameters.kinematic import MEAN_ZERO, NO_STANDING, mean_curve
+from sagittal.core.parameters.result import CycleCurves, MeanCurve
+from sagittal.core.parameters.variability import TOO_FEW
 
 GDI_STAR: Final[Mapping[Profile, str]] = {"gps": "gdi_star", "gps_sagittal": "gdi_star_sagittal"}
 """Name of the index made from each profile; the reduced one has a name of its own."""
@@ -141,9 +141,10 @@ def score_curves(
 
     Parameters
     ----------
-    curves : from standing. standing_deg : goniometer angles in standing (`core.parameters.anatomical_zero`).
+    curves : from standing.
+    standing_deg : goniometer angles in standing (`sagittal.core.parameters.anatomical_zero`).
     reference : None = 42 healthy adults at their comfortable speed; at the person's own:
-        `core.norms.adult_reference_at_speed`.
+        `sagittal.core.norms.adult_reference_at_speed`.
     estimated : variables no two sensors measure; they are not scored.
     age : years; below 18 there is no score against adults (`no_norm_for_age`). None = an adult.
     means : where the curves are not held any more; then `curves` has only what is known beside them.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from core.errors import ParameterError
+from sagittal.core.errors import ParameterError
 
 LIMITS = {"back_m": (0.0, 0.35), "front_m": (0.0, 0.35), "tip_up_m": (0.0, 0.1)}
 """What a tape can read, m."""

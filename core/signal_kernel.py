@@ -1,5 +1,7 @@
-"""Compiled loops of `core.filtering`, `core.peaks` and `core.rest`: over a row forwards and backwards, over
-its tops, and over what a sensor measured in the window around every sample.
+"""Compiled loops of `sagittal.core.filtering`, `sagittal.core.peaks` and `sagittal.core.rest`.
+
+They run over a row forwards and backwards, over its tops, and over what a sensor measured in the window
+around every sample.
 
 The filtered numbers are those of SciPy's `sosfiltfilt` to the bit, in a third of its time and without its
 five copies.

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from core.errors import ParameterError
+from sagittal.core.errors import ParameterError
 
 PELVIS: Final = ("pelvis_tilt", "pelvis_obliquity")
 """Pelvis angles that standing has a zero for; obliquity is given with the right side up positive."""
@@ -22,7 +22,7 @@ JOINTS: Final = (
 """Joint angles, each with _l and _r."""
 
 NAMES: Final = (*PELVIS, *(f"{joint}_{suffix}" for joint in JOINTS for suffix in "lr"))
-"""Angles that may be entered, named and signed as in `core.angles.JointAngles`."""
+"""Angles that may be entered, named and signed as in `sagittal.core.angles.JointAngles`."""
 
 LIMIT_DEG: Final = 60.0
 """Nobody stands quietly with a larger angle; catches slips of the keyboard."""

@@ -15,15 +15,15 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import SIGNS, JointAngles, list_leg_joints
-from core.body.estimate import PoseEstimate
-from core.body.health import HealthFinding
-from core.body.poses import Poses
-from core.errors import Notice
-from core.estimators import BY_METHOD
-from core.frames import FOOT, SIDES, SUFFIX, Oriented, Segment, Side
-from core.rest import Window, find_runs
-from core.rotation import wrap_angle
+from sagittal.core.angles import SIGNS, JointAngles, list_leg_joints
+from sagittal.core.body.estimate import PoseEstimate
+from sagittal.core.body.health import HealthFinding
+from sagittal.core.body.poses import Poses
+from sagittal.core.errors import Notice
+from sagittal.core.estimators import BY_METHOD
+from sagittal.core.frames import FOOT, SIDES, SUFFIX, Oriented, Segment, Side
+from sagittal.core.rest import Window, find_runs
+from sagittal.core.rotation import wrap_angle
 
 BAD: Final = "estimator_bad"
 """Reason of an angle whose estimator contradicts itself at that joint."""

@@ -6,22 +6,31 @@ Importing this package is cheap: what it needs is loaded when it is first used.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from core.errors import Notice, SagittalError
-    from core.recording import Recording
     from sagittal.analysis import Analysis
+    from sagittal.core.errors import Notice, SagittalError
+    from sagittal.core.recording import Recording
     from sagittal.functions import analyse, read, simulate
     from sagittal.simulated import SimulatedWalk
 
 __all__ = ["Analysis", "Notice", "Recording", "SagittalError", "SimulatedWalk", "analyse", "read", "simulate"]
 
+_DIRECTORY = Path(__file__).parent
+if (_DIRECTORY / "core").is_file():
+    raise ImportError(
+        f"{_DIRECTORY / 'core'} is a text file instead of a symbolic link to a folder: git checked out the "
+        "links of this clone as text. Run `git config core.symlinks true` and `git checkout -- sagittal` "
+        "(on Windows with developer mode on), or install the wheel, which has no links."
+    )
+
 _HOMES = {
     "Analysis": "sagittal.analysis",
-    "Notice": "core.errors",
-    "Recording": "core.recording",
-    "SagittalError": "core.errors",
+    "Notice": "sagittal.core.errors",
+    "Recording": "sagittal.core.recording",
+    "SagittalError": "sagittal.core.errors",
     "SimulatedWalk": "sagittal.simulated",
     "analyse": "sagittal.functions",
     "read": "sagittal.functions",

@@ -9,10 +9,10 @@ from math import degrees, nan
 import numpy as np
 import pyarrow as pa
 
-from core import pipeline
-from core.errors import Notice
-from core.frames import Floats, Side
-from core.parameters.result import Parameter
+from sagittal.core import pipeline
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Floats, Side
+from sagittal.core.parameters.result import Parameter
 
 NUMBERS = ("mean", "sd", "cv_pct", "ci_low", "ci_high", "uncertainty", "u_own", "u_common")
 """Columns of the parameter table that hold a number or null."""

@@ -7,15 +7,21 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from core.formats import list_source_files, manifest_of, parse_manifest, read_named_file, read_recording
-from core.frames import Segment
-from core.pipeline import PipelineConfig
-from core.pipeline import analyse as run_pipeline
-from core.pipeline.config import override_config
-from core.pipeline.recipes import say_nothing
-from core.recording import Recording
-from core.simulate import simulate_scenario
 from sagittal.analysis import Analysis
+from sagittal.core.formats import (
+    list_source_files,
+    manifest_of,
+    parse_manifest,
+    read_named_file,
+    read_recording,
+)
+from sagittal.core.frames import Segment
+from sagittal.core.pipeline import PipelineConfig
+from sagittal.core.pipeline import analyse as run_pipeline
+from sagittal.core.pipeline.config import override_config
+from sagittal.core.pipeline.recipes import say_nothing
+from sagittal.core.recording import Recording
+from sagittal.core.simulate import simulate_scenario
 from sagittal.simulated import SimulatedWalk
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 
-from core.recording import Recording
-from core.simulate import Simulation, angle_table, event_table, stride_table
+from sagittal.core.recording import Recording
+from sagittal.core.simulate import Simulation, angle_table, event_table, stride_table
 
 
 @dataclass(frozen=True, eq=False)

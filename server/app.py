@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 from functools import cache
 from typing import TYPE_CHECKING
 
-from server.settings import Settings
+from sagittal.server.settings import Settings
 
 if TYPE_CHECKING:
     from fastapi import FastAPI
@@ -26,17 +26,17 @@ def create_app(settings: Settings) -> FastAPI:
     from fastapi import FastAPI
     from starlette.middleware import Middleware
 
-    from server.http import problems
-    from server.http.body_limit import BodyLimit
-    from server.http.compression import Compression
-    from server.http.cross_site import CrossSiteGuard
-    from server.http.headers import SecurityHeaders
-    from server.http.hosts import HostGuard
-    from server.http.requests import RequestObserver
-    from server.metrics import RequestMetrics
-    from server.nodes.forwarding import Forwarding
-    from server.nodes.known import KnownNodes
-    from server.services.provenance import CODE_VERSION
+    from sagittal.server.http import problems
+    from sagittal.server.http.body_limit import BodyLimit
+    from sagittal.server.http.compression import Compression
+    from sagittal.server.http.cross_site import CrossSiteGuard
+    from sagittal.server.http.headers import SecurityHeaders
+    from sagittal.server.http.hosts import HostGuard
+    from sagittal.server.http.requests import RequestObserver
+    from sagittal.server.metrics import RequestMetrics
+    from sagittal.server.nodes.forwarding import Forwarding
+    from sagittal.server.nodes.known import KnownNodes
+    from sagittal.server.services.provenance import CODE_VERSION
 
     metrics = RequestMetrics()
     app = FastAPI(
@@ -69,8 +69,8 @@ def create_app(settings: Settings) -> FastAPI:
 @asynccontextmanager
 async def _run(app: FastAPI) -> AsyncIterator[None]:
     """Open what the application needs while the block runs."""
-    from server.lifespan import run_installation
-    from server.viewer.proxy import open_views
+    from sagittal.server.lifespan import run_installation
+    from sagittal.server.viewer.proxy import open_views
 
     async with run_installation(app), open_views(app):
         yield
@@ -89,11 +89,11 @@ def wire_routes() -> tuple[BaseRoute, ...]:
     """
     from fastapi import APIRouter
 
-    from server.api.routes import BESIDE, build_api
-    from server.auth.routes import list_declared_actions
-    from server.pages.assets import STATIC, Assets
-    from server.pages.routes import ROUTERS
-    from server.viewer import live_proxy, proxy
+    from sagittal.server.api.routes import BESIDE, build_api
+    from sagittal.server.auth.routes import list_declared_actions
+    from sagittal.server.pages.assets import STATIC, Assets
+    from sagittal.server.pages.routes import ROUTERS
+    from sagittal.server.viewer import live_proxy, proxy
 
     whole = APIRouter()
     for router in (build_api(), *BESIDE, *ROUTERS, proxy.router, live_proxy.router):

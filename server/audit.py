@@ -19,8 +19,8 @@ from typing import Any, Protocol
 
 from sqlalchemy import Connection, Row, insert, select
 
-from server.storage.db import highest_number
-from server.storage.tables import audit, now
+from sagittal.server.storage.db import highest_number
+from sagittal.server.storage.tables import audit, now
 
 GENESIS = "0" * 64
 """What the first row follows."""

@@ -11,19 +11,19 @@ from typing import Annotated, Literal, cast
 from fastapi import Depends, Path, Query
 from starlette.requests import HTTPConnection
 
-from core.frames import Protocol
-from server.auth.sessions import Logins
-from server.auth.throttle import Throttle
-from server.jobs.feed import JobFeed
-from server.jobs.queue import JobQueue
-from server.live.hub import Hub
-from server.services.films import FilmIntake
-from server.services.reviewed import ReviewedAnalyses
-from server.services.studies import StudyChoice
-from server.settings import Settings
-from server.storage.blobs import BlobStore
-from server.storage.db import Database
-from server.trail import AuditTrail
+from sagittal.core.frames import Protocol
+from sagittal.server.auth.sessions import Logins
+from sagittal.server.auth.throttle import Throttle
+from sagittal.server.jobs.feed import JobFeed
+from sagittal.server.jobs.queue import JobQueue
+from sagittal.server.live.hub import Hub
+from sagittal.server.services.films import FilmIntake
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.studies import StudyChoice
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.trail import AuditTrail
 
 
 async def _settings(connection: HTTPConnection) -> Settings:

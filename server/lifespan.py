@@ -14,26 +14,26 @@ from functools import partial
 
 from fastapi import FastAPI
 
-from server.auth.sessions import Logins
-from server.auth.throttle import SharedFailures, Throttle
-from server.jobs.feed import JobFeed
-from server.jobs.opening import open_queue
-from server.live.hub import Hub
-from server.metrics import StateCollector
-from server.nodes.registry import Nodes
-from server.processes.supervisor import Workers
-from server.services import custody, erasure, report_links
-from server.services.custody import refuse_strangers
-from server.services.films import FilmIntake
-from server.services.reviewed import ReviewedAnalyses
-from server.settings import Settings
-from server.storage.blob_opening import open_blobs
-from server.storage.blobs import BlobStore
-from server.storage.db import Database
-from server.storage.high_water import MarkKeeper
-from server.storage.migrate import upgrade
-from server.storage.readiness import Readiness
-from server.trail import AuditTrail
+from sagittal.server.auth.sessions import Logins
+from sagittal.server.auth.throttle import SharedFailures, Throttle
+from sagittal.server.jobs.feed import JobFeed
+from sagittal.server.jobs.opening import open_queue
+from sagittal.server.live.hub import Hub
+from sagittal.server.metrics import StateCollector
+from sagittal.server.nodes.registry import Nodes
+from sagittal.server.processes.supervisor import Workers
+from sagittal.server.services import custody, erasure, report_links
+from sagittal.server.services.custody import refuse_strangers
+from sagittal.server.services.films import FilmIntake
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blob_opening import open_blobs
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import MarkKeeper
+from sagittal.server.storage.migrate import upgrade
+from sagittal.server.storage.readiness import Readiness
+from sagittal.server.trail import AuditTrail
 
 log = logging.getLogger(__name__)
 

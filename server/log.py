@@ -12,7 +12,7 @@ import logging
 from contextvars import ContextVar
 from typing import Final
 
-from server.settings import Settings
+from sagittal.server.settings import Settings
 
 request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
 """Id of the request that is being served, None outside of one."""

@@ -15,7 +15,6 @@ from pathlib import Path
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
-    _refuse_foreign_packages()
     arguments = vars(_parser().parse_args(argv))
     command = arguments.pop("command")
     return int(_run(command, arguments))
@@ -25,16 +24,16 @@ def _run(command: str, given: dict[str, object]) -> int:
     # numba and the web stack take seconds to import: each command loads only what it needs
     from importlib import import_module
 
-    from core.errors import SagittalError
-    from server.processes.memory import share_allocator
-    from server.settings import SettingsError, load_settings
-    from server.storage.compile_cache import share_compile_cache
+    from sagittal.core.errors import SagittalError
+    from sagittal.server.processes.memory import share_allocator
+    from sagittal.server.settings import SettingsError, load_settings
+    from sagittal.server.storage.compile_cache import share_compile_cache
 
     share_allocator()
     try:
         share_compile_cache(load_settings({"data_dir": given.get("data_dir")}).cache)
         name = command.replace("-", "_")
-        run = getattr(import_module(f"server.commands.{name}"), name)
+        run = getattr(import_module(f"sagittal.server.commands.{name}"), name)
         return int(run(**given))
     except SettingsError as error:
         sys.stderr.write(f"{error}\n")
@@ -240,23 +239,6 @@ def _version() -> str:
         return f"sagittal {version('sagittal')}"
     except PackageNotFoundError:
         return "sagittal (source tree)"
-
-
-def _refuse_foreign_packages() -> None:
-    """Another distribution may have overwritten one of our packages: their names are common words."""
-    import core
-    import sagittal
-    import server
-    import web
-
-    homes = {Path(p.__file__ or "").parent.parent for p in (core, sagittal, server, web)}
-    if len(homes) != 1:
-        sys.stderr.write(
-            "The packages core, sagittal, server and web do not come from one installation: "
-            f"{', '.join(sorted(map(str, homes)))}. Another distribution uses one of these names; "
-            "install Sagittal into a virtual environment of its own.\n"
-        )
-        raise SystemExit(1)
 
 
 if __name__ == "__main__":

@@ -100,7 +100,7 @@ class Settings:
     bucket: str = ""
     node_name: str = ""
     node_address: str = ""
-    task_modules: tuple[str, ...] = ("server.worker.tasks", "server.viewer.recorded_walk")
+    task_modules: tuple[str, ...] = ("sagittal.server.worker.tasks", "sagittal.server.viewer.recorded_walk")
 
     def __post_init__(self) -> None:
         _require(0 <= self.port <= 65535, "port", self.port, "0 to 65535 (0 = any free port)")

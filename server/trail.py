@@ -23,10 +23,10 @@ from typing import Any, Final, Protocol
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from server import audit
-from server.storage.db import Database
-from server.storage.refusal import refusal_of
-from server.storage.tables import now
+from sagittal.server import audit
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.refusal import refusal_of
+from sagittal.server.storage.tables import now
 
 log = logging.getLogger(__name__)
 

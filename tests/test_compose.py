@@ -15,8 +15,8 @@ import yaml
 from packaging.requirements import Requirement
 from sqlalchemy import make_url
 
-from server.main import _parser
-from server.settings import Settings, load_settings
+from sagittal.server.main import _parser
+from sagittal.server.settings import Settings, load_settings
 from tests.data import ROOT
 from tests.server.clinic import open_clinic
 from tests.test_packaging import EXTRAS, INSTRUCTIONS, last

@@ -12,22 +12,22 @@ from typing import Final
 import numpy as np
 import pytest
 
-from core.errors import FormatError, Notice
-from core.feedback import Prescription
-from core.formats import SourceFile, read_recording, vendors
-from core.formats.draft import Draft
-from core.formats.source_spec import SourceSpec
-from core.formats.vendors import VendorFormat
-from core.measure import Tracks, measure_gait
-from core.parameters.catalogue import CATALOGUE, CurveFigure, ParameterEntry
-from core.parameters.catalogue.entry import ANKLE_AND_FOOT, DORSIFLEXION
-from core.pipeline import WALK, PipelineConfig, PipelineStage, TakeAnalysis, analyse, recipes
-from core.pipeline.recipes import SIGNALS, run_stages, say_nothing
-from core.pipeline.stages import ORIENTATION, orient_segments
-from core.simulate import simulate_scenario
-from server.pages.live import list_terms
-from server.pages.prescription import group_trainable
-from server.report.exports import analysis_files
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.feedback import Prescription
+from sagittal.core.formats import SourceFile, read_recording, vendors
+from sagittal.core.formats.draft import Draft
+from sagittal.core.formats.source_spec import SourceSpec
+from sagittal.core.formats.vendors import VendorFormat
+from sagittal.core.measure import Tracks, measure_gait
+from sagittal.core.parameters.catalogue import CATALOGUE, CurveFigure, ParameterEntry
+from sagittal.core.parameters.catalogue.entry import ANKLE_AND_FOOT, DORSIFLEXION
+from sagittal.core.pipeline import WALK, PipelineConfig, PipelineStage, TakeAnalysis, analyse, recipes
+from sagittal.core.pipeline.recipes import SIGNALS, run_stages, say_nothing
+from sagittal.core.pipeline.stages import ORIENTATION, orient_segments
+from sagittal.core.simulate import simulate_scenario
+from sagittal.server.pages.live import list_terms
+from sagittal.server.pages.prescription import group_trainable
+from sagittal.server.report.exports import analysis_files
 from tests.data import ROOT
 from tests.helpers.parameter_page import PAGE, render_page
 from tests.helpers.true_walks import true_tracks

@@ -9,14 +9,12 @@ from typing import Final
 import pytest
 from babel.messages.pofile import read_po
 
-from core.frames import SIDES
-from core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES
-from server.report.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
-from server.report.level import STANDING, define_parameter
-from server.report.wording import JUDGED, PATH_JUDGED, REASONS, reason_words
-from tests.data import ROOT
-from tests.helpers.texts import STAYS_ENGLISH, list_messages, python_texts, script_texts
-from web.language import (
+from sagittal.core.frames import SIDES
+from sagittal.core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES
+from sagittal.server.report.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
+from sagittal.server.report.level import STANDING, define_parameter
+from sagittal.server.report.wording import JUDGED, PATH_JUDGED, REASONS, reason_words
+from sagittal.web.language import (
     LANGUAGES,
     PLACEHOLDER,
     SOURCE,
@@ -25,10 +23,12 @@ from web.language import (
     choose_language,
     load_catalogue,
 )
-from web.language import script_texts as script_catalogue
-from web.shown import Shown
-from web.template_texts import list_texts, speak_template
-from web.user_text import UserText, quote
+from sagittal.web.language import script_texts as script_catalogue
+from sagittal.web.shown import Shown
+from sagittal.web.template_texts import list_texts, speak_template
+from sagittal.web.user_text import UserText, quote
+from tests.data import ROOT
+from tests.helpers.texts import STAYS_ENGLISH, list_messages, python_texts, script_texts
 
 OTHERS: Final = [language for language in LANGUAGES if language != SOURCE]
 

@@ -106,7 +106,9 @@ def _imports_below(tree: Path, folders: tuple[str, ...]) -> dict[str, frozenset[
     for folder in folders:
         for path in (tree / folder).rglob("*.py"):
             name = ".".join(path.relative_to(tree).with_suffix("").parts).removesuffix(".__init__")
-            found[name] = frozenset(list_imports(ast.parse(path.read_text("utf-8"))))
+            found[name] = frozenset(
+                i.removeprefix("sagittal.") for i in list_imports(ast.parse(path.read_text("utf-8")))
+            )
     return found
 
 

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 from markupsafe import Markup, escape
 
-from web.language import Catalogue
-from web.words import Verbatim, number
+from sagittal.web.language import Catalogue
+from sagittal.web.words import Verbatim, number
 
 SPOKEN_KEYS: Final = frozenset(
     {
@@ -42,7 +42,7 @@ class Shown:
 
     @property
     def functions(self) -> dict[str, Callable[..., object]]:
-        """What `web.template_texts.speak_template` calls, by name."""
+        """What `sagittal.web.template_texts.speak_template` calls, by name."""
         return {
             "say": self.say,
             "say_plain": self.say_plain,

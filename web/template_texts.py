@@ -13,7 +13,7 @@ from typing import Final
 
 from jinja2 import Environment, nodes
 
-from web.language import PLACEHOLDER
+from sagittal.web.language import PLACEHOLDER
 
 READ_ATTRIBUTES: Final = frozenset({"alt", "aria-label", "aria-description", "label", "placeholder", "title"})
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.activity.frames import FRAME_HZ, PER_MINUTE, Frames, Singles, Slab, measure_length
-from core.activity.params import ActivityParams
-from core.activity.result import PosturalTransition, TransitionCandidate, WearPeriod
-from core.activity.stairs import measure_walking, tell_stairs
-from core.activity.transitions import (
+from sagittal.core.activity.frames import FRAME_HZ, PER_MINUTE, Frames, Singles, Slab, measure_length
+from sagittal.core.activity.params import ActivityParams
+from sagittal.core.activity.result import PosturalTransition, TransitionCandidate, WearPeriod
+from sagittal.core.activity.stairs import measure_walking, tell_stairs
+from sagittal.core.activity.transitions import (
     Lean,
     Lying,
     find_leans,
@@ -24,11 +24,18 @@ from core.activity.transitions import (
     mark_near,
     tell_lying,
 )
-from core.activity.wear import Wear, describe_period, find_forward, find_upright, find_wear, group_periods
-from core.events.bouts import plain_bouts
-from core.events.turns import Turn
-from core.frames import Bools, Floats
-from core.rest import Window, find_runs
+from sagittal.core.activity.wear import (
+    Wear,
+    describe_period,
+    find_forward,
+    find_upright,
+    find_wear,
+    group_periods,
+)
+from sagittal.core.events.bouts import plain_bouts
+from sagittal.core.events.turns import Turn
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.rest import Window, find_runs
 
 NEAR_LYING_S = 10.0
 """Leans so close to lying do not tell where forward is."""

@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.events.turns import Turn
-from core.frames import Bools, Floats
+from sagittal.core.events.turns import Turn
+from sagittal.core.frames import Bools, Floats
 
 Singles = NDArray[np.float32]
 

@@ -9,28 +9,28 @@ from typing import Final
 
 import numpy as np
 
-from core.activity.day_part import DayPart, read_day
-from core.activity.frames import FRAME_HZ, FrameStore, Slab
-from core.activity.params import ActivityParams, StairParams
-from core.activity.postures import FixedStretch, decide_postures
-from core.activity.reduction import reduce_stream
-from core.activity.result import (
+from sagittal.core.activity.day_part import DayPart, read_day
+from sagittal.core.activity.frames import FRAME_HZ, FrameStore, Slab
+from sagittal.core.activity.params import ActivityParams, StairParams
+from sagittal.core.activity.postures import FixedStretch, decide_postures
+from sagittal.core.activity.reduction import reduce_stream
+from sagittal.core.activity.result import (
     ActivityBout,
     ActivityResult,
     PosturalTransition,
     TransitionCandidate,
     WearPeriod,
 )
-from core.activity.stairs import KIND_OF, LEVEL, StepKind, calibrate_stairs
-from core.activity.totals import HOUR_S, sum_days, sum_hours
-from core.body.model import NOMINAL_HEIGHT_M
-from core.errors import Notice, SignalError
-from core.events.bouts import Bout, plain_bouts
-from core.events.turns import Turn
-from core.frames import Floats, Segment
-from core.plurals import plural
-from core.rest import Window
-from core.sample_blocks import LongStream
+from sagittal.core.activity.stairs import KIND_OF, LEVEL, StepKind, calibrate_stairs
+from sagittal.core.activity.totals import HOUR_S, sum_days, sum_hours
+from sagittal.core.body.model import NOMINAL_HEIGHT_M
+from sagittal.core.errors import Notice, SignalError
+from sagittal.core.events.bouts import Bout, plain_bouts
+from sagittal.core.events.turns import Turn
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.plurals import plural
+from sagittal.core.rest import Window
+from sagittal.core.sample_blocks import LongStream
 
 DAY_SLABS_S: Final = 86400
 AROUND_S: Final = 2400

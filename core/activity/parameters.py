@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from core.activity.result import ActivityDay, ActivityResult
-from core.parameters.catalogue import list_names, unit_of
-from core.parameters.catalogue.entry import DAILY
-from core.parameters.result import Parameter
-from core.parameters.variability import summarise_values
+from sagittal.core.activity.result import ActivityDay, ActivityResult
+from sagittal.core.parameters.catalogue import list_names, unit_of
+from sagittal.core.parameters.catalogue.entry import DAILY
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.variability import summarise_values
 
 MEASURES: Final = list_names(DAILY, "take")
 """Names in the order of the table."""

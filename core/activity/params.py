@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from core.events.bouts import WalkParams
-from core.events.lumbar import StepTimeParams
-from core.events.turns import TurnParams
+from sagittal.core.events.bouts import WalkParams
+from sagittal.core.events.lumbar import StepTimeParams
+from sagittal.core.events.turns import TurnParams
 
 THIGH_SHARE: Final = 0.245
 """Length of the thigh by body height (Winter)."""
@@ -25,7 +25,8 @@ class WearParams:
     wobble : a worn trunk breathes: standard deviation of the means over 1 s within a minute below this, m/s²,
         on every axis. Our choice: 2 mg; breathing tilts the chest of the simulated sleepers by 0.5 to 1.5°.
     unmoved : spread of |acc| over 1 s, m/s², with which such a stretch goes on to the second. Our choice.
-    gap_s : longer holes are told as gaps, those of up to core.timeline's max_gap_s are filled. Our choice.
+    gap_s : longer holes are told as gaps, those of up to
+        sagittal.core.timeline's max_gap_s are filled. Our choice.
     """
 
     still_min: int = 30

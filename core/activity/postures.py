@@ -15,7 +15,7 @@ from itertools import pairwise
 from types import MappingProxyType
 from typing import Final, Literal
 
-from core.activity.result import (
+from sagittal.core.activity.result import (
     ActivityKind,
     ActivitySpan,
     Evidence,
@@ -23,7 +23,7 @@ from core.activity.result import (
     TransitionCandidate,
     TransitionKind,
 )
-from core.rest import Window
+from sagittal.core.rest import Window
 
 Upright = Literal["sitting", "standing"]
 

@@ -16,17 +16,17 @@ from typing import Final, TypeVar
 import numba
 import numpy as np
 
-from core.activity.frames import FRAME_HZ, PER_MINUTE, Frames, Singles, Slab
-from core.activity.params import ActivityParams
-from core.errors import SignalError
-from core.events.lumbar import StepTimeParams, find_moving, find_step_times, split_about_vertical
-from core.events.turns import Turn, find_turns
-from core.frames import GRAVITY, Bools, Floats, Segment
-from core.recording import SensorSignals, Subject, UniformRecording
-from core.rest import find_runs
-from core.sample_blocks import LongStream, SampleBlock, find_complete_rows
-from core.timeline.grid import lay_signal
-from core.timeline.params import TimelineParams
+from sagittal.core.activity.frames import FRAME_HZ, PER_MINUTE, Frames, Singles, Slab
+from sagittal.core.activity.params import ActivityParams
+from sagittal.core.errors import SignalError
+from sagittal.core.events.lumbar import StepTimeParams, find_moving, find_step_times, split_about_vertical
+from sagittal.core.events.turns import Turn, find_turns
+from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
+from sagittal.core.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.rest import find_runs
+from sagittal.core.sample_blocks import LongStream, SampleBlock, find_complete_rows
+from sagittal.core.timeline.grid import lay_signal
+from sagittal.core.timeline.params import TimelineParams
 
 Samples = TypeVar("Samples", Floats, Bools)
 

@@ -24,9 +24,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal, get_args
 
-from core.errors import Notice
-from core.events.turns import Turn
-from core.frames import Floats, Segment
+from sagittal.core.errors import Notice
+from sagittal.core.events.turns import Turn
+from sagittal.core.frames import Floats, Segment
 
 ActivityKind = Literal[
     "lying", "sitting", "standing", "walking", "stairs_up", "stairs_down", "unknown", "non_wear", "gap"

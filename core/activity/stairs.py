@@ -13,11 +13,11 @@ from typing import Literal
 
 import numpy as np
 
-from core.activity.frames import FRAME_HZ, Singles
-from core.activity.params import StairParams
-from core.errors import ParameterError
-from core.frames import Bools, Floats
-from core.rest import find_runs
+from sagittal.core.activity.frames import FRAME_HZ, Singles
+from sagittal.core.activity.params import StairParams
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.rest import find_runs
 
 StepKind = Literal["walking", "stairs_up", "stairs_down"]
 

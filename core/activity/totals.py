@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from core.activity.result import (
+from sagittal.core.activity.result import (
     KINDS,
     TRANSITIONS,
     ActivityBout,
@@ -20,7 +20,7 @@ from core.activity.result import (
     ActivitySpan,
     PosturalTransition,
 )
-from core.frames import Floats
+from sagittal.core.frames import Floats
 
 HOUR_S: Final = 3600.0
 DAY_S: Final = 86400.0

@@ -9,12 +9,17 @@ from math import degrees
 
 import numpy as np
 
-from core.activity.frames import FRAME_HZ, Frames, Singles, measure_length
-from core.activity.params import TransitionParams
-from core.activity.result import PosturalTransition, TransitionCandidate, TransitionKind, TransitionRefusal
-from core.frames import GRAVITY, Bools, Floats
-from core.peaks import find_peaks
-from core.rest import find_runs
+from sagittal.core.activity.frames import FRAME_HZ, Frames, Singles, measure_length
+from sagittal.core.activity.params import TransitionParams
+from sagittal.core.activity.result import (
+    PosturalTransition,
+    TransitionCandidate,
+    TransitionKind,
+    TransitionRefusal,
+)
+from sagittal.core.frames import GRAVITY, Bools, Floats
+from sagittal.core.peaks import find_peaks
+from sagittal.core.rest import find_runs
 
 EDGE_RISE = 0.035
 """A lean ends where the inclination rises again by so much, rad: 2°, above the unrest of sitting."""

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.activity.frames import FRAME_HZ, PER_MINUTE, Frames, Singles, measure_length
-from core.activity.params import UprightParams, WearParams
-from core.activity.result import UprightMethod, WearPeriod
-from core.frames import Bools, Floats
-from core.rest import find_runs
+from sagittal.core.activity.frames import FRAME_HZ, PER_MINUTE, Frames, Singles, measure_length
+from sagittal.core.activity.params import UprightParams, WearParams
+from sagittal.core.activity.result import UprightMethod, WearPeriod
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.rest import find_runs
 
 Axis = tuple[float, float, float]
 

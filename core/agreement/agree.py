@@ -7,22 +7,22 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from core.agreement.exchange import SensorExchange, find_exchange, undo_exchange
-from core.agreement.joints import list_worn_joints
-from core.agreement.lags import SensorDrift, SensorLag, find_drifts, find_sensor_lags, list_judged
-from core.agreement.params import AgreementParams, JointParams
-from core.agreement.repair import leave_out, take_lag_out, turn_back
-from core.agreement.slips import SensorSlip, find_slips
-from core.agreement.standings import compare_standings
-from core.agreement.tell import tell_drift, tell_exchange, tell_lag, tell_left_over, tell_slip
-from core.agreement.terms import SensorTerms, find_terms
-from core.agreement.windows import JointWindows, compare_at_joint
-from core.errors import Notice
-from core.frames import Floats, Segment
-from core.quality.stuck import drop_stuck_sensors
-from core.recording import UniformRecording
-from core.rest import Window
-from core.timeline import TimelineParams
+from sagittal.core.agreement.exchange import SensorExchange, find_exchange, undo_exchange
+from sagittal.core.agreement.joints import list_worn_joints
+from sagittal.core.agreement.lags import SensorDrift, SensorLag, find_drifts, find_sensor_lags, list_judged
+from sagittal.core.agreement.params import AgreementParams, JointParams
+from sagittal.core.agreement.repair import leave_out, take_lag_out, turn_back
+from sagittal.core.agreement.slips import SensorSlip, find_slips
+from sagittal.core.agreement.standings import compare_standings
+from sagittal.core.agreement.tell import tell_drift, tell_exchange, tell_lag, tell_left_over, tell_slip
+from sagittal.core.agreement.terms import SensorTerms, find_terms
+from sagittal.core.agreement.windows import JointWindows, compare_at_joint
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.quality.stuck import drop_stuck_sensors
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import Window
+from sagittal.core.timeline import TimelineParams
 
 
 @dataclass(frozen=True, eq=False)

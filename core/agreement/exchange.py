@@ -14,15 +14,15 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from core.agreement.joints import LEG_JOINTS, list_worn_joints
-from core.agreement.labels import sort_by_joints
-from core.agreement.mirrored import find_mirrored
-from core.agreement.params import ExchangeParams, JointParams
-from core.agreement.strides import find_swings
-from core.agreement.terms import SensorMotion, SensorTerms, TermsPart, cut_terms
-from core.agreement.windows import JointWindows, compare_at_joint
-from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
-from core.rotation import find_lengths, rotate
+from sagittal.core.agreement.joints import LEG_JOINTS, list_worn_joints
+from sagittal.core.agreement.labels import sort_by_joints
+from sagittal.core.agreement.mirrored import find_mirrored
+from sagittal.core.agreement.params import ExchangeParams, JointParams
+from sagittal.core.agreement.strides import find_swings
+from sagittal.core.agreement.terms import SensorMotion, SensorTerms, TermsPart, cut_terms
+from sagittal.core.agreement.windows import JointWindows, compare_at_joint
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
+from sagittal.core.rotation import find_lengths, rotate
 
 Swap = tuple[tuple[Segment, Segment], ...]
 """Pairs of segments whose sensors are exchanged."""

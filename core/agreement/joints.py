@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final, Literal
 
-from core.frames import FOOT, SHANK, SIDES, THIGH, Segment
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Segment
 
 JointKind = Literal["hip", "knee", "ankle"]
 

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import Segment
+from sagittal.core.frames import Segment
 
 PATH: Final[tuple[Segment, ...]] = ("foot_l", "shank_l", "thigh_l", "pelvis", "thigh_r", "shank_r", "foot_r")
 MIDDLE: Final = 3

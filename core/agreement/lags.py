@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.joints import CHAINS, LEG_JOINTS
-from core.agreement.params import LagParams
-from core.agreement.windows import JointWindows
-from core.frames import Floats, Segment
+from sagittal.core.agreement.joints import CHAINS, LEG_JOINTS
+from sagittal.core.agreement.params import LagParams
+from sagittal.core.agreement.windows import JointWindows
+from sagittal.core.frames import Floats, Segment
 
 MAD: Final = 1.4826
 """Standard deviation of a normal spread whose median absolute deviation is 1."""

@@ -14,18 +14,18 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.exchange import undo_exchange
-from core.agreement.joints import list_worn_joints
-from core.agreement.live_comparison import SensorComparison, Verdict
-from core.agreement.live_terms import RawSecond
-from core.agreement.params import LiveAgreementParams
-from core.agreement.slips import SensorSlip, compile_agreement_kernels
-from core.agreement.tell_live import take_back, tell_exchange_now, tell_lag_now, tell_slip_now
-from core.agreement.terms import find_thinning
-from core.errors import Notice
-from core.frames import Segment
-from core.timeline.columns import find_columns, take_columns
-from core.timeline.live import UniformBlock
+from sagittal.core.agreement.exchange import undo_exchange
+from sagittal.core.agreement.joints import list_worn_joints
+from sagittal.core.agreement.live_comparison import SensorComparison, Verdict
+from sagittal.core.agreement.live_terms import RawSecond
+from sagittal.core.agreement.params import LiveAgreementParams
+from sagittal.core.agreement.slips import SensorSlip, compile_agreement_kernels
+from sagittal.core.agreement.tell_live import take_back, tell_exchange_now, tell_lag_now, tell_slip_now
+from sagittal.core.agreement.terms import find_thinning
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Segment
+from sagittal.core.timeline.columns import find_columns, take_columns
+from sagittal.core.timeline.live import UniformBlock
 
 STANDING: Final = 2
 """Seconds of the standing from which biases and tilts are learnt."""

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.exchange import (
+from sagittal.core.agreement.exchange import (
     SensorExchange,
     Swap,
     choose_labels,
@@ -19,12 +19,12 @@ from core.agreement.exchange import (
     judge_legs,
     undo_exchange,
 )
-from core.agreement.joints import list_worn_joints
-from core.agreement.lags import SensorLag, find_sensor_lags
-from core.agreement.live_joints import LivePair, Pair, list_pairs, relabel
-from core.agreement.live_terms import LiveTerms, RawSecond, TermSecond
-from core.agreement.params import LiveAgreementParams
-from core.agreement.slips import (
+from sagittal.core.agreement.joints import list_worn_joints
+from sagittal.core.agreement.lags import SensorLag, find_sensor_lags
+from sagittal.core.agreement.live_joints import LivePair, Pair, list_pairs, relabel
+from sagittal.core.agreement.live_terms import LiveTerms, RawSecond, TermSecond
+from sagittal.core.agreement.params import LiveAgreementParams
+from sagittal.core.agreement.slips import (
     PlaceTurns,
     SensorSlip,
     find_turns,
@@ -33,10 +33,10 @@ from core.agreement.slips import (
     judge_turns,
     question_strides,
 )
-from core.agreement.strides import choose_leg, find_largest_axis
-from core.agreement.terms import LevelMotion
-from core.agreement.windows import JointWindows
-from core.frames import FOOT, SHANK, SIDES, Bools, Floats, Segment
+from sagittal.core.agreement.strides import choose_leg, find_largest_axis
+from sagittal.core.agreement.terms import LevelMotion
+from sagittal.core.agreement.windows import JointWindows
+from sagittal.core.frames import FOOT, SHANK, SIDES, Bools, Floats, Segment
 
 HIPS: Final[frozenset[Segment]] = frozenset(("pelvis", "thigh_l", "thigh_r"))
 

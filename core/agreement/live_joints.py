@@ -9,12 +9,12 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.exchange import SWAPS, Swap, undo_exchange
-from core.agreement.joints import LEG_JOINTS, list_worn_joints
-from core.agreement.live_terms import TermSecond
-from core.agreement.params import JointParams
-from core.agreement.windows import JointSums, JointWindows, read_windows
-from core.frames import Floats, Segment
+from sagittal.core.agreement.exchange import SWAPS, Swap, undo_exchange
+from sagittal.core.agreement.joints import LEG_JOINTS, list_worn_joints
+from sagittal.core.agreement.live_terms import TermSecond
+from sagittal.core.agreement.params import JointParams
+from sagittal.core.agreement.windows import JointSums, JointWindows, read_windows
+from sagittal.core.frames import Floats, Segment
 
 KEPT: Final = 120
 """Windows that are kept: a slip is told from those within 20 s of it on either side, and the last seconds."""

@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from core.agreement.params import JointParams
-from core.agreement.terms import (
+from sagittal.core.agreement.params import JointParams
+from sagittal.core.agreement.terms import (
     LevelMotion,
     find_bias,
     find_thinning,
@@ -22,9 +22,9 @@ from core.agreement.terms import (
     start_tilt,
     take_mean_out,
 )
-from core.frames import Bools, Floats
-from core.fusion.attitude import advance
-from core.recording import SensorSignals
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.fusion.attitude import advance
+from sagittal.core.recording import SensorSignals
 
 SETTLE_S: Final = 0.3
 """The filters of the upper edge of the band see so much on either side: they have forgotten it after."""

@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.params import ExchangeParams, JointParams
-from core.agreement.terms import TermsPart
-from core.agreement.windows import compare_at_joint
-from core.frames import Floats, Segment
+from sagittal.core.agreement.params import ExchangeParams, JointParams
+from sagittal.core.agreement.terms import TermsPart
+from sagittal.core.agreement.windows import compare_at_joint
+from sagittal.core.frames import Floats, Segment
 
 MOST: Final = 3
 """So many sensors of seven are looked for: more would be the majority."""

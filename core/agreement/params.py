@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import radians
 
-from core.fusion.attitude import AttitudeParams
+from sagittal.core.fusion.attitude import AttitudeParams
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.slips import SensorSlip
-from core.frames import Floats
-from core.recording import SensorSignals
-from core.rest import Window
-from core.rotation import exp, rotate
-from core.timeline.grid import lay_signal
-from core.timeline.params import TimelineParams
+from sagittal.core.agreement.slips import SensorSlip
+from sagittal.core.frames import Floats
+from sagittal.core.recording import SensorSignals
+from sagittal.core.rest import Window
+from sagittal.core.rotation import exp, rotate
+from sagittal.core.timeline.grid import lay_signal
+from sagittal.core.timeline.params import TimelineParams
 
 
 def take_lag_out(

@@ -15,14 +15,14 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.agreement.lags import MAD
-from core.agreement.params import JointParams, SlipParams
-from core.agreement.strides import choose_leg, find_main_axis, find_stride_turns, find_swings
-from core.agreement.terms import SensorMotion, SensorTerms, find_terms
-from core.agreement.windows import JointWindows, compare_at_joint
-from core.frames import Bools, Floats, Segment
-from core.recording import SensorSignals, UniformRecording
-from core.rest import Window
+from sagittal.core.agreement.lags import MAD
+from sagittal.core.agreement.params import JointParams, SlipParams
+from sagittal.core.agreement.strides import choose_leg, find_main_axis, find_stride_turns, find_swings
+from sagittal.core.agreement.terms import SensorMotion, SensorTerms, find_terms
+from sagittal.core.agreement.windows import JointWindows, compare_at_joint
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.rest import Window
 
 INDEPENDENT: Final = 5.0
 """More windows side by side than this do not make a median surer: gait changes between them too."""

@@ -16,14 +16,14 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.params import SlipParams
-from core.agreement.slips import SensorSlip
-from core.agreement.strides import SMOOTH_HZ, find_main_axis, find_swings
-from core.agreement.terms import SensorTerms
-from core.filtering import low_pass
-from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
-from core.recording import UniformRecording
-from core.rest import Window, drop_false_rests, find_rest_windows, index_window
+from sagittal.core.agreement.params import SlipParams
+from sagittal.core.agreement.slips import SensorSlip
+from sagittal.core.agreement.strides import SMOOTH_HZ, find_main_axis, find_swings
+from sagittal.core.agreement.terms import SensorTerms
+from sagittal.core.filtering import low_pass
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import Window, drop_false_rests, find_rest_windows, index_window
 
 WITHIN_S: Final = 0.4
 """A thigh and a foot swing forward so near to their shank."""

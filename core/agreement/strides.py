@@ -9,12 +9,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.agreement.params import SlipParams
-from core.agreement.terms import SensorMotion
-from core.filtering import low_pass
-from core.frames import Bools, Floats, Segment
-from core.peaks import find_peaks
-from core.rotation import conjugate, exp, find_lengths, rotate, to_matrix
+from sagittal.core.agreement.params import SlipParams
+from sagittal.core.agreement.terms import SensorMotion
+from sagittal.core.filtering import low_pass
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.peaks import find_peaks
+from sagittal.core.rotation import conjugate, exp, find_lengths, rotate, to_matrix
 
 SMOOTH_HZ: Final = 4.0
 LEAST_SWING: Final = 0.6

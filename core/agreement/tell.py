@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.exchange import SensorExchange
-from core.agreement.lags import SensorDrift, SensorLag
-from core.agreement.params import ExchangeParams, LagParams, SlipParams
-from core.agreement.slips import SensorSlip
-from core.errors import Notice
+from sagittal.core.agreement.exchange import SensorExchange
+from sagittal.core.agreement.lags import SensorDrift, SensorLag
+from sagittal.core.agreement.params import ExchangeParams, LagParams, SlipParams
+from sagittal.core.agreement.slips import SensorSlip
+from sagittal.core.errors import Notice
 
 KEPT: Final = "The recording itself keeps its own times."
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from core.agreement.exchange import SensorExchange
-from core.agreement.lags import SensorLag
-from core.agreement.params import LagParams
-from core.agreement.slips import SensorSlip
-from core.agreement.tell import list_sensors, say_exchange, say_lag, say_slip
-from core.errors import Notice
+from sagittal.core.agreement.exchange import SensorExchange
+from sagittal.core.agreement.lags import SensorLag
+from sagittal.core.agreement.params import LagParams
+from sagittal.core.agreement.slips import SensorSlip
+from sagittal.core.agreement.tell import list_sensors, say_exchange, say_lag, say_slip
+from sagittal.core.errors import Notice
 
 AGAIN: Final = "sensors_agree_again"
 

@@ -12,13 +12,13 @@ from typing import Final, Protocol
 import numba
 import numpy as np
 
-from core.agreement.params import JointBandParams, JointParams
-from core.filtering import low_pass
-from core.frames import GRAVITY, Bools, Floats
-from core.fusion.attitude import AttitudeParams, AttitudeState, advance
-from core.recording import SensorSignals
-from core.rest import Quietness, measure_quietness
-from core.rotation import compiled, find_lengths, from_matrix
+from sagittal.core.agreement.params import JointBandParams, JointParams
+from sagittal.core.filtering import low_pass
+from sagittal.core.frames import GRAVITY, Bools, Floats
+from sagittal.core.fusion.attitude import AttitudeParams, AttitudeState, advance
+from sagittal.core.recording import SensorSignals
+from sagittal.core.rest import Quietness, measure_quietness
+from sagittal.core.rotation import compiled, find_lengths, from_matrix
 
 TERMS: Final = 4
 """Columns of a sensor's terms: three for the place, one for its own specific force."""

@@ -13,10 +13,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.agreement.params import JointParams, JointSumParams
-from core.agreement.terms import TERMS, SensorTerms, TermsPart
-from core.frames import Bools, Floats, Segment
-from core.inner import inner_njit
+from sagittal.core.agreement.params import JointParams, JointSumParams
+from sagittal.core.agreement.terms import TERMS, SensorTerms, TermsPart
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.inner import inner_njit
 
 
 @dataclass(frozen=True, eq=False)

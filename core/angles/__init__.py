@@ -5,10 +5,10 @@ ISB frames: a about the proximal medio-lateral axis, b about the floating axis, 
 Pelvis: R_W_neutralᵀ R_pelvis = Ry(rotation) Rx(b) Rz(tilt), intrinsic Y-X-Z (Baker 2001), so that tilt and
 obliquity do not depend on the direction of walking.
 
-`core.angles.measure` measures a take; it brings numba, which readers of results do without.
+`sagittal.core.angles.measure` measures a take; it brings numba, which readers of results do without.
 """
 
-from core.angles.cardan import cardan_zxy, compute_headings, pelvis_angles
-from core.angles.result import SIGNS, JointAngles, list_leg_joints
+from sagittal.core.angles.cardan import cardan_zxy, compute_headings, pelvis_angles
+from sagittal.core.angles.result import SIGNS, JointAngles, list_leg_joints
 
 __all__ = ["SIGNS", "JointAngles", "cardan_zxy", "compute_headings", "list_leg_joints", "pelvis_angles"]

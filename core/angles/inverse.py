@@ -1,8 +1,8 @@
-"""Joint angles → segment orientations: the inverse of core.angles.
+"""Joint angles → segment orientations: the inverse of sagittal.core.angles.
 
 R_distal = R_proximal Rz(a) Rx(b) Ry(c) down the leg, R_pelvis = R_neutral Ry(rotation) Rx(b) Rz(tilt), with
-the signs of core.angles. Angles over a cycle are named without side, as in the curves of core.parameters and
-core.norms: positive with that side up and that side forward.
+the signs of sagittal.core.angles. Angles over a cycle are named without side, as in the curves of
+sagittal.core.parameters and sagittal.core.norms: positive with that side up and that side forward.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import SIGNS, list_leg_joints
-from core.frames import R_NEUTRAL, Floats, Segment, Side
-from core.rotation import about, from_matrix, multiply
+from sagittal.core.angles import SIGNS, list_leg_joints
+from sagittal.core.frames import R_NEUTRAL, Floats, Segment, Side
+from sagittal.core.rotation import about, from_matrix, multiply
 
 _NEUTRAL: Final = from_matrix(R_NEUTRAL)
 

@@ -14,9 +14,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.angles.result import SIGNS, list_leg_joints
-from core.frames import SIDES, SUFFIX, Bools, Floats, Segment
-from core.rotation import compiled, wrap_angle
+from sagittal.core.angles.result import SIGNS, list_leg_joints
+from sagittal.core.frames import SIDES, SUFFIX, Bools, Floats, Segment
+from sagittal.core.rotation import compiled, wrap_angle
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from core.angles.cardan import compute_headings
-from core.angles.kernel import AngleKernel, mean_angles, subtract_zero
-from core.angles.result import SIGNS, JointAngles, list_leg_joints
-from core.errors import Notice
-from core.frames import SIDES, SUFFIX, Bools, Floats, Posture
-from core.held_samples import cut_blocks, give_pages_back, make_room
-from core.rest import Window, index_window
+from sagittal.core.angles.cardan import compute_headings
+from sagittal.core.angles.kernel import AngleKernel, mean_angles, subtract_zero
+from sagittal.core.angles.result import SIGNS, JointAngles, list_leg_joints
+from sagittal.core.errors import Notice
+from sagittal.core.frames import SIDES, SUFFIX, Bools, Floats, Posture
+from sagittal.core.held_samples import cut_blocks, give_pages_back, make_room
+from sagittal.core.rest import Window, index_window
 
 if TYPE_CHECKING:
-    from core.body.poses import Poses
-    from core.fusion.orientations import Orientations
+    from sagittal.core.body.poses import Poses
+    from sagittal.core.fusion.orientations import Orientations
 
 GIMBAL_LIMIT: Final = radians(80.0)
 """|b| beyond which a and c cannot be told apart (docs/science/joint-angles.md, "Joints")."""

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from core.errors import Notice
-from core.frames import FOOT, SHANK, THIGH, Floats, Posture, Segment, Side
+from sagittal.core.errors import Notice
+from sagittal.core.frames import FOOT, SHANK, THIGH, Floats, Posture, Segment, Side
 
 SIGNS: Final[dict[str, tuple[tuple[str, float, float], ...]]] = {
     "hip": (("hip_flexion", 1, 1), ("hip_adduction", 1, -1), ("hip_rotation", 1, -1)),
@@ -44,10 +44,10 @@ class JointAngles:
     zero : "standing", or "walking": nobody stood still and the angles start from their mean over straight
         walking, so that they have a shape and a range and no level.
     standing_deg : angles of that standing by goniometer, where somebody entered them; see
-        `core.standing_angles`, and `core.parameters.anatomical_zero`, which adds them back.
+        `sagittal.core.standing_angles`, and `sagittal.core.parameters.anatomical_zero`, which adds them back.
     headings : "pelvis", "foot_l", "foot_r" → (n,) rad about the vertical, left positive, unwrapped, from a
         zero of its own; only of segments with a sensor. Its course over a stride means something.
-    withheld : angles that were taken out again → reason (`core.withheld`).
+    withheld : angles that were taken out again → reason (`sagittal.core.withheld`).
     bounds : name → rad, the straight knee of a leg model: at it the angle is a limit and no measurement.
     """
 

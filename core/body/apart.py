@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
-from core.body.model import BodyModel
-from core.calibration.result import CalibratedRecording
-from core.frames import SIDES, SUFFIX, Segment
-from core.fusion.orientations import Orientations
-from core.rotation import about, multiply, to_matrix
+from sagittal.core.body.model import BodyModel
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.frames import SIDES, SUFFIX, Segment
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import about, multiply, to_matrix
 
 LONGEST: Final = 0.5
 """Sine of the widest lean that is believed."""

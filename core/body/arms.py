@@ -15,20 +15,20 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.joints import LEG_JOINTS, JointKind
-from core.agreement.params import JointBandParams
-from core.agreement.terms import find_thinning, find_usable, low_pass_terms, take_mean_out
-from core.body.corrected import correct_signals
-from core.body.model import BodyModel
-from core.body.places import joint_places, sensor_place
-from core.calibration.knee_axis import KneeAxes, measure_knees
-from core.calibration.result import CalibratedRecording
-from core.errors import Notice
-from core.filtering import low_pass
-from core.frames import Bools, Floats, Segment, Side
-from core.fusion.orientations import Orientations
-from core.rest import index_window
-from core.rotation import conjugate, from_matrix, multiply, to_matrix
+from sagittal.core.agreement.joints import LEG_JOINTS, JointKind
+from sagittal.core.agreement.params import JointBandParams
+from sagittal.core.agreement.terms import find_thinning, find_usable, low_pass_terms, take_mean_out
+from sagittal.core.body.corrected import correct_signals
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.places import joint_places, sensor_place
+from sagittal.core.calibration.knee_axis import KneeAxes, measure_knees
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.errors import Notice
+from sagittal.core.filtering import low_pass
+from sagittal.core.frames import Bools, Floats, Segment, Side
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rest import index_window
+from sagittal.core.rotation import conjugate, from_matrix, multiply, to_matrix
 
 LegJoint = tuple[Segment, Segment]
 """The segments on either side of a joint, proximal first."""

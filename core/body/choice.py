@@ -8,12 +8,21 @@ from typing import Final
 
 import numpy as np
 
-from core.body.tree import PRESETS
-from core.calibration.result import CalibratedRecording
-from core.errors import EstimationError, Notice
-from core.estimators import AUTO, BY_NAME, ERKF, L7S_2I, L7S_3I, ORIENTATIONS_ONLY, Estimator, Requested
-from core.frames import Segment
-from core.fusion.orientations import Orientations
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.errors import EstimationError, Notice
+from sagittal.core.estimators import (
+    AUTO,
+    BY_NAME,
+    ERKF,
+    L7S_2I,
+    L7S_3I,
+    ORIENTATIONS_ONLY,
+    Estimator,
+    Requested,
+)
+from sagittal.core.frames import Segment
+from sagittal.core.fusion.orientations import Orientations
 
 WHOLE: Final = PRESETS["lower_body7"]
 

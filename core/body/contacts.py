@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from core.frames import Bools, Floats
+from sagittal.core.frames import Bools, Floats
 
 
 def contact_mask(t_s: Floats, ic_s: Sequence[float], tc_s: Sequence[float]) -> Bools:

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from core.calibration.result import CalibratedRecording
-from core.frames import GRAVITY, Bools, Floats, Segment
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
 
 
 def correct_signals(

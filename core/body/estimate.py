@@ -13,40 +13,40 @@ from typing import Final
 
 import numpy as np
 
-from core.body.arms import report_ahead
-from core.body.choice import WHOLE
-from core.body.corrected import correct_signals
-from core.body.erkf.filter import erkf_inputs
-from core.body.erkf.headings import judge_turned_axes, report_turned_axes
-from core.body.erkf.health import erkf_health, erkf_notices
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.poses import (
+from sagittal.core.body.arms import report_ahead
+from sagittal.core.body.choice import WHOLE
+from sagittal.core.body.corrected import correct_signals
+from sagittal.core.body.erkf.filter import erkf_inputs
+from sagittal.core.body.erkf.headings import judge_turned_axes, report_turned_axes
+from sagittal.core.body.erkf.health import erkf_health, erkf_notices
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.poses import (
     find_segment_tracks,
     foot_tracks,
     place_figure,
     replace_orientations,
     run_erkf,
 )
-from core.body.erkf.smoother import smooth
-from core.body.erkf.start import start_state
-from core.body.feet import FootTracks
-from core.body.kinematics import forward_kinematics
-from core.body.l7s.health import l7s_health, l7s_notices
-from core.body.l7s.inputs import free_acceleration
-from core.body.l7s.poses import compile_l7s_kernel, l7s_poses
-from core.body.model import NOMINAL_HEIGHT_M, BodyModel
-from core.body.mounting import MountedSensors
-from core.body.pose_params import PoseParams
-from core.body.poses import Poses
-from core.body.still import contact_samples
-from core.body.tree import person_tree
-from core.calibration.result import CalibratedRecording
-from core.errors import EstimationError, Notice
-from core.estimators import BY_NAME, ERKF, L7S_3I, NO_FIGURE, ORIENTATIONS_ONLY, Estimator
-from core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
-from core.fusion.orientations import LastReading, Orientations
-from core.held_samples import lay_aside
-from core.memory import give_memory_back
+from sagittal.core.body.erkf.smoother import smooth
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.body.kinematics import forward_kinematics
+from sagittal.core.body.l7s.health import l7s_health, l7s_notices
+from sagittal.core.body.l7s.inputs import free_acceleration
+from sagittal.core.body.l7s.poses import compile_l7s_kernel, l7s_poses
+from sagittal.core.body.model import NOMINAL_HEIGHT_M, BodyModel
+from sagittal.core.body.mounting import MountedSensors
+from sagittal.core.body.pose_params import PoseParams
+from sagittal.core.body.poses import Poses
+from sagittal.core.body.still import contact_samples
+from sagittal.core.body.tree import person_tree
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.errors import EstimationError, Notice
+from sagittal.core.estimators import BY_NAME, ERKF, L7S_3I, NO_FIGURE, ORIENTATIONS_ONLY, Estimator
+from sagittal.core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
+from sagittal.core.fusion.orientations import LastReading, Orientations
+from sagittal.core.held_samples import lay_aside
+from sagittal.core.memory import give_memory_back
 
 ON_A_BELT: Final = (
     "On a treadmill a foot on the belt does not rest in the room, as the estimator takes it to. Positions "

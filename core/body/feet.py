@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from core.body.model import BodyModel
-from core.frames import Bools, Floats, Posture, Side
+from sagittal.core.body.model import BodyModel
+from sagittal.core.frames import Bools, Floats, Posture, Side
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +20,7 @@ class FootTracks:
     valid : side → (n,) the sensor was there.
     linked : both feet hang on one chain of sensors, so that their places relative to each other are known;
         False: each foot has its own origin and heading.
-    source : `core.estimators.LINKED_PATHS` or `SINGLE_PATHS`; live their live twins.
+    source : `sagittal.core.estimators.LINKED_PATHS` or `SINGLE_PATHS`; live their live twins.
     patched : side → (n,) packets were lost while the foot moved, and a straight line says too little of it.
     posture : what the feet's neutral posture and direction are of; toe-out is told from standing alone.
     sensor_ahead : side → how far ahead of its nominal place the sensor was found to sit, m, 0 where not

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from core.frames import Bools
-from core.rest import find_runs
+from sagittal.core.frames import Bools
+from sagittal.core.rest import find_runs
 
 Verdict = Literal["good", "warn", "bad"]
 

@@ -16,19 +16,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from core.anthropometry import BodyMeasures
-from core.body.model import LEG_FRACTION, NOMINAL_HEIGHT_M, BodyModel
-from core.body.places import FOOT as SENSOR_ON_FOOT
-from core.body.poses import Poses
-from core.errors import Notice
-from core.estimators import NO_FIGURE, ORIENTATIONS_ONLY
-from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
-from core.rotation import rotate
-from core.shoe import Shoe
+from sagittal.core.anthropometry import BodyMeasures
+from sagittal.core.body.model import LEG_FRACTION, NOMINAL_HEIGHT_M, BodyModel
+from sagittal.core.body.places import FOOT as SENSOR_ON_FOOT
+from sagittal.core.body.poses import Poses
+from sagittal.core.errors import Notice
+from sagittal.core.estimators import NO_FIGURE, ORIENTATIONS_ONLY
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from sagittal.core.rotation import rotate
+from sagittal.core.shoe import Shoe
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
-    from core.fusion.orientations import Orientations
+    from sagittal.core.fusion.orientations import Orientations
 
 HEEL, BALL = -0.21, 0.53
 """Heel and ball contact points in front of the ankle as fractions of foot length: the −.055 and .14 m of the

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple, Protocol
 
-from core.errors import Notice
-from core.estimators import LiveMethod
-from core.frames import FOOT, SIDES, Bools, Floats, Segment
+from sagittal.core.errors import Notice
+from sagittal.core.estimators import LiveMethod
+from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment
 
 
 class MeasuredBlock(NamedTuple):

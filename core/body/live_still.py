@@ -14,8 +14,8 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.still import AT_REST, FOOT_STILL
-from core.frames import GRAVITY, Bools, Floats
+from sagittal.core.body.still import AT_REST, FOOT_STILL
+from sagittal.core.frames import GRAVITY, Bools, Floats
 
 FOOT_S: Final = 0.03
 """A foot that has been quiet for so long stands. Half the offline window, so that it starts as early."""

@@ -11,18 +11,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from core.body.apart import lean_legs_apart
-from core.body.arms import MeasuredArms, measure_arms
-from core.body.choice import Choice, choose
-from core.body.erkf.headings import align_forward_axes
-from core.body.kinematics import nominal_body
-from core.body.model import BodyModel
-from core.body.pose_params import PoseParams
-from core.calibration.result import CalibratedRecording
-from core.errors import EstimationError, Notice
-from core.estimators import ERKF
-from core.frames import Segment
-from core.fusion.orientations import Orientations
+from sagittal.core.body.apart import lean_legs_apart
+from sagittal.core.body.arms import MeasuredArms, measure_arms
+from sagittal.core.body.choice import Choice, choose
+from sagittal.core.body.erkf.headings import align_forward_axes
+from sagittal.core.body.kinematics import nominal_body
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.pose_params import PoseParams
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.errors import EstimationError, Notice
+from sagittal.core.estimators import ERKF
+from sagittal.core.frames import Segment
+from sagittal.core.fusion.orientations import Orientations
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.body.model import BodyModel
-from core.frames import Floats, Segment
+from sagittal.core.body.model import BodyModel
+from sagittal.core.frames import Floats, Segment
 
 PELVIS = (-0.10, 0.08, 0.0)
 """m, over the sacrum, from mid-hip."""

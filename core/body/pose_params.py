@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import get_args
 
-from core.body.arms import ArmParams
-from core.body.erkf.params import ErkfParams
-from core.body.kinematics import AnchorParams
-from core.body.l7s.filter import L7sParams
-from core.errors import ParameterError
-from core.estimators import AUTO, Requested
+from sagittal.core.body.arms import ArmParams
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.kinematics import AnchorParams
+from sagittal.core.body.l7s.filter import L7sParams
+from sagittal.core.errors import ParameterError
+from sagittal.core.estimators import AUTO, Requested
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from core.body.health import HealthFinding
-from core.body.model import BodyModel
-from core.errors import Notice
-from core.frames import Bools, Floats, Segment
-from core.held_samples import SHORT
+from sagittal.core.body.health import HealthFinding
+from sagittal.core.body.model import BodyModel
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.held_samples import SHORT
 
 
 def figure_precision(samples: int) -> type[np.floating[Any]]:
@@ -32,7 +32,7 @@ class Poses:
     valid : (n,) all segments of the figure measured.
     contact : segment (feet) → (n,) True while the foot is taken to be on the floor.
     q, p : in single precision where the take is long (`figure_precision`).
-    method : of an estimator of `core.estimators`, or its NO_FIGURE.
+    method : of an estimator of `sagittal.core.estimators`, or its NO_FIGURE.
     reduced : a stable code when a better estimator was not possible or not asked for: "sensor_failed",
         "not_calibrated", "no_standing", "estimator_failed"; None for the best one of the worn sensors.
     health : the estimator's own findings.

@@ -1,11 +1,11 @@
-"""From sensors to segments, compiled; `core.body.tree.ImuTree` explains it."""
+"""From sensors to segments, compiled; `sagittal.core.body.tree.ImuTree` explains it."""
 
 from __future__ import annotations
 
 import numba
 import numpy as np
 
-from core.rotation.compiled import multiply, to_matrix, transform
+from sagittal.core.rotation.compiled import multiply, to_matrix, transform
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

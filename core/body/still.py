@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.frames import GRAVITY, Bools, Floats
-from core.rest import find_runs
-from core.rotation import find_lengths
+from sagittal.core.frames import GRAVITY, Bools, Floats
+from sagittal.core.rest import find_runs
+from sagittal.core.rotation import find_lengths
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,11 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.body.model import LENGTHS, BodyModel
-from core.body.places import joint_places, sensor_place, standing_origin
-from core.errors import EstimationError, ParameterError
-from core.frames import Floats, Segment
-from core.rotation import conjugate, from_matrix, rotate, to_matrix
+from sagittal.core.body.model import LENGTHS, BodyModel
+from sagittal.core.body.places import joint_places, sensor_place, standing_origin
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.rotation import conjugate, from_matrix, rotate, to_matrix
 
 Preset = Literal["lower_body7", "feet_pelvis3", "feet2", "single_foot_r", "single_foot_l"]
 
@@ -141,7 +141,7 @@ class ImuTree:
         ----------
         p, q : (..., n, 3), (..., n, 4) of the sensors in W.
         """
-        from core.body.segment_kernel import write_segments
+        from sagittal.core.body.segment_kernel import write_segments
 
         n = len(self.imus)
         turned, origin = np.empty((q.size // (4 * n), n, 4)), np.empty((p.size // (3 * n), n, 3))

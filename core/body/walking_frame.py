@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.frames import Floats
-from core.rotation import yaw
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import yaw
 
 HEADING_S = 2.0
 """The heading is averaged over so long: the turning of the trunk within a stride is part of gait, not of the

@@ -1,5 +1,5 @@
 """UniformRecording → CalibratedRecording: sensor-to-segment orientation, gyro bias, heading."""
 
-from core.calibration.calibrate import CalibrationParams, calibrate
+from sagittal.core.calibration.calibrate import CalibrationParams, calibrate
 
 __all__ = ["CalibrationParams", "calibrate"]

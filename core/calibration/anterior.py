@@ -9,13 +9,13 @@ from typing import Literal
 
 import numpy as np
 
-from core.calibration.forward import (
+from sagittal.core.calibration.forward import (
     ForwardMeasure,
     ForwardParams,
     JointMeasure,
     weigh_forward_axes,
 )
-from core.calibration.gyro_pca import (
+from sagittal.core.calibration.gyro_pca import (
     GOOD_AXIS,
     SINGLE_AXIS,
     WEAK_MARGIN,
@@ -26,7 +26,7 @@ from core.calibration.gyro_pca import (
     measure_flexion,
     sagittal_course,
 )
-from core.calibration.heading import (
+from sagittal.core.calibration.heading import (
     Complexes,
     HeadingParams,
     Part,
@@ -41,15 +41,15 @@ from core.calibration.heading import (
     subtract_angles,
     velocity_direction,
 )
-from core.calibration.mounting import read_declared_angle
-from core.calibration.sensor_in_walk import WalkRungParams, find_flat_moments
-from core.calibration.standing import SensorAtRest, vertical_frame
-from core.calibration.walking import TRUNK
-from core.errors import CalibrationError, Notice
-from core.frames import FOOT, Bools, Floats, Segment
-from core.recording import SensorSignals
-from core.rest import Window
-from core.rotation import rotate
+from sagittal.core.calibration.mounting import read_declared_angle
+from sagittal.core.calibration.sensor_in_walk import WalkRungParams, find_flat_moments
+from sagittal.core.calibration.standing import SensorAtRest, vertical_frame
+from sagittal.core.calibration.walking import TRUNK
+from sagittal.core.errors import CalibrationError, Notice
+from sagittal.core.frames import FOOT, Bools, Floats, Segment
+from sagittal.core.recording import SensorSignals
+from sagittal.core.rest import Window
+from sagittal.core.rotation import rotate
 
 DISAGREEMENT = radians(15.0)
 """Difference of two measures of the walking direction that is told

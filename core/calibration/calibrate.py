@@ -8,22 +8,28 @@ from math import degrees, radians
 
 import numpy as np
 
-from core.calibration.anterior import AnteriorAxis, CalibrationWalk, Method, find_anterior_axis, weigh_axes
-from core.calibration.forward import ForwardParams
-from core.calibration.from_walking import calibrate_from_walking
-from core.calibration.functional import (
+from sagittal.core.calibration.anterior import (
+    AnteriorAxis,
+    CalibrationWalk,
+    Method,
+    find_anterior_axis,
+    weigh_axes,
+)
+from sagittal.core.calibration.forward import ForwardParams
+from sagittal.core.calibration.from_walking import calibrate_from_walking
+from sagittal.core.calibration.functional import (
     FunctionalMovements,
     FunctionalParams,
     find_functional_axes,
     find_functional_movements,
 )
-from core.calibration.gyro_pca import about_vertical, count_steps, sagittal_angle, sagittal_course
-from core.calibration.heading import HeadingParams, Part, step_time
-from core.calibration.joint_turns import JointTurnParams, measure_joint_turns
-from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
-from core.calibration.score import ScoreParams
-from core.calibration.sensor_in_walk import WalkRungParams
-from core.calibration.standing import (
+from sagittal.core.calibration.gyro_pca import about_vertical, count_steps, sagittal_angle, sagittal_course
+from sagittal.core.calibration.heading import HeadingParams, Part, step_time
+from sagittal.core.calibration.joint_turns import JointTurnParams, measure_joint_turns
+from sagittal.core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
+from sagittal.core.calibration.score import ScoreParams
+from sagittal.core.calibration.sensor_in_walk import WalkRungParams
+from sagittal.core.calibration.standing import (
     LEG_AHEAD,
     SensorAtRest,
     choose_rest,
@@ -33,7 +39,7 @@ from core.calibration.standing import (
     stand_all,
     vertical_frame,
 )
-from core.calibration.walking import (
+from sagittal.core.calibration.walking import (
     TRUNK,
     WalkingParams,
     mean_turn,
@@ -42,14 +48,14 @@ from core.calibration.walking import (
     turn_sensors,
     turning_mask,
 )
-from core.errors import CalibrationError, Notice, SignalError
-from core.frames import R_NEUTRAL, Bools, Floats, Segment
-from core.fusion.attitude import AttitudeParams, estimate_orientation
-from core.held_samples import HeldSeries
-from core.plurals import plural
-from core.recording import UniformRecording
-from core.rest import RestParams, Window
-from core.rotation import find_vertical, from_matrix, rotate
+from sagittal.core.errors import CalibrationError, Notice, SignalError
+from sagittal.core.frames import R_NEUTRAL, Bools, Floats, Segment
+from sagittal.core.fusion.attitude import AttitudeParams, estimate_orientation
+from sagittal.core.held_samples import HeldSeries
+from sagittal.core.plurals import plural
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import RestParams, Window
+from sagittal.core.rotation import find_vertical, from_matrix, rotate
 
 FACING = radians(20.0)
 """Turn between standing and the first straight part that still counts as facing the walk (our choice)."""

@@ -11,8 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import SHANK, THIGH, Floats, Segment, Side
-from core.rotation import about, to_matrix
+from sagittal.core.frames import SHANK, THIGH, Floats, Segment, Side
+from sagittal.core.rotation import about, to_matrix
 
 SHIN_FACE: Final = radians(45.0)
 """The flat side of the shin looks so far inward of forward (Kianifar, "IMU orientations")."""

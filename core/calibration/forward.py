@@ -16,8 +16,8 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment, Side
-from core.rotation import wrap_angle
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment, Side
+from sagittal.core.rotation import wrap_angle
 
 MeasureName = Literal[
     "strides", "velocity", "start_velocity", "acceleration", "gyro_pca", "mirror", "declared", "hip_swing",

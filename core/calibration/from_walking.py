@@ -13,9 +13,9 @@ from typing import Final
 
 import numpy as np
 
-from core.calibration.anterior import AnteriorAxis, Method, list_axis_measures, weigh_axes
-from core.calibration.forward import ForwardMeasure, ForwardParams
-from core.calibration.gyro_pca import (
+from sagittal.core.calibration.anterior import AnteriorAxis, Method, list_axis_measures, weigh_axes
+from sagittal.core.calibration.forward import ForwardMeasure, ForwardParams
+from sagittal.core.calibration.gyro_pca import (
     WEAK_MARGIN,
     about_vertical,
     count_steps,
@@ -24,7 +24,7 @@ from core.calibration.gyro_pca import (
     measure_flexion,
     sagittal_angle,
 )
-from core.calibration.heading import (
+from sagittal.core.calibration.heading import (
     Complexes,
     HeadingParams,
     Part,
@@ -35,12 +35,12 @@ from core.calibration.heading import (
     step_time,
     stride_direction,
 )
-from core.calibration.joint_turns import JointTurnParams, measure_joint_turns
-from core.calibration.mounting import read_declared_angle
-from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
-from core.calibration.sensor_in_walk import SensorInWalk, WalkRungParams, follow_sensor
-from core.calibration.standing import vertical_frame
-from core.calibration.walking import (
+from sagittal.core.calibration.joint_turns import JointTurnParams, measure_joint_turns
+from sagittal.core.calibration.mounting import read_declared_angle
+from sagittal.core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
+from sagittal.core.calibration.sensor_in_walk import SensorInWalk, WalkRungParams, follow_sensor
+from sagittal.core.calibration.standing import vertical_frame
+from sagittal.core.calibration.walking import (
     TRUNK,
     WalkingParams,
     mean_turn,
@@ -50,13 +50,13 @@ from core.calibration.walking import (
     turn_sensors,
     turning_mask,
 )
-from core.errors import CalibrationError, Notice, SignalError
-from core.filtering import low_pass
-from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, THIGH, Bools, Floats, Segment
-from core.fusion.attitude import AttitudeParams
-from core.recording import UniformRecording
-from core.rest import Window, find_runs
-from core.rotation import about, find_vertical, from_matrix, multiply, rotate
+from sagittal.core.errors import CalibrationError, Notice, SignalError
+from sagittal.core.filtering import low_pass
+from sagittal.core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, THIGH, Bools, Floats, Segment
+from sagittal.core.fusion.attitude import AttitudeParams
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import Window, find_runs
+from sagittal.core.rotation import about, find_vertical, from_matrix, multiply, rotate
 
 SWING_HZ: Final = 1.6
 """Low-pass under which the sensors of one leg are pushed forward together: a stride and its double."""

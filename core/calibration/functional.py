@@ -12,9 +12,9 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.calibration.anterior import AnteriorAxis
-from core.calibration.forward import ForwardMeasure, ForwardParams
-from core.calibration.gyro_pca import (
+from sagittal.core.calibration.anterior import AnteriorAxis
+from sagittal.core.calibration.forward import ForwardMeasure, ForwardParams
+from sagittal.core.calibration.gyro_pca import (
     GOOD_AXIS,
     WEAK_MARGIN,
     about_vertical,
@@ -22,16 +22,16 @@ from core.calibration.gyro_pca import (
     flexion_axis,
     sagittal_angle,
 )
-from core.calibration.heading import nearest_sign
-from core.calibration.mounting import read_declared_angle
-from core.calibration.standing import SensorAtRest, vertical_frame
-from core.calibration.walking import TRUNK
-from core.errors import CalibrationError, Notice
-from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
-from core.plurals import plural
-from core.recording import UniformRecording
-from core.rest import find_runs
-from core.rotation import find_lengths, find_vertical
+from sagittal.core.calibration.heading import nearest_sign
+from sagittal.core.calibration.mounting import read_declared_angle
+from sagittal.core.calibration.standing import SensorAtRest, vertical_frame
+from sagittal.core.calibration.walking import TRUNK
+from sagittal.core.errors import CalibrationError, Notice
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from sagittal.core.plurals import plural
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import find_runs
+from sagittal.core.rotation import find_lengths, find_vertical
 
 FunctionalMethod = Literal["hip_swing", "trunk_bow"]
 FUNCTIONAL: Final[tuple[FunctionalMethod, ...]] = ("hip_swing", "trunk_bow")

@@ -20,10 +20,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.filtering import low_pass
-from core.frames import Floats
-from core.rest import Window
-from core.rotation import rotate, wrap_angle
+from sagittal.core.filtering import low_pass
+from sagittal.core.frames import Floats
+from sagittal.core.rest import Window
+from sagittal.core.rotation import rotate, wrap_angle
 
 Complexes = NDArray[np.complex128]
 Part = tuple[int, int]

@@ -14,15 +14,15 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.joints import LEG_JOINTS, JointKind, list_worn_joints
-from core.agreement.params import JointSumParams
-from core.agreement.terms import find_thinning, find_usable, low_pass_terms, take_mean_out
-from core.agreement.windows import JointSums
-from core.calibration.forward import JointMeasure
-from core.calibration.heading import Part
-from core.frames import Bools, Floats, Segment
-from core.recording import UniformRecording
-from core.rotation import wrap_angle
+from sagittal.core.agreement.joints import LEG_JOINTS, JointKind, list_worn_joints
+from sagittal.core.agreement.params import JointSumParams
+from sagittal.core.agreement.terms import find_thinning, find_usable, low_pass_terms, take_mean_out
+from sagittal.core.agreement.windows import JointSums
+from sagittal.core.calibration.forward import JointMeasure
+from sagittal.core.calibration.heading import Part
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rotation import wrap_angle
 
 LEAST_CHUNKS: Final = 3
 """Seconds of walking with both sensors from which a joint is asked."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.frames import Bools, Protocol, Segment
-from core.recording import SensorSignals, Subject, UniformRecording
-from core.timeline.live import UniformBlock
+from sagittal.core.frames import Bools, Protocol, Segment
+from sagittal.core.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.timeline.live import UniformBlock
 
 
 @dataclass(frozen=True)

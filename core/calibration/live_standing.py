@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from core.frames import Floats, Segment
-from core.recording import UniformRecording
-from core.rest import RestParams, find_windows, measure_quietness
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import RestParams, find_windows, measure_quietness
 
 
 @dataclass(frozen=True)

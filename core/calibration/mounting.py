@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from core.frames import Floats, Segment
+from sagittal.core.frames import Floats, Segment
 
 FACE = np.array([0.0, 0.0, 1.0])
 """Outward axis of a sensor's housing in sensor coordinates (Xsens MTw and DOT: z away from the skin)."""

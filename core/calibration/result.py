@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from core.errors import Notice
-from core.frames import Bools, Floats, Posture, Segment
-from core.recording import UniformRecording
-from core.rest import Window as Window  # the calibration's windows are windows of rest and walking
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Bools, Floats, Posture, Segment
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import Window as Window  # the calibration's windows are windows of rest and walking
 
 
 @dataclass(frozen=True, eq=False)

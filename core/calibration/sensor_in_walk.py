@@ -15,12 +15,12 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import FOOT, Bools, Floats, Segment
-from core.fusion.attitude import AttitudeParams, AttitudeState, advance, estimate_orientation
-from core.peaks import find_peaks
-from core.recording import SensorSignals
-from core.rest import find_runs
-from core.rotation import conjugate, find_squares, multiply, rotate, wrap_angle
+from sagittal.core.frames import FOOT, Bools, Floats, Segment
+from sagittal.core.fusion.attitude import AttitudeParams, AttitudeState, advance, estimate_orientation
+from sagittal.core.peaks import find_peaks
+from sagittal.core.recording import SensorSignals
+from sagittal.core.rest import find_runs
+from sagittal.core.rotation import conjugate, find_squares, multiply, rotate, wrap_angle
 
 Indices = NDArray[np.int64]
 Span = tuple[int, int]

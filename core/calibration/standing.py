@@ -8,10 +8,10 @@ from math import radians
 
 import numpy as np
 
-from core.errors import SignalError
-from core.frames import SHANK, THIGH, Bools, Floats, Segment
-from core.recording import SensorSignals, UniformRecording
-from core.rest import (
+from sagittal.core.errors import SignalError
+from sagittal.core.frames import SHANK, THIGH, Bools, Floats, Segment
+from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.rest import (
     QuietParams,
     RestParams,
     Window,

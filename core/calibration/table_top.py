@@ -13,12 +13,12 @@ from math import acos, degrees, radians
 import numba
 import numpy as np
 
-from core.errors import CalibrationError, Notice
-from core.frames import R_NEUTRAL, Floats, Segment
-from core.recording import SensorSignals, UniformRecording
-from core.rest import QuietParams, Window, find_rest_windows, find_runs, index_window
-from core.rotation import conjugate, exp, from_matrix, mean, multiply, rotate, to_matrix
-from core.rotation.compiled import turn
+from sagittal.core.errors import CalibrationError, Notice
+from sagittal.core.frames import R_NEUTRAL, Floats, Segment
+from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.rest import QuietParams, Window, find_rest_windows, find_runs, index_window
+from sagittal.core.rotation import conjugate, exp, from_matrix, mean, multiply, rotate, to_matrix
+from sagittal.core.rotation.compiled import turn
 
 
 @dataclass(frozen=True)

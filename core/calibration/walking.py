@@ -8,11 +8,11 @@ from math import radians
 
 import numpy as np
 
-from core.filtering import low_pass
-from core.frames import Bools, Floats, Segment
-from core.recording import UniformRecording
-from core.rest import find_runs
-from core.rotation import conjugate, find_lengths, multiply, rotate, wrap_angle
+from sagittal.core.filtering import low_pass
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import find_runs
+from sagittal.core.rotation import conjugate, find_lengths, multiply, rotate, wrap_angle
 
 TRUNK: tuple[Segment, ...] = ("pelvis", "chest")
 DOWN: tuple[tuple[Segment, ...], ...] = (

@@ -1,7 +1,7 @@
 """Across visits: limits of change, and the verdict on a difference (docs/science/change.md)."""
 
-from core.change.facts import ChangedFact, SortedChanges, name_fact, sort_changes
-from core.change.limits import (
+from sagittal.core.change.facts import ChangedFact, SortedChanges, name_fact, sort_changes
+from sagittal.core.change.limits import (
     ChangeLimit,
     Repeatability,
     detectable_ratio,
@@ -9,7 +9,7 @@ from core.change.limits import (
     find_detectable_change,
     find_relevant_change,
 )
-from core.change.verdict import (
+from sagittal.core.change.verdict import (
     NOT_MEASURED_ALIKE,
     UNLIKE,
     Change,

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from core.change.verdict import Change
-from core.frames import Side
-from core.parameters.catalogue import CATALOGUE, require_entries
-from core.parameters.flats import OTHER
+from sagittal.core.change.verdict import Change
+from sagittal.core.frames import Side
+from sagittal.core.parameters.catalogue import CATALOGUE, require_entries
+from sagittal.core.parameters.flats import OTHER
 
 Fact = tuple[str, Side | None]
 """What changed: the figure that stands for it, and the side."""
@@ -27,7 +27,7 @@ SAME_AS: Final[Mapping[str, tuple[str, Literal["own", "other", "take"]]]] = {
 The rest of a stride is swing, a foot stands alone while the other swings, and two steps are a stride.
 """
 
-require_entries((*SAME_AS, *(to for to, _ in SAME_AS.values())), "core.change.facts")
+require_entries((*SAME_AS, *(to for to, _ in SAME_AS.values())), "sagittal.core.change.facts")
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.catalogue import CATALOGUE
 
 Limb = Literal["affected", "unaffected"]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from math import hypot
 from typing import Final, Literal
 
-from core.change.limits import (
+from sagittal.core.change.limits import (
     ChangeLimit,
     Limb,
     Repeatability,
@@ -20,15 +20,15 @@ from core.change.limits import (
     find_detectable_change,
     find_relevant_change,
 )
-from core.frames import Side
-from core.norms.place import place_value
-from core.norms.values import NormValue
-from core.parameters.kinematic import is_level
-from core.parameters.result import Parameter
-from core.parameters.symmetry import Symmetry
-from core.parameters.uncertainty import difference_half_width
-from core.parameters.variability import TOO_FEW, has_enough_values
-from core.scores import Score
+from sagittal.core.frames import Side
+from sagittal.core.norms.place import place_value
+from sagittal.core.norms.values import NormValue
+from sagittal.core.parameters.kinematic import is_level
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.symmetry import Symmetry
+from sagittal.core.parameters.uncertainty import difference_half_width
+from sagittal.core.parameters.variability import TOO_FEW, has_enough_values
+from sagittal.core.scores import Score
 
 Verdict = Literal["within_measurement_error", "real_change", "clinically_relevant"]
 

@@ -1,10 +1,10 @@
 """Orientations → gait events and the stride list."""
 
-from core.events.detection import detect, detect_contacts
-from core.events.flags import StrideParams
-from core.events.foot_contact import FootContactParams, compile_foot_contact_kernel
-from core.events.foot_pitch import FootPitchParams, compile_foot_pitch_kernel
-from core.events.strides import stride_list
+from sagittal.core.events.detection import detect, detect_contacts
+from sagittal.core.events.flags import StrideParams
+from sagittal.core.events.foot_contact import FootContactParams, compile_foot_contact_kernel
+from sagittal.core.events.foot_pitch import FootPitchParams, compile_foot_pitch_kernel
+from sagittal.core.events.strides import stride_list
 
 __all__ = [
     "FootContactParams",

@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import Notice
-from core.events.result import GaitEvents
-from core.frames import SIDES, Floats, Segment, Side
+from sagittal.core.errors import Notice
+from sagittal.core.events.result import GaitEvents
+from sagittal.core.frames import SIDES, Floats, Segment, Side
 
 FURTHEST_S: Final = 0.45
 """A lift further from a contact belongs to another step."""

@@ -15,9 +15,9 @@ from math import inf
 
 import numpy as np
 
-from core.events.result import GaitEvents
-from core.frames import SIDES
-from core.rest import Window
+from sagittal.core.events.result import GaitEvents
+from sagittal.core.frames import SIDES
+from sagittal.core.rest import Window
 
 
 @dataclass(frozen=True)

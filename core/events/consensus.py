@@ -15,18 +15,18 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from core.errors import Notice, ParameterError
-from core.events.detection import PITCH_RULE, detect
-from core.events.detection import SOURCE as REFINED
-from core.events.foot_pitch import FootPitchParams
-from core.events.gyro_peaks import LIMB, GyroPeakPresets, gyro_peak_events
-from core.events.result import EventKind, GaitEvent, GaitEvents
-from core.frames import FOOT, SIDES, Side
-from core.plurals import plural
+from sagittal.core.errors import Notice, ParameterError
+from sagittal.core.events.detection import PITCH_RULE, detect
+from sagittal.core.events.detection import SOURCE as REFINED
+from sagittal.core.events.foot_pitch import FootPitchParams
+from sagittal.core.events.gyro_peaks import LIMB, GyroPeakPresets, gyro_peak_events
+from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents
+from sagittal.core.frames import FOOT, SIDES, Side
+from sagittal.core.plurals import plural
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
-    from core.fusion.orientations import Orientations
+    from sagittal.core.fusion.orientations import Orientations
 
 SOURCE: Final = "consensus"
 KINDS: Final[tuple[EventKind, EventKind]] = ("ic", "tc")

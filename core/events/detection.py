@@ -14,23 +14,23 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from core.errors import Notice, SignalError
-from core.events.foot_contact import (
+from sagittal.core.errors import Notice, SignalError
+from sagittal.core.events.foot_contact import (
     ContactReports,
     FootContactParams,
     FootContactState,
     advance_foot_contacts,
 )
-from core.events.foot_movement import FootMovement, FootMovements
-from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
-from core.events.result import EventKind, GaitEvent, GaitEvents
-from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
-from core.held_samples import compare_neighbours, cut_blocks
-from core.rotation import angle_between
+from sagittal.core.events.foot_movement import FootMovement, FootMovements
+from sagittal.core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
+from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents
+from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
+from sagittal.core.held_samples import compare_neighbours, cut_blocks
+from sagittal.core.rotation import angle_between
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
-    from core.fusion.orientations import Orientations
+    from sagittal.core.fusion.orientations import Orientations
 
 SOURCE: Final = "foot_contact"
 """The detector of the product."""

@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from typing import Any, Final, Literal, cast, get_args
 
-from core.errors import ParameterError
-from core.events.result import EventKind, GaitEvent, GaitEvents, Stride, Strides
-from core.frames import SIDES, Side
+from sagittal.core.errors import ParameterError
+from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents, Stride, Strides
+from sagittal.core.frames import SIDES, Side
 
 EditKind = Literal["move_event", "add_event", "delete_event", "exclude_stride", "include_stride"]
 KINDS: Final[tuple[EditKind, ...]] = get_args(EditKind)

@@ -15,7 +15,7 @@ from typing import Final, get_args
 
 import numpy as np
 
-from core.events.result import Stride, StrideFlag
+from sagittal.core.events.result import Stride, StrideFlag
 
 ORDER: Final[tuple[StrideFlag, ...]] = get_args(StrideFlag)
 

@@ -17,8 +17,8 @@ from typing import Final, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from core.events.foot_pitch import FootPitchParams, FootPitchState
-from core.frames import Bools, Floats
+from sagittal.core.events.foot_pitch import FootPitchParams, FootPitchState
+from sagittal.core.frames import Bools, Floats
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class FootContactState:
     ) -> FootContactState:
         """State before the first sample at `rate_hz`."""
         # numba is slow to import and only needed here
-        from core.events.foot_contact_kernel import (
+        from sagittal.core.events.foot_contact_kernel import (
             BOTTOM,
             COUNTERS,
             HELD,
@@ -203,7 +203,7 @@ _NO_REPORTS: Final = ContactReports(_NONE, _NONE, _NONE, np.empty(0, np.bool_), 
 @cache
 def _load_kernel() -> Callable[..., int]:
     """The compiled rule: numba is slow to import and only needed to run it."""
-    from core.events.foot_contact_kernel import foot_contact_kernel
+    from sagittal.core.events.foot_contact_kernel import foot_contact_kernel
 
     return cast("Callable[..., int]", foot_contact_kernel)
 

@@ -8,8 +8,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numba import njit
 
-from core.events.foot_pitch_kernel import foot_pitch_kernel
-from core.inner import inner_njit
+from sagittal.core.events.foot_pitch_kernel import foot_pitch_kernel
+from sagittal.core.inner import inner_njit
 
 # not plain numbers: for each of those all that takes it would be compiled once more
 TC: Final = np.int64(0)

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from core.frames import FOOT, Floats, Segment
-from core.rotation import find_lengths
+from sagittal.core.frames import FOOT, Floats, Segment
+from sagittal.core.rotation import find_lengths
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
-    from core.calibration.result import CalibratedRecording, SegmentCalibration
-    from core.recording import SensorSignals
+    from sagittal.core.calibration.result import CalibratedRecording, SegmentCalibration
+    from sagittal.core.recording import SensorSignals
 
 
 class FootMovement(NamedTuple):

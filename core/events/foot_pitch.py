@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import Bools, Floats
+from sagittal.core.frames import Bools, Floats
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def advance_foot_pitch(
     kind, index, known = (np.empty(room, np.int64) for _ in range(3))
     offset = np.empty(room)
     # numba is slow to import and only needed here
-    from core.events.foot_pitch_kernel import foot_pitch_kernel
+    from sagittal.core.events.foot_pitch_kernel import foot_pitch_kernel
 
     # copies: the kernel is compiled once, for writable contiguous arrays of these types
     m = foot_pitch_kernel(

@@ -20,14 +20,14 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.errors import Notice, SignalError
-from core.events.result import GaitEvent, GaitEvents
-from core.filtering import low_pass
-from core.frames import FOOT, SHANK, SIDES, Bools, Floats, Oriented, Segment, Side
-from core.held_samples import compare_neighbours
-from core.peaks import find_peaks
-from core.plurals import plural
-from core.rotation import conjugate, log, multiply
+from sagittal.core.errors import Notice, SignalError
+from sagittal.core.events.result import GaitEvent, GaitEvents
+from sagittal.core.filtering import low_pass
+from sagittal.core.frames import FOOT, SHANK, SIDES, Bools, Floats, Oriented, Segment, Side
+from sagittal.core.held_samples import compare_neighbours
+from sagittal.core.peaks import find_peaks
+from sagittal.core.plurals import plural
+from sagittal.core.rotation import conjugate, log, multiply
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from core.errors import SignalError
-from core.events.detection import read_reports
-from core.events.foot_contact import FootContactParams, FootContactState, advance_foot_contacts
-from core.events.foot_movement import FootMovement
-from core.events.foot_pitch import FootPitchParams
-from core.events.result import GaitEvent
-from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
+from sagittal.core.errors import SignalError
+from sagittal.core.events.detection import read_reports
+from sagittal.core.events.foot_contact import FootContactParams, FootContactState, advance_foot_contacts
+from sagittal.core.events.foot_movement import FootMovement
+from sagittal.core.events.foot_pitch import FootPitchParams
+from sagittal.core.events.result import GaitEvent
+from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
 
 REMEMBERED: Final = 4
 """Events of a foot that may be told again: a foot-off, the contact after it, and a swing that is held."""

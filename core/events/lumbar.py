@@ -19,17 +19,17 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import Notice, SignalError
-from core.events.bouts import Bout, BoutParams, RowParams, plain_bouts, walking_bouts
-from core.events.periodicity import Periodicity, PeriodicityParams, step_times
-from core.events.steps import Step, Steps
-from core.filtering import low_pass, smooth_gaussian
-from core.frames import Bools, Floats, Segment, Side
-from core.peaks import find_peaks
-from core.plurals import plural
-from core.recording import SensorSignals, UniformRecording
-from core.rest import STANDING, find_rest_windows, find_runs
-from core.rotation import find_lengths
+from sagittal.core.errors import Notice, SignalError
+from sagittal.core.events.bouts import Bout, BoutParams, RowParams, plain_bouts, walking_bouts
+from sagittal.core.events.periodicity import Periodicity, PeriodicityParams, step_times
+from sagittal.core.events.steps import Step, Steps
+from sagittal.core.filtering import low_pass, smooth_gaussian
+from sagittal.core.frames import Bools, Floats, Segment, Side
+from sagittal.core.peaks import find_peaks
+from sagittal.core.plurals import plural
+from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.rest import STANDING, find_rest_windows, find_runs
+from sagittal.core.rotation import find_lengths
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 

@@ -10,8 +10,8 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from core.errors import Notice
-from core.frames import SIDES, Bools, Floats, Side
+from sagittal.core.errors import Notice
+from sagittal.core.frames import SIDES, Bools, Floats, Side
 
 EventKind = Literal["ic", "tc"]
 """ic = initial contact (foot strike), tc = terminal contact (foot off)."""

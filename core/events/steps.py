@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import Notice
-from core.events.bouts import Bout
-from core.frames import Segment, Side
+from sagittal.core.errors import Notice
+from sagittal.core.events.bouts import Bout
+from sagittal.core.frames import Segment, Side
 
 EDGE_STEPS: Final = 2
 """Steps at each end of a bout that are not steady: one stride (core/events/flags.py, edge_strides)."""

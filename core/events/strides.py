@@ -12,12 +12,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.errors import Notice
-from core.events.flags import StrideParams, decide_exclusions, flag_cycles
-from core.events.result import COMPARED, GaitEvents, Stride, StrideFlag, Strides, list_known
-from core.frames import FOOT, SIDES, Bools, Floats, Oriented, Side
-from core.plurals import plural
-from core.rotation import wrap_angle, yaw
+from sagittal.core.errors import Notice
+from sagittal.core.events.flags import StrideParams, decide_exclusions, flag_cycles
+from sagittal.core.events.result import COMPARED, GaitEvents, Stride, StrideFlag, Strides, list_known
+from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Oriented, Side
+from sagittal.core.plurals import plural
+from sagittal.core.rotation import wrap_angle, yaw
 
 NEAR_S: Final = 0.3
 """A contact so near lost samples may be wrong: it is found by what comes up to 0.25 s before and after it

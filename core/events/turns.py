@@ -18,11 +18,11 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.filtering import low_pass
-from core.frames import Bools, Floats, Oriented, Segment
-from core.held_samples import compare_neighbours
-from core.rest import find_runs
-from core.rotation import conjugate, log, multiply
+from sagittal.core.filtering import low_pass
+from sagittal.core.frames import Bools, Floats, Oriented, Segment
+from sagittal.core.held_samples import compare_neighbours
+from sagittal.core.rest import find_runs
+from sagittal.core.rotation import conjugate, log, multiply
 
 LEVELS: Final[tuple[tuple[Segment, ...], ...]] = (
     ("pelvis",),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from core.feedback.baseline import Baseline
-from core.feedback.cue import Cue, FeedbackState, GuardState, SideEffect, Summary, Tone
-from core.feedback.engine import Command, FeedbackEngine
-from core.feedback.prescription import (
+from sagittal.core.feedback.baseline import Baseline
+from sagittal.core.feedback.cue import Cue, FeedbackState, GuardState, SideEffect, Summary, Tone
+from sagittal.core.feedback.engine import Command, FeedbackEngine
+from sagittal.core.feedback.prescription import (
     Prescription,
     Progression,
     Schedule,
@@ -13,8 +13,8 @@ from core.feedback.prescription import (
     StopRule,
     Target,
 )
-from core.feedback.stride import StrideLike
-from core.feedback.summary import AnalysedStride, FeedbackSplit, split
+from sagittal.core.feedback.stride import StrideLike
+from sagittal.core.feedback.summary import AnalysedStride, FeedbackSplit, split
 
 __all__ = [
     "AnalysedStride",

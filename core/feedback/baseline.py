@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
-from core.feedback.fields import RecordFields
-from core.feedback.prescription import LEVELS
+from sagittal.core.feedback.fields import RecordFields
+from sagittal.core.feedback.prescription import LEVELS
 
 
 @dataclass(frozen=True)

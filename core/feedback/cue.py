@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Final, Literal, get_args
 
-from core.feedback.fields import RecordFields
-from core.frames import SIDES, Side
+from sagittal.core.feedback.fields import RecordFields
+from sagittal.core.frames import SIDES, Side
 
 Zone = Literal["in", "near_low", "near_high", "low", "high"]
 """in = green; near_* = yellow, one level width beside it; low, high = red."""

@@ -9,16 +9,16 @@ from __future__ import annotations
 from collections import deque
 from typing import Final, Literal, cast, get_args
 
-from core.errors import ParameterError
-from core.feedback.baseline import Baseline
-from core.feedback.cue import Cue, FeedbackState, Phase, Stop, WhyNot, Zone
-from core.feedback.guard import GuardWatch
-from core.feedback.levels import Ladder
-from core.feedback.prescription import Prescription
-from core.feedback.schedule import ScheduleSlot, find_slot
-from core.feedback.stride import StrideLike
-from core.feedback.tally import RunningStatistics
-from core.feedback.zones import make_zones
+from sagittal.core.errors import ParameterError
+from sagittal.core.feedback.baseline import Baseline
+from sagittal.core.feedback.cue import Cue, FeedbackState, Phase, Stop, WhyNot, Zone
+from sagittal.core.feedback.guard import GuardWatch
+from sagittal.core.feedback.levels import Ladder
+from sagittal.core.feedback.prescription import Prescription
+from sagittal.core.feedback.schedule import ScheduleSlot, find_slot
+from sagittal.core.feedback.stride import StrideLike
+from sagittal.core.feedback.tally import RunningStatistics
+from sagittal.core.feedback.zones import make_zones
 
 OPENING: Final = 10
 """Strides without feedback that give the start level where no earlier session does (our choice)."""

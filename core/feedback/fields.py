@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import inf, isfinite
 from typing import Any, Final, TypeVar
 
-from core.errors import ParameterError
+from sagittal.core.errors import ParameterError
 
 Name = TypeVar("Name")
 

@@ -13,12 +13,12 @@ from typing import Final, Generic, TypeVar
 
 import numpy as np
 
-from core.feedback.baseline import Baseline
-from core.feedback.cue import GuardState, SideEffect
-from core.feedback.prescription import Prescription
-from core.frames import SIDES, Floats, Side
-from core.norms.adults import adult_reference
-from core.norms.profile import SAGITTAL, gvs, overall_profile
+from sagittal.core.feedback.baseline import Baseline
+from sagittal.core.feedback.cue import GuardState, SideEffect
+from sagittal.core.feedback.prescription import Prescription
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.norms.adults import adult_reference
+from sagittal.core.norms.profile import SAGITTAL, gvs, overall_profile
 
 T = TypeVar("T")
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from statistics import fmean
 
-from core.feedback.baseline import Baseline
-from core.feedback.cue import Zone
-from core.feedback.prescription import LEVELS, Progression
-from core.feedback.zones import Zones
+from sagittal.core.feedback.baseline import Baseline
+from sagittal.core.feedback.cue import Zone
+from sagittal.core.feedback.prescription import LEVELS, Progression
+from sagittal.core.feedback.zones import Zones
 
 
 class Ladder:

@@ -11,10 +11,10 @@ from dataclasses import asdict, dataclass, field
 from math import isfinite
 from typing import Final, Literal, get_args
 
-from core.errors import ParameterError
-from core.feedback.fields import RecordFields
-from core.frames import SIDES, Side
-from core.parameters.catalogue import list_trainable
+from sagittal.core.errors import ParameterError
+from sagittal.core.feedback.fields import RecordFields
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.parameters.catalogue import list_trainable
 
 TargetSource = Literal["norm", "own_better_side", "own_baseline", "manual"]
 Mode = Literal["bar", "zone", "tone", "tick"]

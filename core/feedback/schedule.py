@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from core.feedback.prescription import Schedule
+from sagittal.core.feedback.prescription import Schedule
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from core.frames import Floats, Side
+from sagittal.core.frames import Floats, Side
 
 
 class StrideLike(Protocol):
-    """What is needed of a live stride (core.online.LiveStride)."""
+    """What is needed of a live stride (sagittal.core.online.LiveStride)."""
 
     @property
     def n(self) -> int:

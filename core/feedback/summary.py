@@ -12,9 +12,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from core.feedback.cue import Cue, Summary, WhyNot
-from core.feedback.tally import RunningStatistics
-from core.frames import SIDES, Side
+from sagittal.core.feedback.cue import Cue, Summary, WhyNot
+from sagittal.core.feedback.tally import RunningStatistics
+from sagittal.core.frames import SIDES, Side
 
 TOLERANCE_S: Final = 0.1
 """A cue and a stride of the same foot that begin within this are the same stride."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from core.feedback.cue import Summary
+from sagittal.core.feedback.cue import Summary
 
 
 class RunningStatistics:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Final
 
-from core.feedback.cue import Tone, Zone
-from core.feedback.prescription import LEVELS, Prescription, Towards
+from sagittal.core.feedback.cue import Tone, Zone
+from sagittal.core.feedback.prescription import LEVELS, Prescription, Towards
 
 BASE_HZ: Final = 440.0
 SEMITONES_PER_SD: Final = 4.0

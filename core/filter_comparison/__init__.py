@@ -3,7 +3,7 @@
 docs/science/filter-comparison.md says how each number is made.
 """
 
-from core.filter_comparison.compare import compare_filters
-from core.filter_comparison.result import FilterComparison, FilterRequest
+from sagittal.core.filter_comparison.compare import compare_filters
+from sagittal.core.filter_comparison.result import FilterComparison, FilterRequest
 
 __all__ = ["FilterComparison", "FilterRequest", "compare_filters"]

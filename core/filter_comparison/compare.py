@@ -8,26 +8,26 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import JointAngles
-from core.angles.measure import measure_angles
-from core.errors import EstimationError, Notice
-from core.events.result import Strides
-from core.filter_comparison.reference import (
+from sagittal.core.angles import JointAngles
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.errors import EstimationError, Notice
+from sagittal.core.events.result import Strides
+from sagittal.core.filter_comparison.reference import (
     PlacedReference,
     compare_by_bland_altman,
     lean_and_course,
     measure_reference_angles,
     place_reference,
 )
-from core.filter_comparison.result import (
+from sagittal.core.filter_comparison.result import (
     BlandAltman,
     FilterAgreement,
     FilterComparison,
     FilterRequest,
     ReferenceScores,
 )
-from core.filter_comparison.run import Clock, FilterRun, prepare_signals, run_filter
-from core.filter_comparison.spread import (
+from sagittal.core.filter_comparison.run import Clock, FilterRun, prepare_signals, run_filter
+from sagittal.core.filter_comparison.spread import (
     choose_samples,
     cut_into_cycles,
     pool_scores,
@@ -35,12 +35,12 @@ from core.filter_comparison.spread import (
     spread_of_angles,
     spread_of_segment,
 )
-from core.formats.orientation_table import OrientationTable
-from core.frames import SIDES, Bools, Floats, Segment
-from core.fusion.algorithms.choice import LABELS
-from core.fusion.orientations import Orientations
-from core.pipeline import Progress, TakeAnalysis
-from core.rest import Window
+from sagittal.core.formats.orientation_table import OrientationTable
+from sagittal.core.frames import SIDES, Bools, Floats, Segment
+from sagittal.core.fusion.algorithms.choice import LABELS
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.pipeline import Progress, TakeAnalysis
+from sagittal.core.rest import Window
 
 OWN_CHAIN: Final = "Sagittal, as analysed"
 """The product's own orientations, to which every filter is compared."""

@@ -14,13 +14,13 @@ from typing import Final
 import numpy as np
 from scipy.signal import correlate
 
-from core.angles.kernel import AngleKernel
-from core.errors import FormatError, Notice
-from core.filter_comparison.result import BlandAltman
-from core.formats.aliases import segment_named
-from core.formats.orientation_table import OrientationTable
-from core.frames import SEGMENTS, Bools, Floats, Segment
-from core.rotation import conjugate, log, mean, multiply, normalise, rotate, wrap_angle, yaw
+from sagittal.core.angles.kernel import AngleKernel
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.filter_comparison.result import BlandAltman
+from sagittal.core.formats.aliases import segment_named
+from sagittal.core.formats.orientation_table import OrientationTable
+from sagittal.core.frames import SEGMENTS, Bools, Floats, Segment
+from sagittal.core.rotation import conjugate, log, mean, multiply, normalise, rotate, wrap_angle, yaw
 
 LEAST_OVERLAP_S: Final = 5.0
 """Shortest stretch on which a lag is looked for (our choice: some strides)."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.errors import Notice
-from core.frames import Bools, Floats, Segment, Side
-from core.fusion.algorithms.benchmark import OrientationScore
-from core.fusion.algorithms.choice import require_filters
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Bools, Floats, Segment, Side
+from sagittal.core.fusion.algorithms.benchmark import OrientationScore
+from sagittal.core.fusion.algorithms.choice import require_filters
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,8 @@ class FilterRequest:
 
     Parameters
     ----------
-    filters : names of `core.fusion.algorithms.choice.LABELS`. magnetometer : whether those that can, use one.
+    filters : names of `sagittal.core.fusion.algorithms.choice.LABELS`.
+    magnetometer : whether those that can, use one.
 
     Raises
     ------

@@ -7,13 +7,13 @@ from typing import Final
 
 import numpy as np
 
-from core.events.result import Stride, Strides
-from core.filter_comparison.result import FilterSpread
-from core.frames import SIDES, SUFFIX, Bools, Floats, Segment, Side
-from core.fusion.algorithms.benchmark import OrientationScore, score_error
-from core.parameters.kinematic import POINTS
-from core.parameters.resample import resample
-from core.rotation import conjugate, exp, log, multiply, split_heading, wrap_angle
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.filter_comparison.result import FilterSpread
+from sagittal.core.frames import SIDES, SUFFIX, Bools, Floats, Segment, Side
+from sagittal.core.fusion.algorithms.benchmark import OrientationScore, score_error
+from sagittal.core.parameters.kinematic import POINTS
+from sagittal.core.parameters.resample import resample
+from sagittal.core.rotation import conjugate, exp, log, multiply, split_heading, wrap_angle
 
 
 def find_median(q: Floats, near: Floats) -> Floats:

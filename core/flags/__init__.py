@@ -4,7 +4,7 @@ A flag says "swing peak of the left knee 38°, limit 44.3°", never what a perso
 angle need the anatomical level: without goniometer angles the standing posture would decide them.
 """
 
-from core.flags.judge import Flag, judge_flags
-from core.flags.rules import RULES, Rule, classify_ambulation
+from sagittal.core.flags.judge import Flag, judge_flags
+from sagittal.core.flags.rules import RULES, Rule, classify_ambulation
 
 __all__ = ["RULES", "Flag", "Rule", "classify_ambulation", "judge_flags"]

@@ -9,18 +9,18 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.events.result import COMPARED
-from core.flags.rules import CURVES, RULES, SWING_TO_STANCE, Beyond, Kind, Rule
-from core.frames import SIDES, Side
-from core.norms.lookup import Norms, look_up_norms
-from core.norms.tables import wbds_group
-from core.parameters.anatomical_zero import anatomical_curves
-from core.parameters.catalogue import CurveFigure
-from core.parameters.catalogue.errors import LEVELS
-from core.parameters.flats import OTHER
-from core.parameters.kinematic import NO_STANDING, stride_figures
-from core.parameters.result import CycleCurves, Parameter
-from core.parameters.variability import NORMAL_95, TOO_FEW, Spread, differ, mean_and_sd
+from sagittal.core.events.result import COMPARED
+from sagittal.core.flags.rules import CURVES, RULES, SWING_TO_STANCE, Beyond, Kind, Rule
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.norms.lookup import Norms, look_up_norms
+from sagittal.core.norms.tables import wbds_group
+from sagittal.core.parameters.anatomical_zero import anatomical_curves
+from sagittal.core.parameters.catalogue import CurveFigure
+from sagittal.core.parameters.catalogue.errors import LEVELS
+from sagittal.core.parameters.flats import OTHER
+from sagittal.core.parameters.kinematic import NO_STANDING, stride_figures
+from sagittal.core.parameters.result import CycleCurves, Parameter
+from sagittal.core.parameters.variability import NORMAL_95, TOO_FEW, Spread, differ, mean_and_sd
 
 Zero = Literal["anatomical", "standing"]
 
@@ -101,7 +101,7 @@ def judge_flags(
     Parameters
     ----------
     curves : from standing; None without joint angles. parameters : of the session.
-    standing_deg : goniometer angles in standing (`core.standing_angles`). height_m : m, makes speed
+    standing_deg : goniometer angles in standing (`sagittal.core.standing_angles`). height_m : m, makes speed
         dimensionless.
     controls : own control group (`ControlGroup.norms`) for rules whose limit is theirs.
     age : years; below 18 limits made of the adult norms are not held against anybody. None = an adult.

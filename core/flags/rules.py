@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from core.norms.tables import WBDS, read_rows
-from core.norms.values import single_side_sd
-from core.parameters.catalogue import LIMIT_FIGURES, CurveFigure, list_curve_figures, require_entries
+from sagittal.core.norms.tables import WBDS, read_rows
+from sagittal.core.norms.values import single_side_sd
+from sagittal.core.parameters.catalogue import LIMIT_FIGURES, CurveFigure, list_curve_figures, require_entries
 
 Kind = Literal["value", "difference", "ratio"]
 Beyond = Literal["above", "below"]
@@ -141,7 +141,7 @@ RULES: Final[tuple[Rule, ...]] = (
 )
 """In the order of a report: knee, ankle and foot, pelvis and hip, sides against each other."""
 
-require_entries((rule.measure for rule in RULES), "core.flags.rules")
+require_entries((rule.measure for rule in RULES), "sagittal.core.flags.rules")
 
 PERRY_MPS: Final = (0.4, 0.8)
 """Speeds between the classes of walking after stroke: Perry et al. 1995 (docs/science/flags.md)."""

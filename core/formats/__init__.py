@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from core.formats.archive import ArchiveLimits, expand
-from core.formats.manifest import Manifest, manifest_of, parse_manifest
-from core.formats.parquet import write_recording
-from core.formats.reader import read_recording
-from core.formats.source import SourceFile, list_source_files, read_named_file
+from sagittal.core.formats.archive import ArchiveLimits, expand
+from sagittal.core.formats.manifest import Manifest, manifest_of, parse_manifest
+from sagittal.core.formats.parquet import write_recording
+from sagittal.core.formats.reader import read_recording
+from sagittal.core.formats.source import SourceFile, list_source_files, read_named_file
 
 __all__ = [
     "ArchiveLimits",

@@ -6,9 +6,9 @@ import json
 from itertools import pairwise
 from typing import Final, Literal
 
-from core.formats import live_reader, mapping_xml, parquet, text
-from core.formats.manifest import is_manifest
-from core.formats.vendors import find_vendor
+from sagittal.core.formats import live_reader, mapping_xml, parquet, text
+from sagittal.core.formats.manifest import is_manifest
+from sagittal.core.formats.vendors import find_vendor
 
 Kind = Literal["vendor", "parquet", "live", "manifest", "mapping", "table", "known", "empty", "other"]
 """vendor = of `VENDOR_FORMATS`; known = a sensor format we recognise but do not read; other = neither signals

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final, cast
 
-from core.frames import SEGMENTS, Segment
+from sagittal.core.frames import SEGMENTS, Segment
 
 _WHOLE: Final[dict[str, str]] = {
     "pelvis": "pelvis", "sacrum": "pelvis", "hip": "pelvis", "hips": "pelvis", "lumbar": "pelvis",

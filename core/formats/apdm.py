@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from core.errors import FormatError
-from core.formats import text
-from core.formats.aliases import segment_named
-from core.formats.draft import Draft, make_draft
-from core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, SourceSpec
+from sagittal.core.errors import FormatError
+from sagittal.core.formats import text
+from sagittal.core.formats.aliases import segment_named
+from sagittal.core.formats.draft import Draft, make_draft
+from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, SourceSpec
 
 LABEL: Final = "APDM CSV"
 _STUDIO: Final = b"Format=7,"

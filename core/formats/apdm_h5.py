@@ -12,11 +12,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from core.errors import FormatError
-from core.formats.aliases import segment_named
-from core.formats.draft import Draft, make_draft
-from core.formats.source_spec import SourceSpec
-from core.frames import Floats
+from sagittal.core.errors import FormatError
+from sagittal.core.formats.aliases import segment_named
+from sagittal.core.formats.draft import Draft, make_draft
+from sagittal.core.formats.source_spec import SourceSpec
+from sagittal.core.frames import Floats
 
 LABEL: Final = "APDM HDF5"
 MAGIC: Final = b"\x89HDF\r\n\x1a\n"

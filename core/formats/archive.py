@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Final
 
-from core.errors import ArchiveError
-from core.formats.source import SourceFile
+from sagittal.core.errors import ArchiveError
+from sagittal.core.formats.source import SourceFile
 
 ZIP_MAGIC = (b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")
 GZIP_MAGIC = b"\x1f\x8b"

@@ -12,12 +12,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
-from core.errors import FormatError
-from core.formats import text
-from core.formats.aliases import segment_named
-from core.formats.json_tree import read_json
-from core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, SourceSpec
-from core.frames import Segment
+from sagittal.core.errors import FormatError
+from sagittal.core.formats import text
+from sagittal.core.formats.aliases import segment_named
+from sagittal.core.formats.json_tree import read_json
+from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, SourceSpec
+from sagittal.core.frames import Segment
 
 _CHANNELS: Final = "_channels.tsv"
 _MOTION: Final = "_motion.tsv"

@@ -16,11 +16,11 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.errors import FormatError, Notice
-from core.formats.draft import Draft
-from core.formats.source_spec import SourceSpec
-from core.frames import GRAVITY, Floats
-from core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.formats.draft import Draft
+from sagittal.core.formats.source_spec import SourceSpec
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.sample_blocks import LongStream, SampleBlock
 
 LABEL: Final = "Axivity CWA"
 MAGIC: Final = b"MD\xfc\x03"

@@ -13,16 +13,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from core import rotation
-from core.correction import AGAINST
-from core.errors import FormatError, Notice
-from core.formats import text
-from core.formats.aliases import segment_in
-from core.formats.draft import Draft, make_draft
-from core.formats.json_tree import read_json
-from core.formats.source import stem_of
-from core.formats.source_spec import GYR_UNITS, SourceSpec
-from core.frames import GRAVITY, Floats
+from sagittal.core import rotation
+from sagittal.core.correction import AGAINST
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.formats import text
+from sagittal.core.formats.aliases import segment_in
+from sagittal.core.formats.draft import Draft, make_draft
+from sagittal.core.formats.json_tree import read_json
+from sagittal.core.formats.source import stem_of
+from sagittal.core.formats.source_spec import GYR_UNITS, SourceSpec
+from sagittal.core.frames import GRAVITY, Floats
 
 LABEL: Final = "DeviceMotion JSON"
 SIGN_ASSUMED: Final = "sign_assumed"

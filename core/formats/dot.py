@@ -13,12 +13,12 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import FormatError, Notice
-from core.formats import text
-from core.formats.aliases import segment_in
-from core.formats.draft import WRAP_32, Draft, make_draft
-from core.formats.source import stem_of
-from core.formats.source_spec import ACC_UNITS, GYR_UNITS, SourceSpec
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.formats import text
+from sagittal.core.formats.aliases import segment_in
+from sagittal.core.formats.draft import WRAP_32, Draft, make_draft
+from sagittal.core.formats.source import stem_of
+from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, SourceSpec
 
 LABEL: Final = "Movella DOT CSV"
 _HEAD: Final = 40

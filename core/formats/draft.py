@@ -15,11 +15,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.errors import FormatError, Notice, Severity
-from core.frames import Floats, Segment
-from core.held_samples import cut_blocks, is_complete
-from core.plurals import plural
-from core.recording import ImuStream
+from sagittal.core.errors import FormatError, Notice, Severity
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.held_samples import cut_blocks, is_complete
+from sagittal.core.plurals import plural
+from sagittal.core.recording import ImuStream
 
 WRAP_16: Final = 1 << 16
 WRAP_32: Final = 1 << 32

@@ -12,7 +12,7 @@ from collections import Counter
 from math import isfinite
 from typing import Final
 
-from core.errors import ManifestError
+from sagittal.core.errors import ManifestError
 
 MOST_DEPTH: Final = 64
 """Objects and lists inside each other; a manifest has five levels."""

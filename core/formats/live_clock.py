@@ -15,8 +15,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.formats.live_hello import Hello
-from core.formats.live_log import SampleBatch
+from sagittal.core.formats.live_hello import Hello
+from sagittal.core.formats.live_log import SampleBatch
 
 SETTLING_US: Final = 1_000_000
 """Samples of a clock by which it is aligned."""

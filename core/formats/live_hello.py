@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, cast, get_args
 
-from core.errors import InputError
-from core.formats.json_tree import read_json
-from core.frames import SEGMENTS, Segment
+from sagittal.core.errors import InputError
+from sagittal.core.formats.json_tree import read_json
+from sagittal.core.frames import SEGMENTS, Segment
 
 PROTOCOL: Final = "sagittal.live.v1"
 MOST_STREAMS: Final = 64

@@ -17,9 +17,9 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from core.errors import InputError
-from core.formats.json_tree import read_json
-from core.formats.live_hello import (
+from sagittal.core.errors import InputError
+from sagittal.core.formats.json_tree import read_json
+from sagittal.core.formats.live_hello import (
     PROTOCOL,
     Clock,
     Hello,

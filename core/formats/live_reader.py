@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from core.errors import FormatError, InputError, Notice
-from core.formats.draft import MOST_OUT_OF_ORDER, grade_loss, signal_digest
-from core.formats.live_clock import LiveClock, Micros, sample_times_us
-from core.formats.live_log import (
+from sagittal.core.errors import FormatError, InputError, Notice
+from sagittal.core.formats.draft import MOST_OUT_OF_ORDER, grade_loss, signal_digest
+from sagittal.core.formats.live_clock import LiveClock, Micros, sample_times_us
+from sagittal.core.formats.live_log import (
     FILE_MARK,
     Finish,
     Hello,
@@ -27,9 +27,9 @@ from core.formats.live_log import (
     scan,
     view_samples,
 )
-from core.frames import Floats
-from core.plurals import plural
-from core.recording import ImuStream, Recording
+from sagittal.core.frames import Floats
+from sagittal.core.plurals import plural
+from sagittal.core.recording import ImuStream, Recording
 
 
 def looks_like(data: bytes) -> bool:

@@ -7,9 +7,9 @@ from xml.etree.ElementTree import ParseError
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
-from core.errors import FormatError
-from core.formats.aliases import segment_named
-from core.frames import Segment
+from sagittal.core.errors import FormatError
+from sagittal.core.formats.aliases import segment_named
+from sagittal.core.frames import Segment
 
 
 def looks_like(data: bytes) -> bool:

@@ -14,13 +14,13 @@ from xml.parsers import expat
 import numpy as np
 from defusedxml import DTDForbidden
 
-from core import rotation
-from core.errors import FormatError, Notice
-from core.formats import text
-from core.formats.aliases import segment_named
-from core.formats.draft import Draft, grade_loss, make_draft
-from core.formats.source_spec import SourceSpec
-from core.frames import GRAVITY, Floats
+from sagittal.core import rotation
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.formats import text
+from sagittal.core.formats.aliases import segment_named
+from sagittal.core.formats.draft import Draft, grade_loss, make_draft
+from sagittal.core.formats.source_spec import SourceSpec
+from sagittal.core.frames import GRAVITY, Floats
 
 LABEL: Final = "Xsens MVNX"
 _MOST_SENSORS: Final = 64

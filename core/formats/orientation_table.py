@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import FormatError, Notice
-from core.formats import text
-from core.formats.source_spec import TIME_UNITS
-from core.frames import Floats
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.formats import text
+from sagittal.core.formats.source_spec import TIME_UNITS
+from sagittal.core.frames import Floats
 
 _STO_MARK: Final = b"endheader"
 _STO_LINES: Final = 50

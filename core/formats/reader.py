@@ -8,21 +8,21 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from core.correction import AS_READ, SensorCorrection
-from core.errors import ArchiveError, FormatError, InputError, ManifestError, Notice
-from core.formats import _sniff, bids, cwa, live_reader, mapping_xml, parquet, table, text
-from core.formats.aliases import segment_named
-from core.formats.archive import EPISODE_MANIFEST, ArchiveLimits, expand
-from core.formats.device_motion import SIGN_ASSUMED
-from core.formats.draft import Draft, finish
-from core.formats.manifest import Manifest, parse_manifest
-from core.formats.source import SourceFile, digest_file, sha256
-from core.formats.source_spec import SourceSpec
-from core.formats.vendors import find_vendor, list_formats
-from core.frames import Segment
-from core.plurals import plural
-from core.recording import ImuStream, Recording
-from core.sample_blocks import LongStream
+from sagittal.core.correction import AS_READ, SensorCorrection
+from sagittal.core.errors import ArchiveError, FormatError, InputError, ManifestError, Notice
+from sagittal.core.formats import _sniff, bids, cwa, live_reader, mapping_xml, parquet, table, text
+from sagittal.core.formats.aliases import segment_named
+from sagittal.core.formats.archive import EPISODE_MANIFEST, ArchiveLimits, expand
+from sagittal.core.formats.device_motion import SIGN_ASSUMED
+from sagittal.core.formats.draft import Draft, finish
+from sagittal.core.formats.manifest import Manifest, parse_manifest
+from sagittal.core.formats.source import SourceFile, digest_file, sha256
+from sagittal.core.formats.source_spec import SourceSpec
+from sagittal.core.formats.vendors import find_vendor, list_formats
+from sagittal.core.frames import Segment
+from sagittal.core.plurals import plural
+from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.sample_blocks import LongStream
 
 _SHOWN = 5
 
@@ -68,7 +68,7 @@ def read_recording(
     Raises
     ------
     ArchiveError
-        An archive breaks a limit or is damaged (codes in `core.formats.archive`).
+        An archive breaks a limit or is damaged (codes in `sagittal.core.formats.archive`).
     FormatError
         unknown_format when nothing could be read (with what was tried), or the problem of the only file;
         duplicate_device, counter_restart.

@@ -12,12 +12,12 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import FormatError, Notice
-from core.formats import text
-from core.formats.aliases import segment_in
-from core.formats.draft import Draft, make_draft
-from core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, SourceSpec
-from core.frames import GRAVITY, Floats
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.formats import text
+from sagittal.core.formats.aliases import segment_in
+from sagittal.core.formats.draft import Draft, make_draft
+from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, SourceSpec
+from sagittal.core.frames import GRAVITY, Floats
 
 LABEL: Final = "Shimmer Consensys CSV"
 _HEAD: Final = 5

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from core.errors import InputError
+from sagittal.core.errors import InputError
 
 _PIECE: Final = 1 << 20
 
@@ -22,7 +22,7 @@ class SourceFile:
     ----------
     name : path as the sender gave it, with forward slashes; any Unicode.
     size : bytes (for an archive member the size its directory declares).
-    read : returns all bytes; may raise `core.errors.ArchiveError`.
+    read : returns all bytes; may raise `sagittal.core.errors.ArchiveError`.
     opener : opens the bytes to be read piece by piece; None = they can only be had at once.
     """
 

@@ -8,9 +8,9 @@ from fnmatch import fnmatchcase
 from types import MappingProxyType
 from typing import Final
 
-from core.errors import ManifestError
-from core.formats.json_tree import JsonNode
-from core.frames import GRAVITY
+from sagittal.core.errors import ManifestError
+from sagittal.core.formats.json_tree import JsonNode
+from sagittal.core.frames import GRAVITY
 
 ACC_UNITS: Final[dict[str, float]] = {
     "m/s2": 1.0,

@@ -11,13 +11,13 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import FormatError, ManifestError, Notice
-from core.formats import text
-from core.formats.draft import Draft, make_draft
-from core.formats.source import SourceFile
-from core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, Counter, SourceSpec
-from core.frames import Floats
-from core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.errors import FormatError, ManifestError, Notice
+from sagittal.core.formats import text
+from sagittal.core.formats.draft import Draft, make_draft
+from sagittal.core.formats.source import SourceFile
+from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, Counter, SourceSpec
+from sagittal.core.frames import Floats
+from sagittal.core.sample_blocks import LongStream, SampleBlock
 
 _ROWS_TO_LOOK_AT = 4
 _CHUNK: Final = 1 << 23

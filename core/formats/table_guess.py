@@ -13,15 +13,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from core.errors import FormatError, ManifestError
-from core.formats import table, text
-from core.formats._sniff import sniff
-from core.formats.aliases import segment_in
-from core.formats.archive import is_gzip, is_zip
-from core.formats.draft import Draft
-from core.formats.source import SourceFile, stem_of
-from core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, SourceSpec
-from core.frames import GRAVITY, Floats
+from sagittal.core.errors import FormatError, ManifestError
+from sagittal.core.formats import table, text
+from sagittal.core.formats._sniff import sniff
+from sagittal.core.formats.aliases import segment_in
+from sagittal.core.formats.archive import is_gzip, is_zip
+from sagittal.core.formats.draft import Draft
+from sagittal.core.formats.source import SourceFile, stem_of
+from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, SourceSpec
+from sagittal.core.frames import GRAVITY, Floats
 
 PIECE: Final = 1 << 21
 """Bytes of the beginning that are read: minutes of a few sensors."""

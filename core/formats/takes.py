@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from core.formats import _sniff, bids, live_reader, mapping_xml, parquet, text
-from core.formats.archive import is_gzip, is_zip
-from core.formats.vendors import find_vendor
+from sagittal.core.formats import _sniff, bids, live_reader, mapping_xml, parquet, text
+from sagittal.core.formats.archive import is_gzip, is_zip
+from sagittal.core.formats.vendors import find_vendor
 
 MANIFEST: Final = "manifest.json"
 _HEAD: Final = 1 << 16

@@ -12,10 +12,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pc
 
-from core.errors import FormatError, Notice
-from core.formats.draft import grade_loss
-from core.frames import Floats
-from core.plurals import plural
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.formats.draft import grade_loss
+from sagittal.core.frames import Floats
+from sagittal.core.plurals import plural
 
 SEPARATORS: Final = (b"\t", b";", b",", b"|", b" ")
 MISSING: Final = ["", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "null", "NULL", "-", "None"]

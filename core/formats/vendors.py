@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from core.formats import apdm, apdm_h5, cwa, device_motion, dot, mvnx, shimmer, xsens
-from core.formats.draft import Draft
-from core.formats.source_spec import SourceSpec
+from sagittal.core.formats import apdm, apdm_h5, cwa, device_motion, dot, mvnx, shimmer, xsens
+from sagittal.core.formats.draft import Draft
+from sagittal.core.formats.source_spec import SourceSpec
 
 
 @dataclass(frozen=True)

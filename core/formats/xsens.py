@@ -12,13 +12,13 @@ from typing import Final
 
 import numpy as np
 
-from core import rotation
-from core.errors import FormatError, Notice
-from core.formats import text
-from core.formats.draft import Draft
-from core.formats.source import stem_of
-from core.formats.source_spec import ACC_UNITS, GYR_UNITS, SourceSpec
-from core.frames import Floats
+from sagittal.core import rotation
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.formats import text
+from sagittal.core.formats.draft import Draft
+from sagittal.core.formats.source import stem_of
+from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, SourceSpec
+from sagittal.core.frames import Floats
 
 _ACC: Final = ("Acc_X", "Acc_Y", "Acc_Z")
 _GYR: Final = ("Gyr_X", "Gyr_Y", "Gyr_Z")

@@ -7,14 +7,20 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import Notice
-from core.functional_tests.result import FunctionalTest, TimedSegment, state_figures
-from core.functional_tests.rising import SIT_TO_STAND, STAND_TO_SIT, PostureChange, RisingParams, find_changes
-from core.functional_tests.trunk import TrunkMotion
-from core.parameters.catalogue import list_names
-from core.parameters.catalogue.entry import CHAIR
-from core.plurals import plural
-from core.recording import GivenLimits
+from sagittal.core.errors import Notice
+from sagittal.core.functional_tests.result import FunctionalTest, TimedSegment, state_figures
+from sagittal.core.functional_tests.rising import (
+    SIT_TO_STAND,
+    STAND_TO_SIT,
+    PostureChange,
+    RisingParams,
+    find_changes,
+)
+from sagittal.core.functional_tests.trunk import TrunkMotion
+from sagittal.core.parameters.catalogue import list_names
+from sagittal.core.parameters.catalogue.entry import CHAIR
+from sagittal.core.plurals import plural
+from sagittal.core.recording import GivenLimits
 
 RISES: Final = 5
 

@@ -13,24 +13,24 @@ from typing import Any, Final
 
 import numpy as np
 
-from core.errors import EstimationError
-from core.events.bouts import find_bouts
-from core.events.result import GaitEvent, GaitEvents, Stride, Strides
-from core.events.turns import Turn, TurnParams
-from core.frames import FOOT, Floats, Protocol, Segment
-from core.functional_tests.chair import LONGEST_S, measure_chair_rises
-from core.functional_tests.params import FunctionalTestParams
-from core.functional_tests.result import FunctionalTest, GuidedTestView, TestPhase, shift_test
-from core.functional_tests.rising import SIT_TO_STAND
-from core.functional_tests.sway import STANDING_QUIETLY, measure_sway
-from core.functional_tests.trunk import TRUNK, follow_trunk
-from core.functional_tests.tug import measure_tug
-from core.functional_tests.walks import LENGTH, measure_six_minutes, measure_ten_metres
-from core.measure import MeasuredGait
-from core.parameters.live_stride import LiveStride
-from core.recording import GivenLimits, SensorSignals, Subject, UniformRecording
-from core.rest import QuietParams, find_rest_windows, measure_quietness
-from core.timeline.live import UniformBlock
+from sagittal.core.errors import EstimationError
+from sagittal.core.events.bouts import find_bouts
+from sagittal.core.events.result import GaitEvent, GaitEvents, Stride, Strides
+from sagittal.core.events.turns import Turn, TurnParams
+from sagittal.core.frames import FOOT, Floats, Protocol, Segment
+from sagittal.core.functional_tests.chair import LONGEST_S, measure_chair_rises
+from sagittal.core.functional_tests.params import FunctionalTestParams
+from sagittal.core.functional_tests.result import FunctionalTest, GuidedTestView, TestPhase, shift_test
+from sagittal.core.functional_tests.rising import SIT_TO_STAND
+from sagittal.core.functional_tests.sway import STANDING_QUIETLY, measure_sway
+from sagittal.core.functional_tests.trunk import TRUNK, follow_trunk
+from sagittal.core.functional_tests.tug import measure_tug
+from sagittal.core.functional_tests.walks import LENGTH, measure_six_minutes, measure_ten_metres
+from sagittal.core.measure import MeasuredGait
+from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.recording import GivenLimits, SensorSignals, Subject, UniformRecording
+from sagittal.core.rest import QuietParams, find_rest_windows, measure_quietness
+from sagittal.core.timeline.live import UniformBlock
 
 CHAIR_TESTS: Final = ("tug", "five_sit_to_stand")
 STANDING_TESTS: Final = ("standing_eyes_open", "standing_eyes_closed")

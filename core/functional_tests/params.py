@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from core.functional_tests.rising import RisingParams
-from core.functional_tests.sway import SwayParams
-from core.functional_tests.walks import WalkTestParams
+from sagittal.core.functional_tests.rising import RisingParams
+from sagittal.core.functional_tests.sway import SwayParams
+from sagittal.core.functional_tests.walks import WalkTestParams
 
 
 @dataclass(frozen=True)

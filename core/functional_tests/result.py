@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from math import hypot
 from typing import Literal
 
-from core.errors import Notice
-from core.frames import Protocol, Segment
-from core.parameters.catalogue import CATALOGUE, unit_of
-from core.parameters.result import Parameter
-from core.parameters.variability import NORMAL_95
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Protocol, Segment
+from sagittal.core.parameters.catalogue import CATALOGUE, unit_of
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.variability import NORMAL_95
 
 
 @dataclass(frozen=True)

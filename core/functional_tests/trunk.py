@@ -11,12 +11,12 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import EstimationError
-from core.frames import GRAVITY, Bools, Floats, Segment
-from core.fusion.attitude import AttitudeParams, estimate_orientation
-from core.recording import UniformRecording
-from core.rest import find_rest_windows, index_window
-from core.rotation import exp, find_vertical
+from sagittal.core.errors import EstimationError
+from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
+from sagittal.core.fusion.attitude import AttitudeParams, estimate_orientation
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import find_rest_windows, index_window
+from sagittal.core.rotation import exp, find_vertical
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 """Sensors that tell how the trunk moves, the better known first."""

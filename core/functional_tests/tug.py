@@ -5,15 +5,21 @@ from __future__ import annotations
 from math import degrees, radians
 from typing import Final
 
-from core.errors import Notice
-from core.events.turns import Turn, TurnParams, find_turns
-from core.functional_tests.result import FunctionalTest, TimedSegment, state_figures
-from core.functional_tests.rising import SIT_TO_STAND, STAND_TO_SIT, PostureChange, RisingParams, find_changes
-from core.functional_tests.trunk import TrunkMotion
-from core.parameters.catalogue import list_names
-from core.parameters.catalogue.entry import TUG
-from core.plurals import plural
-from core.recording import GivenLimits
+from sagittal.core.errors import Notice
+from sagittal.core.events.turns import Turn, TurnParams, find_turns
+from sagittal.core.functional_tests.result import FunctionalTest, TimedSegment, state_figures
+from sagittal.core.functional_tests.rising import (
+    SIT_TO_STAND,
+    STAND_TO_SIT,
+    PostureChange,
+    RisingParams,
+    find_changes,
+)
+from sagittal.core.functional_tests.trunk import TrunkMotion
+from sagittal.core.parameters.catalogue import list_names
+from sagittal.core.parameters.catalogue.entry import TUG
+from sagittal.core.plurals import plural
+from sagittal.core.recording import GivenLimits
 
 HALF_TURN: Final = radians(120.0)
 """Least angle of a turn around the mark, and of the one before the chair (our choice)."""

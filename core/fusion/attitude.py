@@ -20,10 +20,10 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from core.errors import EstimationError, ParameterError
-from core.frames import Bools, Floats
-from core.held_samples import SampleSeries, cut_blocks
-from core.rotation import compiled, find_middle
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.held_samples import SampleSeries, cut_blocks
+from sagittal.core.rotation import compiled, find_middle
 
 
 @dataclass(frozen=True)

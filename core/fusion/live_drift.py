@@ -16,8 +16,8 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.frames import Bools, Floats, Segment
-from core.fusion.drift import DriftParams
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.fusion.drift import DriftParams
 
 REFERENCE_S: Final = 15.0
 """Straight walking that defines the mean; half of offline, as a session begins with the calibration walk."""

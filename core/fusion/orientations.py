@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from core.errors import Notice
-from core.frames import Bools, Floats, Segment
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Bools, Floats, Segment
 
 
 class LastReading(dict[Segment, Floats]):

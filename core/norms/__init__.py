@@ -1,10 +1,10 @@
 """Reference tables (package data) and their lookup."""
 
-from core.norms.adults import adult_reference, adult_reference_at_speed
-from core.norms.kinematics import NormBand, NormBands, adult_kinematics
-from core.norms.lookup import Norms, look_up_norms
-from core.norms.place import NormPlacement
-from core.norms.values import NormValue, NormValues, angle_values, predict_at_speed, temporal_values
+from sagittal.core.norms.adults import adult_reference, adult_reference_at_speed
+from sagittal.core.norms.kinematics import NormBand, NormBands, adult_kinematics
+from sagittal.core.norms.lookup import Norms, look_up_norms
+from sagittal.core.norms.place import NormPlacement
+from sagittal.core.norms.values import NormValue, NormValues, angle_values, predict_at_speed, temporal_values
 
 __all__ = [
     "NormBand",

@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import cache
 from typing import Final
 
-from core.norms.at_speed import is_matched, reference_at_speed
-from core.norms.kinematics import adult_kinematics
-from core.norms.profile import MODES, CurveReference, Mode, ScoreSpread
-from core.norms.speed import WalkingSpeed
-from core.norms.tables import WBDS, WBDS_N, read_rows, wbds_group
+from sagittal.core.norms.at_speed import is_matched, reference_at_speed
+from sagittal.core.norms.kinematics import adult_kinematics
+from sagittal.core.norms.profile import MODES, CurveReference, Mode, ScoreSpread
+from sagittal.core.norms.speed import WalkingSpeed
+from sagittal.core.norms.tables import WBDS, WBDS_N, read_rows, wbds_group
 
 _KEYS: Final = {
     "GPS_side_9var": "gps_side",

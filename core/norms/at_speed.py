@@ -18,13 +18,13 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import GRAVITY, Floats
-from core.norms.kinematics import NormBand, adult_kinematics
-from core.norms.profile import MODES, PROFILES, CurveReference, ScoreSpread
-from core.norms.speed import COMFORTABLE, SLOWEST
-from core.norms.tables import read_columns, read_rows
-from core.norms.values import NormValue, angle_values, explain_difference, single_side_sd
-from core.parameters.catalogue import CurveFigure, find_entry, require_entries
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.norms.kinematics import NormBand, adult_kinematics
+from sagittal.core.norms.profile import MODES, PROFILES, CurveReference, ScoreSpread
+from sagittal.core.norms.speed import COMFORTABLE, SLOWEST
+from sagittal.core.norms.tables import read_columns, read_rows
+from sagittal.core.norms.values import NormValue, angle_values, explain_difference, single_side_sd
+from sagittal.core.parameters.catalogue import CurveFigure, find_entry, require_entries
 
 ASKED: Final = "healthy adults asked to walk at this speed"
 """Who the people are, printed beside every such norm. Who is slow from habit, being old, moves less."""
@@ -141,7 +141,7 @@ _ROWS: Final[Mapping[str, str]] = {
 _OF_MEAN_CURVE: Final = ("hip_flexion_min_deg", "hip_flexion_rom_deg", "pelvis_obliquity_max_swing_deg")
 """Figures read from the mean curve, for want of single ones; a value at contact needs no single curves."""
 
-require_entries((*_ROWS, *_OF_MEAN_CURVE), "core.norms.at_speed")
+require_entries((*_ROWS, *_OF_MEAN_CURVE), "sagittal.core.norms.at_speed")
 
 _STATISTICS: Final[Mapping[str, Callable[[Floats], float]]] = {"min": np.min, "max": np.max, "range": np.ptp}
 

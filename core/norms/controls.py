@@ -13,17 +13,17 @@ from typing import Final
 
 import numpy as np
 
-from core.events.result import COMPARED
-from core.frames import SIDES, Floats, Side
-from core.norms.kinematics import NormBand
-from core.norms.lookup import Norms
-from core.norms.profile import SAGITTAL, CurveReference, MeanCurves, gather_curves, leave_one_out
-from core.norms.speed import walking_speed
-from core.norms.values import NormValue, Sex
-from core.parameters.kinematic import MEAN_ZERO, mean_curve
-from core.parameters.result import CycleCurves, Parameter
-from core.parameters.variability import has_enough_values
-from core.plurals import plural
+from sagittal.core.events.result import COMPARED
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.norms.kinematics import NormBand
+from sagittal.core.norms.lookup import Norms
+from sagittal.core.norms.profile import SAGITTAL, CurveReference, MeanCurves, gather_curves, leave_one_out
+from sagittal.core.norms.speed import walking_speed
+from sagittal.core.norms.values import NormValue, Sex
+from sagittal.core.parameters.kinematic import MEAN_ZERO, mean_curve
+from sagittal.core.parameters.result import CycleCurves, Parameter
+from sagittal.core.parameters.variability import has_enough_values
+from sagittal.core.plurals import plural
 
 FEWEST: Final = 5
 """People below which there is no group (our choice; percentiles allow for small groups, see `place`)."""

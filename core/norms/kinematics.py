@@ -2,7 +2,7 @@
 
 The reference angles are anatomical, ours are zero at the person's own standing. A band may stand behind a
 curve only where both are measured from the same zero, so every band says its own; curves of a person whose
-standing was read with a goniometer have that of the reference (`core.parameters.anatomical_zero`).
+standing was read with a goniometer have that of the reference (`sagittal.core.parameters.anatomical_zero`).
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.frames import Floats
-from core.norms.tables import LEVEL, WBDS, WBDS_N, read_rows, wbds_group
+from sagittal.core.frames import Floats
+from sagittal.core.norms.tables import LEVEL, WBDS, WBDS_N, read_rows, wbds_group
 
 Zero = Literal["anatomical", "standing", "walking", "stride_mean"]
 """What a curve is measured from: anatomy, the person's own standing, its mean over straight walking where
@@ -72,7 +72,7 @@ class NormBands:
 def adult_kinematics(age: float | None) -> NormBands:
     """Reference bands for a person of this age, walking overground at comfortable speed (1.25 ± 0.16 m/s).
 
-    Those at a person's own speed: `core.norms.at_speed`.
+    Those at a person's own speed: `sagittal.core.norms.at_speed`.
 
     Parameters
     ----------

@@ -6,16 +6,16 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from core.norms.at_speed import (
+from sagittal.core.norms.at_speed import (
     angle_values_at_speed,
     bands_at_speed,
     is_matched,
     walkway_values_at_speed,
 )
-from core.norms.kinematics import NormBand, adult_kinematics
-from core.norms.place import NormPlacement, place_difference, place_value
-from core.norms.speed import SPEED_SD, WalkingSpeed, walking_speed
-from core.norms.values import (
+from sagittal.core.norms.kinematics import NormBand, adult_kinematics
+from sagittal.core.norms.place import NormPlacement, place_difference, place_value
+from sagittal.core.norms.speed import SPEED_SD, WalkingSpeed, walking_speed
+from sagittal.core.norms.values import (
     NormValue,
     Pace,
     Sex,
@@ -38,7 +38,7 @@ class Norms:
     speed : None = not measured; then all adults at comfortable speed are the reference.
     pace : class of the walkway norms that this speed falls into.
     values : parameter → reference, each with n, group, source and whether it is comparable. Adults below
-        comfortable speed: of healthy adults asked to walk as slowly (`core.norms.at_speed.ASKED`).
+        comfortable speed: of healthy adults asked to walk as slowly (`sagittal.core.norms.at_speed.ASKED`).
     expected : step length and cadence expected at this very speed.
     bands : variable → band over the cycle, each with its zero; at this speed as `values`.
     comfortable, comfortable_bands : of people at their own comfortable speed, where the above are at this
@@ -86,7 +86,7 @@ def look_up_norms(
     age : years; None = all adults, and nobody for times and distances. sex : None = nobody for these.
     speed_mps : walking speed. height_m : makes it dimensionless.
     anatomical : variables whose anatomical level is known on both sides
-        (`core.parameters.anatomical_zero`); figures of the others compare in range only.
+        (`sagittal.core.parameters.anatomical_zero`); figures of the others compare in range only.
     treadmill : steps on a belt are quicker and shorter than on the floor at the same speed; below comfortable
         speed they are held against people on a belt.
     contacts_s : what the contacts are known to (`GaitEvents.contact_uncertainty_s`), 0 = exact, None = not

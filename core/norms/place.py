@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import erf, sqrt
 from typing import Final, Literal
 
-from core.norms.values import NormValue
+from sagittal.core.norms.values import NormValue
 
 GRADES_SD: Final = (1.5, 4.5)
 """|z| up to which a value has grade 0 and 1, beyond 2: the steps of the Edinburgh Visual Gait Score

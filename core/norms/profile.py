@@ -14,7 +14,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.frames import SIDES, Bools, Floats, Side
+from sagittal.core.frames import SIDES, Bools, Floats, Side
 
 PELVIS: Final = ("pelvis_tilt", "pelvis_obliquity", "pelvis_rotation")
 NINE: Final = (

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Final
 
-from core.body.model import ANKLE_FRACTION, SHANK_FRACTION, THIGH_FRACTION
-from core.frames import GRAVITY
+from sagittal.core.body.model import ANKLE_FRACTION, SHANK_FRACTION, THIGH_FRACTION
+from sagittal.core.frames import GRAVITY
 
 LEG_M: Final = 0.9
 """Leg of the reference adults, hip to floor."""

@@ -36,7 +36,7 @@ def read_columns(name: str, *columns: str) -> Iterator[tuple[str, ...]]:
 
 
 def _read_cells(name: str) -> Iterator[list[str]]:
-    text = files("core.norms").joinpath("data", f"{name}.csv").read_text(encoding="utf-8")
+    text = files("sagittal.core.norms").joinpath("data", f"{name}.csv").read_text(encoding="utf-8")
     return csv.reader(text.splitlines())
 
 

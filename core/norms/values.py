@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 from math import hypot, sqrt
 from typing import Final, Literal, cast
 
-from core.frames import GRAVITY
-from core.norms.speed import WBDS_MPS
-from core.norms.tables import LEVEL, WBDS, WBDS_N, read_rows, wbds_group
-from core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES, NormKey, find_entry
+from sagittal.core.frames import GRAVITY
+from sagittal.core.norms.speed import WBDS_MPS
+from sagittal.core.norms.tables import LEVEL, WBDS, WBDS_N, read_rows, wbds_group
+from sagittal.core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES, NormKey, find_entry
 
 Sex = Literal["female", "male"]
 Pace = Literal["slow", "normal", "fast"]
@@ -93,7 +93,8 @@ def is_angle(name: str) -> bool:
 def angle_values(age: float | None, anatomical: Collection[str] = ()) -> NormValues:
     """Reference of the angle parameters for an adult of this age (None = all adults).
 
-    Ranges compare always, levels of the variables in `anatomical` (`core.parameters.anatomical_zero`) only.
+    Ranges compare always, levels only of the variables in `anatomical`
+    (`sagittal.core.parameters.anatomical_zero`).
     """
     group = wbds_group(age)
     if group is None:

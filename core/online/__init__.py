@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SegmentCheck, SensorHealth
-from core.parameters.live_stride import LiveStride
+from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame, SegmentCheck, SensorHealth
+from sagittal.core.parameters.live_stride import LiveStride
 
 if TYPE_CHECKING:
-    from core.online.session import OnlineParams, OnlineSession, compile_live_kernels
+    from sagittal.core.online.session import OnlineParams, OnlineSession, compile_live_kernels
 
 __all__ = [
     "AngleTrail",
@@ -26,7 +26,7 @@ __all__ = [
 def __getattr__(name: str) -> object:
     """The estimator itself, on demand: it brings numba, which readers of frames do without."""
     if name in ("OnlineSession", "OnlineParams", "compile_live_kernels"):
-        from core.online import session
+        from sagittal.core.online import session
 
         return getattr(session, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -7,28 +7,28 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from core.agreement import Agreement
-from core.agreement.agree import compare_sensors, measure_misfits
-from core.agreement.params import JointParams
-from core.body.erkf.headings import report_turned_axes
-from core.body.erkf.params import ErkfParams
-from core.body.estimate import compile_pose_kernels
-from core.body.model import BodyModel
-from core.body.mounting import mount_sensors
-from core.body.pose_params import PoseParams
-from core.calibration import CalibrationParams
-from core.calibration.result import CalibratedRecording
-from core.calibration.score import CalibrationScore, score_calibration
-from core.errors import Notice
-from core.filtering import low_pass
-from core.frames import Segment
-from core.fusion.attitude import compile_attitude_kernel
-from core.fusion.mahony import MahonyParams, estimate_orientations
-from core.fusion.orientations import Orientations
-from core.online.frame import SegmentCheck
-from core.peaks import compile_peak_kernel
-from core.recording import UniformRecording
-from core.rest import compile_rest_kernels
+from sagittal.core.agreement import Agreement
+from sagittal.core.agreement.agree import compare_sensors, measure_misfits
+from sagittal.core.agreement.params import JointParams
+from sagittal.core.body.erkf.headings import report_turned_axes
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.estimate import compile_pose_kernels
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.mounting import mount_sensors
+from sagittal.core.body.pose_params import PoseParams
+from sagittal.core.calibration import CalibrationParams
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.calibration.score import CalibrationScore, score_calibration
+from sagittal.core.errors import Notice
+from sagittal.core.filtering import low_pass
+from sagittal.core.frames import Segment
+from sagittal.core.fusion.attitude import compile_attitude_kernel
+from sagittal.core.fusion.mahony import MahonyParams, estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.online.frame import SegmentCheck
+from sagittal.core.peaks import compile_peak_kernel
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import compile_rest_kernels
 
 
 @dataclass(frozen=True)
@@ -87,12 +87,12 @@ def finish_calibration(
 
     Parameters
     ----------
-    calibrated : as `core.calibration.calibrate` gives it. worn : all segments, also those
+    calibrated : as `sagittal.core.calibration.calibrate` gives it. worn : all segments, also those
         without samples. out : of these, sensors that do not measure, which was told.
 
     Raises
     ------
-    EstimationError of `core.fusion.mahony.estimate_orientations`.
+    EstimationError of `sagittal.core.fusion.mahony.estimate_orientations`.
     """
     recording = calibrated.recording
     # every sensor with a sample counts: which of them last, nobody knows yet

@@ -14,20 +14,25 @@ from typing import Final
 
 import numpy as np
 
-from core.calibration import calibrate
-from core.calibration.calibrate import FEW_STEPS
-from core.calibration.functional import FUNCTIONAL, find_functional_movements
-from core.calibration.live_attempt import CalibrationSamples, WornSensors
-from core.calibration.live_standing import StandingNow, cut_last_part, find_upward_axes, judge_standing
-from core.calibration.result import Calibration
-from core.calibration.walking import moving_mask
-from core.errors import Notice, SagittalError, SignalError
-from core.frames import Bools, Floats, Segment
-from core.online.calibrated import LiveCalibration, MountingParams, finish_calibration
-from core.online.frame import CalibrationView, SegmentCheck, Stage
-from core.plurals import plural
-from core.recording import UniformRecording
-from core.timeline.live import UniformBlock
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.calibrate import FEW_STEPS
+from sagittal.core.calibration.functional import FUNCTIONAL, find_functional_movements
+from sagittal.core.calibration.live_attempt import CalibrationSamples, WornSensors
+from sagittal.core.calibration.live_standing import (
+    StandingNow,
+    cut_last_part,
+    find_upward_axes,
+    judge_standing,
+)
+from sagittal.core.calibration.result import Calibration
+from sagittal.core.calibration.walking import moving_mask
+from sagittal.core.errors import Notice, SagittalError, SignalError
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.online.calibrated import LiveCalibration, MountingParams, finish_calibration
+from sagittal.core.online.frame import CalibrationView, SegmentCheck, Stage
+from sagittal.core.plurals import plural
+from sagittal.core.recording import UniformRecording
+from sagittal.core.timeline.live import UniformBlock
 
 
 @dataclass(frozen=True)

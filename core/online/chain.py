@@ -12,36 +12,36 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from core.angles.kernel import AngleKernel, mean_angles, subtract_zero
-from core.body.choice import WHOLE, list_possible_estimators
-from core.body.erkf.live_erkf import HEADING_SD, live_params
-from core.body.erkf.live_figure import LinkedBody, UnlinkedSensors
-from core.body.erkf.live_sensors import FilteredSensors, FootPaths
-from core.body.erkf.params import ErkfParams
-from core.body.l7s.filter import L7sParams
-from core.body.l7s.live_figure import LiveL7s
-from core.body.live_estimator import BodyBlock, LivePoseEstimator, MeasuredBlock, list_worn_feet
-from core.body.live_still import StillnessDetector
-from core.body.still import FOOT_STILL
-from core.errors import Notice
-from core.estimators import ERKF, L7S_2I, L7S_3I
-from core.events.flags import StrideParams
-from core.events.foot_contact import FootContactParams
-from core.events.foot_movement import FootMovement
-from core.events.foot_pitch import FootPitchParams
-from core.events.live_contacts import ContactDetector
-from core.events.result import GaitEvent
-from core.frames import Bools, Floats, Segment, Side
-from core.fusion.attitude import AttitudeParams
-from core.fusion.live_attitude import AttitudeTracker
-from core.fusion.live_drift import HeadingHold
-from core.online.calibrated import LiveCalibration
-from core.parameters.live_history import MOST, SampleHistory
-from core.parameters.live_stride import LiveStride
-from core.parameters.live_strides import HistoryColumns, LiveStrides
-from core.parameters.spatial import Surface
-from core.rest import index_window
-from core.timeline.columns import find_columns, take_columns, take_mask
+from sagittal.core.angles.kernel import AngleKernel, mean_angles, subtract_zero
+from sagittal.core.body.choice import WHOLE, list_possible_estimators
+from sagittal.core.body.erkf.live_erkf import HEADING_SD, live_params
+from sagittal.core.body.erkf.live_figure import LinkedBody, UnlinkedSensors
+from sagittal.core.body.erkf.live_sensors import FilteredSensors, FootPaths
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.l7s.filter import L7sParams
+from sagittal.core.body.l7s.live_figure import LiveL7s
+from sagittal.core.body.live_estimator import BodyBlock, LivePoseEstimator, MeasuredBlock, list_worn_feet
+from sagittal.core.body.live_still import StillnessDetector
+from sagittal.core.body.still import FOOT_STILL
+from sagittal.core.errors import Notice
+from sagittal.core.estimators import ERKF, L7S_2I, L7S_3I
+from sagittal.core.events.flags import StrideParams
+from sagittal.core.events.foot_contact import FootContactParams
+from sagittal.core.events.foot_movement import FootMovement
+from sagittal.core.events.foot_pitch import FootPitchParams
+from sagittal.core.events.live_contacts import ContactDetector
+from sagittal.core.events.result import GaitEvent
+from sagittal.core.frames import Bools, Floats, Segment, Side
+from sagittal.core.fusion.attitude import AttitudeParams
+from sagittal.core.fusion.live_attitude import AttitudeTracker
+from sagittal.core.fusion.live_drift import HeadingHold
+from sagittal.core.online.calibrated import LiveCalibration
+from sagittal.core.parameters.live_history import MOST, SampleHistory
+from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.live_strides import HistoryColumns, LiveStrides
+from sagittal.core.parameters.spatial import Surface
+from sagittal.core.rest import index_window
+from sagittal.core.timeline.columns import find_columns, take_columns, take_mask
 
 NOT_LIVE: Final = (
     "The sensors that are worn ({}) show no figure while they stream: for one, wear both feet, or the pelvis "

@@ -1,7 +1,8 @@
 """What the live chain says: a frame after every push, a stride at every initial contact.
 
 Everything here is plain values on the axis of core/timeline/live.py: seconds from the first sample of the
-take, SI units and radians, names as in core.angles and core.parameters. Nothing imports numba.
+take, SI units and radians, names as in sagittal.core.angles and sagittal.core.parameters.
+Nothing imports numba.
 """
 
 from __future__ import annotations
@@ -12,14 +13,14 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from core.errors import Notice
-from core.estimators import NO_FIGURE, LiveMethod
-from core.events.result import GaitEvent
-from core.frames import Floats, Segment, Side
-from core.parameters.live_stride import LiveStride
+from sagittal.core.errors import Notice
+from sagittal.core.estimators import NO_FIGURE, LiveMethod
+from sagittal.core.events.result import GaitEvent
+from sagittal.core.frames import Floats, Segment, Side
+from sagittal.core.parameters.live_stride import LiveStride
 
 if TYPE_CHECKING:
-    from core.calibration.score import CalibrationScore
+    from sagittal.core.calibration.score import CalibrationScore
 
 Stage = Literal["waiting", "stand", "walk", "running"]
 """waiting: samples of some sensor are missing; stand, walk: calibration; running: everything there is."""

@@ -10,9 +10,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.formats.live_log import Hello, SampleBatch, StreamInfo
-from core.frames import Segment
-from core.online.frame import SensorHealth
+from sagittal.core.formats.live_log import Hello, SampleBatch, StreamInfo
+from sagittal.core.frames import Segment
+from sagittal.core.online.frame import SensorHealth
 
 OVER_S: Final = 5.0
 """Shares are of so long: a hole shows for as long as a person needs to see it."""

@@ -9,31 +9,31 @@ from typing import Any
 
 import numpy as np
 
-from core.agreement.live import LiveAgreement, compile_live_agreement
-from core.agreement.params import LiveAgreementParams
-from core.body.live_still import StillnessDetector
-from core.body.model import NOMINAL_HEIGHT_M, BodyModel
-from core.body.tree import PRESETS
-from core.calibration.live_attempt import WornSensors
-from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
-from core.calibration.score import CalibrationScore
-from core.errors import Notice, SagittalError
-from core.formats.live_log import Hello, SampleBatch
-from core.frames import GRAVITY, R_NEUTRAL, Protocol, Segment
-from core.functional_tests.guided import GUIDED, GuidedTest
-from core.functional_tests.result import GuidedTestView
-from core.fusion.orientations import Orientations
-from core.online.calibrated import LiveCalibration, compile_calibration_kernels
-from core.online.calibrating import CalibratingParams, LiveCalibrator
-from core.online.chain import ChainOutput, ChainParams, LiveChain
-from core.online.frame import EMPTY_TRAIL, AngleTrail, LiveFrame
-from core.online.health import SensorHealthMonitor
-from core.parameters.spatial import Surface
-from core.quality.live_stuck import StuckSensors
-from core.quality.stuck import compile_stuck_kernel
-from core.recording import GivenLimits, SensorSignals, Subject, UniformRecording, check_belt
-from core.rotation import from_matrix
-from core.timeline.live import LiveAxis, LiveAxisParams, UniformBlock, compile_axis_kernels
+from sagittal.core.agreement.live import LiveAgreement, compile_live_agreement
+from sagittal.core.agreement.params import LiveAgreementParams
+from sagittal.core.body.live_still import StillnessDetector
+from sagittal.core.body.model import NOMINAL_HEIGHT_M, BodyModel
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.calibration.live_attempt import WornSensors
+from sagittal.core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
+from sagittal.core.calibration.score import CalibrationScore
+from sagittal.core.errors import Notice, SagittalError
+from sagittal.core.formats.live_log import Hello, SampleBatch
+from sagittal.core.frames import GRAVITY, R_NEUTRAL, Protocol, Segment
+from sagittal.core.functional_tests.guided import GUIDED, GuidedTest
+from sagittal.core.functional_tests.result import GuidedTestView
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.online.calibrated import LiveCalibration, compile_calibration_kernels
+from sagittal.core.online.calibrating import CalibratingParams, LiveCalibrator
+from sagittal.core.online.chain import ChainOutput, ChainParams, LiveChain
+from sagittal.core.online.frame import EMPTY_TRAIL, AngleTrail, LiveFrame
+from sagittal.core.online.health import SensorHealthMonitor
+from sagittal.core.parameters.spatial import Surface
+from sagittal.core.quality.live_stuck import StuckSensors
+from sagittal.core.quality.stuck import compile_stuck_kernel
+from sagittal.core.recording import GivenLimits, SensorSignals, Subject, UniformRecording, check_belt
+from sagittal.core.rotation import from_matrix
+from sagittal.core.timeline.live import LiveAxis, LiveAxisParams, UniformBlock, compile_axis_kernels
 
 
 @dataclass(frozen=True)

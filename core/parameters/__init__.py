@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from core.parameters.kinematic import (
+from sagittal.core.parameters.kinematic import (
     cycle_curves,
     foot_pitch,
     mean_curve,
@@ -10,9 +10,9 @@ from core.parameters.kinematic import (
     stride_figures,
     summarise_angles,
 )
-from core.parameters.spatial import Surface, measure_distances, surface_of
-from core.parameters.take import TakeFigures, gait_parameters, take_figures
-from core.parameters.temporal import per_stride, stride_values, summarise_times
+from sagittal.core.parameters.spatial import Surface, measure_distances, surface_of
+from sagittal.core.parameters.take import TakeFigures, gait_parameters, take_figures
+from sagittal.core.parameters.temporal import per_stride, stride_values, summarise_times
 
 __all__ = [
     "Surface",

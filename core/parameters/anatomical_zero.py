@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.frames import SIDES, SUFFIX, Floats, Side
-from core.parameters.catalogue import list_curve_figures
-from core.parameters.kinematic import is_level, summarise_angles
-from core.parameters.result import CycleCurves, Parameter
-from core.parameters.uncertainty import state_uncertainty
-from core.standing_angles import JOINTS, PELVIS, check_standing
+from sagittal.core.frames import SIDES, SUFFIX, Floats, Side
+from sagittal.core.parameters.catalogue import list_curve_figures
+from sagittal.core.parameters.kinematic import is_level, summarise_angles
+from sagittal.core.parameters.result import CycleCurves, Parameter
+from sagittal.core.parameters.uncertainty import state_uncertainty
+from sagittal.core.standing_angles import JOINTS, PELVIS, check_standing
 
 
 def anatomical_curves(curves: CycleCurves, standing_deg: Mapping[str, float]) -> CycleCurves:
@@ -21,7 +21,8 @@ def anatomical_curves(curves: CycleCurves, standing_deg: Mapping[str, float]) ->
 
     Parameters
     ----------
-    curves : from standing. standing_deg : goniometer angles in standing, `core.standing_angles.NAMES`.
+    curves : from standing.
+    standing_deg : goniometer angles in standing, `sagittal.core.standing_angles.NAMES`.
 
     Raises
     ------

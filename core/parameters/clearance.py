@@ -14,8 +14,8 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.feet import FootTracks
-from core.frames import Floats, Side
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.frames import Floats, Side
 
 DIP_M: Final = 0.001
 """The toe's least height in mid-swing must lie this far below the heights around it. Our choice: the smoothed

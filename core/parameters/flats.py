@@ -13,10 +13,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.feet import FootTracks
-from core.events.result import Strides
-from core.frames import Side
-from core.rest import find_runs
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.events.result import Strides
+from sagittal.core.frames import Side
+from sagittal.core.rest import find_runs
 
 STANCE_SHARE: Final = 0.7
 """Part of the stride in which its flat is looked for when no foot-off was found."""

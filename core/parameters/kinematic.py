@@ -13,16 +13,16 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import JointAngles
-from core.events.result import Strides
-from core.frames import FOOT, SIDES, SUFFIX, Bools, Floats, Oriented, Segment, Side
-from core.parameters.catalogue import CATALOGUE, CurveFigure, find_entry, list_curve_figures
-from core.parameters.plausible import IMPOSSIBLE, LEAST_KNEE
-from core.parameters.resample import resample_in_turn
-from core.parameters.result import CycleCurves, MeanCurve, Parameter
-from core.parameters.rows import Column, as_column
-from core.parameters.stance import foot_pitches
-from core.parameters.variability import summarise_values
+from sagittal.core.angles import JointAngles
+from sagittal.core.events.result import Strides
+from sagittal.core.frames import FOOT, SIDES, SUFFIX, Bools, Floats, Oriented, Segment, Side
+from sagittal.core.parameters.catalogue import CATALOGUE, CurveFigure, find_entry, list_curve_figures
+from sagittal.core.parameters.plausible import IMPOSSIBLE, LEAST_KNEE
+from sagittal.core.parameters.resample import resample_in_turn
+from sagittal.core.parameters.result import CycleCurves, MeanCurve, Parameter
+from sagittal.core.parameters.rows import Column, as_column
+from sagittal.core.parameters.stance import foot_pitches
+from sagittal.core.parameters.variability import summarise_values
 
 POINTS: Final = 101
 """Points of a curve: 0, 1, … 100 % of the cycle."""

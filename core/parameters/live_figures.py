@@ -9,13 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import JointAngles
-from core.body.feet import FootTracks
-from core.events.result import Stride, Strides
-from core.frames import Bools, Floats, Segment
-from core.parameters.catalogue import list_curve_figures
-from core.parameters.flats import find_flats
-from core.parameters.kinematic import (
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.parameters.catalogue import list_curve_figures
+from sagittal.core.parameters.flats import find_flats
+from sagittal.core.parameters.kinematic import (
     FOOT_PITCH,
     MEAN_ZERO,
     cycle_curves,
@@ -23,14 +23,14 @@ from core.parameters.kinematic import (
     stride_figures,
     turning_angle,
 )
-from core.parameters.live_stride import NOT_YET
-from core.parameters.phases import measure_phases
-from core.parameters.plausible import IMPOSSIBLE, is_impossible
-from core.parameters.rows import Value, read_row
-from core.parameters.spatial import NAMES as SPATIAL
-from core.parameters.spatial import Surface, measure_distances
-from core.parameters.stance import find_stances, foot_pitches
-from core.parameters.temporal import explain_missing, temporal_values
+from sagittal.core.parameters.live_stride import NOT_YET
+from sagittal.core.parameters.phases import measure_phases
+from sagittal.core.parameters.plausible import IMPOSSIBLE, is_impossible
+from sagittal.core.parameters.rows import Value, read_row
+from sagittal.core.parameters.spatial import NAMES as SPATIAL
+from sagittal.core.parameters.spatial import Surface, measure_distances
+from sagittal.core.parameters.stance import find_stances, foot_pitches
+from sagittal.core.parameters.temporal import explain_missing, temporal_values
 
 
 @dataclass(frozen=True, eq=False)

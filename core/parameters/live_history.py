@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import Bools, Floats
+from sagittal.core.frames import Bools, Floats
 
 KEPT_S: Final = 10.0
 """A stride, the pause it may hold (3 s), the stance after it and as much again."""

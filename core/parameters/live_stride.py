@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from core.events.result import StrideFlag
-from core.frames import Floats, Side
+from sagittal.core.events.result import StrideFlag
+from sagittal.core.frames import Floats, Side
 
 NOT_YET: Final = "not_yet"
 """Reason of a value that a later `LiveStride` of the same stride will have."""
@@ -25,8 +25,8 @@ class LiveStride:
     Parameters
     ----------
     n : running number over both feet, from 0. detected_s : last sample that was needed.
-    values : parameters of a stride as in the stride table (core.parameters: temporal, spatial, stance,
-        phases, kinematic), None where undefined. reasons : why, for every None.
+    values : parameters of a stride as in the stride table (sagittal.core.parameters: temporal, spatial,
+        stance, phases, kinematic), None where undefined. reasons : why, for every None.
     curves : variable → (101,) rad over the cycle, as `cycle_curves`; only those known throughout.
     turn_rad : heading change of the foot, left positive. flags : those that are known by then; "first" of a
         bout and "near_turn" after a turn from the start, "last" and "in_place" when it is `complete`.

@@ -17,22 +17,22 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import JointAngles, compute_headings
-from core.body.feet import FootTracks
-from core.body.model import BodyModel
-from core.events.flags import StrideParams, add_flag, find_flags
-from core.events.live_contacts import KnownContact
-from core.events.result import GaitEvent, GaitEvents, Stride, StrideFlag
-from core.events.strides import NEAR_S, side_strides
-from core.frames import FOOT, Floats, Segment, Side
-from core.fusion.orientations import Orientations
-from core.parameters.flats import OTHER
-from core.parameters.live_figures import StrideSpan, early_figures, late_figures
-from core.parameters.live_history import KEPT_S, SampleHistory
-from core.parameters.live_stride import LiveStride
-from core.parameters.rows import Value
-from core.parameters.spatial import NAMES as SPATIAL
-from core.parameters.spatial import Surface
+from sagittal.core.angles import JointAngles, compute_headings
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.body.model import BodyModel
+from sagittal.core.events.flags import StrideParams, add_flag, find_flags
+from sagittal.core.events.live_contacts import KnownContact
+from sagittal.core.events.result import GaitEvent, GaitEvents, Stride, StrideFlag
+from sagittal.core.events.strides import NEAR_S, side_strides
+from sagittal.core.frames import FOOT, Floats, Segment, Side
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.parameters.flats import OTHER
+from sagittal.core.parameters.live_figures import StrideSpan, early_figures, late_figures
+from sagittal.core.parameters.live_history import KEPT_S, SampleHistory
+from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.rows import Value
+from sagittal.core.parameters.spatial import NAMES as SPATIAL
+from sagittal.core.parameters.spatial import Surface
 
 REMEMBERED: Final = 20
 """Strides of a foot that the next one is compared with: those of the therapist's strip."""

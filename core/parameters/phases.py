@@ -12,14 +12,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.angles import JointAngles
-from core.body.feet import FootTracks
-from core.events.result import Strides
-from core.frames import FOOT, SIDES, SUFFIX, Floats, Segment, Side
-from core.parameters.flats import OTHER
-from core.parameters.resample import first_crossing, last_crossing, resample
-from core.parameters.rows import Figure, Figures, tell_figure
-from core.parameters.stance import Stances
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.events.result import Strides
+from sagittal.core.frames import FOOT, SIDES, SUFFIX, Floats, Segment, Side
+from sagittal.core.parameters.flats import OTHER
+from sagittal.core.parameters.resample import first_crossing, last_crossing, resample
+from sagittal.core.parameters.rows import Figure, Figures, tell_figure
+from sagittal.core.parameters.stance import Stances
 
 NAMES: Final = (
     "mid_stance_pct",

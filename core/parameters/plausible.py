@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import radians
 from typing import Final
 
-from core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.catalogue import CATALOGUE
 
 IMPOSSIBLE: Final = "impossible"
 """Reason of a value that was found and is not told."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from core.frames import Bools, Floats, Posture, Side
+from sagittal.core.frames import Bools, Floats, Posture, Side
 
 
 @dataclass(frozen=True)

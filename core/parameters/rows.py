@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from core.events.result import Strides, list_known
-from core.frames import SIDES, Floats, Side
-from core.parameters.catalogue import unit_of
-from core.parameters.result import Parameter
-from core.parameters.variability import summarise_values
+from sagittal.core.events.result import Strides, list_known
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.parameters.catalogue import unit_of
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.variability import summarise_values
 
 Value = float | str
 """A figure of one stride, or the code of the reason why it has none."""

@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import GRAVITY, Floats, Segment
-from core.parameters.resample import resample
-from core.parameters.result import Parameter
-from core.parameters.variability import summarise_values
-from core.rest import Window
+from sagittal.core.frames import GRAVITY, Floats, Segment
+from sagittal.core.parameters.resample import resample
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.variability import summarise_values
+from sagittal.core.rest import Window
 
 NAME: Final = "stride_sparc"
 

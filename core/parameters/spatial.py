@@ -16,26 +16,33 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.feet import FootTracks
-from core.events.result import Strides
-from core.frames import Bools, Floats, Protocol, Side
-from core.held_samples import give_pages_back
-from core.parameters.catalogue import list_names
-from core.parameters.catalogue.entry import DISTANCES
-from core.parameters.clearance import (
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.events.result import Strides
+from sagittal.core.frames import Bools, Floats, Protocol, Side
+from sagittal.core.held_samples import give_pages_back
+from sagittal.core.parameters.catalogue import list_names
+from sagittal.core.parameters.catalogue.entry import DISTANCES
+from sagittal.core.parameters.clearance import (
     SoleHeights,
     lay_out,
     measure_floor_heights,
     sole_heights,
     toe_clearance,
 )
-from core.parameters.flats import OTHER, Flats, find_flats
-from core.parameters.result import Parameter
-from core.parameters.rows import Codes, Figure, Figures, figure_parameter, side_parameters, tell_figure
-from core.parameters.variability import summarise_values
-from core.recording import UniformRecording
-from core.rest import find_runs
-from core.rotation import wrap_angle, yaw
+from sagittal.core.parameters.flats import OTHER, Flats, find_flats
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.rows import (
+    Codes,
+    Figure,
+    Figures,
+    figure_parameter,
+    side_parameters,
+    tell_figure,
+)
+from sagittal.core.parameters.variability import summarise_values
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import find_runs
+from sagittal.core.rotation import wrap_angle, yaw
 
 NAMES: Final[tuple[str, ...]] = (*list_names(DISTANCES, of="stride"), "toe_out_deg")
 """Per-side parameters in the order of the tables."""

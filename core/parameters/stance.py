@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from core.events.result import Strides
-from core.frames import FOOT, Floats, Oriented, Segment
-from core.parameters.resample import resample
-from core.parameters.rows import Figures, tell_figure
+from sagittal.core.events.result import Strides
+from sagittal.core.frames import FOOT, Floats, Oriented, Segment
+from sagittal.core.parameters.resample import resample
+from sagittal.core.parameters.rows import Figures, tell_figure
 
 NAMES: Final = ("loading_pct", "foot_flat_pct", "push_pct")
 """In % of stance, in the order of the tables."""

@@ -14,11 +14,11 @@ from typing import Final
 
 import numpy as np
 
-from core.events.result import Strides
-from core.frames import SIDES, Side
-from core.parameters.flats import OTHER
-from core.parameters.result import Parameter
-from core.parameters.variability import (
+from sagittal.core.events.result import Strides
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.parameters.flats import OTHER
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.variability import (
     CV_STRIDES,
     STEADY_STRIDES,
     Spread,

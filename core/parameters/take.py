@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from core.angles import JointAngles
-from core.events.result import Strides
-from core.frames import Floats, Oriented, Segment, Side
-from core.parameters.flats import Flats
-from core.parameters.kinematic import (
+from sagittal.core.angles import JointAngles
+from sagittal.core.events.result import Strides
+from sagittal.core.frames import Floats, Oriented, Segment, Side
+from sagittal.core.parameters.flats import Flats
+from sagittal.core.parameters.kinematic import (
     foot_pitch,
     measure_cycles,
     per_stride_figures,
@@ -18,19 +18,19 @@ from core.parameters.kinematic import (
     turning_angle,
     without_bounds,
 )
-from core.parameters.phases import measure_phases
-from core.parameters.result import Parameter
-from core.parameters.rows import Column, figure_columns, side_parameters
-from core.parameters.smoothness import stride_smoothness
-from core.parameters.spatial import GROUND, Surface, measure_distances, summarise_distances
-from core.parameters.stance import find_stances, foot_pitches
-from core.parameters.symmetry import phase_coordination
-from core.parameters.temporal import per_stride, summarise_times
-from core.parameters.trunk import choose_foot, trunk_regularity
+from sagittal.core.parameters.phases import measure_phases
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.rows import Column, figure_columns, side_parameters
+from sagittal.core.parameters.smoothness import stride_smoothness
+from sagittal.core.parameters.spatial import GROUND, Surface, measure_distances, summarise_distances
+from sagittal.core.parameters.stance import find_stances, foot_pitches
+from sagittal.core.parameters.symmetry import phase_coordination
+from sagittal.core.parameters.temporal import per_stride, summarise_times
+from sagittal.core.parameters.trunk import choose_foot, trunk_regularity
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
-    from core.body.feet import FootTracks
+    from sagittal.core.body.feet import FootTracks
 
 
 @dataclass(frozen=True, eq=False)

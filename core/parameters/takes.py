@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import sqrt
 
-from core.errors import ParameterError
-from core.parameters.result import Parameter
+from sagittal.core.errors import ParameterError
+from sagittal.core.parameters.result import Parameter
 
 
 def join_takes(takes: Sequence[Parameter]) -> Parameter:

@@ -12,13 +12,13 @@ from math import inf
 
 import numpy as np
 
-from core.events.result import Stride, Strides, list_known
-from core.frames import SIDES, Floats
-from core.parameters.catalogue import CATALOGUE, unit_of
-from core.parameters.plausible import IMPOSSIBLE, is_impossible
-from core.parameters.result import Parameter
-from core.parameters.rows import Column, as_column
-from core.parameters.variability import summarise_values
+from sagittal.core.events.result import Stride, Strides, list_known
+from sagittal.core.frames import SIDES, Floats
+from sagittal.core.parameters.catalogue import CATALOGUE, unit_of
+from sagittal.core.parameters.plausible import IMPOSSIBLE, is_impossible
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.rows import Column, as_column
+from sagittal.core.parameters.variability import summarise_values
 
 
 def stride_values(stride: Stride) -> dict[str, float | None]:

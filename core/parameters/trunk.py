@@ -16,12 +16,12 @@ from typing import Final
 
 import numpy as np
 
-from core.events.result import Strides
-from core.frames import SIDES, Floats, Segment
-from core.parameters.resample import resample
-from core.parameters.result import Parameter
-from core.parameters.variability import STEADY_STRIDES, summarise_values
-from core.rest import Window
+from sagittal.core.events.result import Strides
+from sagittal.core.frames import SIDES, Floats, Segment
+from sagittal.core.parameters.resample import resample
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.variability import STEADY_STRIDES, summarise_values
+from sagittal.core.rest import Window
 
 AXES: Final[Mapping[str, int]] = {"v": 2, "ap": 0, "ml": 1}
 """Ending of the name → column of the acceleration: vertical, forward, sideways."""

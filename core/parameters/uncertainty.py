@@ -14,13 +14,13 @@ from typing import Final
 
 import numpy as np
 
-from core.events.result import MANUAL, EventKind, GaitEvents
-from core.frames import SIDES, SUFFIX, Side
-from core.parameters.catalogue import CATALOGUE
-from core.parameters.catalogue.errors import ContactWeights
-from core.parameters.flats import OTHER
-from core.parameters.result import Parameter
-from core.parameters.variability import NORMAL_95, t_quantile
+from sagittal.core.events.result import MANUAL, EventKind, GaitEvents
+from sagittal.core.frames import SIDES, SUFFIX, Side
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.catalogue.errors import ContactWeights
+from sagittal.core.parameters.flats import OTHER
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.variability import NORMAL_95, t_quantile
 
 GONIOMETER_DEG: Final = 3.0
 """Standing angle read with a goniometer, standard. Our estimate: readings of two people differ by 3 to 5°."""

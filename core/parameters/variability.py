@@ -14,10 +14,10 @@ from typing import Final
 
 import numpy as np
 
-from core.events.result import COMPARED
-from core.frames import Floats, Side
-from core.parameters.catalogue import name_counted
-from core.parameters.result import Parameter
+from sagittal.core.events.result import COMPARED
+from sagittal.core.frames import Floats, Side
+from sagittal.core.parameters.catalogue import name_counted
+from sagittal.core.parameters.result import Parameter
 
 CV_STRIDES: Final = 10
 """Fewer strides have no coefficient of variation: it would say little. Customary."""

@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.events.bouts import Bout
-from core.events.steps import EDGE_STEPS, Steps
-from core.events.turns import Turn
-from core.parameters.catalogue import unit_of
-from core.parameters.plausible import IMPOSSIBLE, is_impossible
-from core.parameters.result import Parameter
-from core.parameters.temporal import cadence
-from core.parameters.variability import summarise_values
-from core.rest import Window
+from sagittal.core.events.bouts import Bout
+from sagittal.core.events.steps import EDGE_STEPS, Steps
+from sagittal.core.events.turns import Turn
+from sagittal.core.parameters.catalogue import unit_of
+from sagittal.core.parameters.plausible import IMPOSSIBLE, is_impossible
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.temporal import cadence
+from sagittal.core.parameters.variability import summarise_values
+from sagittal.core.rest import Window
 
 
 def bout_parameters(bouts: Sequence[Bout]) -> tuple[Parameter, ...]:

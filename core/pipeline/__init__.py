@@ -4,10 +4,10 @@
 `recipes` their order. The same code serves the command line, the worker and the tests.
 """
 
-from core.pipeline.analysis import TakeAnalysis
-from core.pipeline.config import PipelineConfig
-from core.pipeline.recipes import ACTIVITY, SQUAT, TRUNK_ONLY, WALK, Progress, analyse, resume
-from core.pipeline.stages import PipelineStage
+from sagittal.core.pipeline.analysis import TakeAnalysis
+from sagittal.core.pipeline.config import PipelineConfig
+from sagittal.core.pipeline.recipes import ACTIVITY, SQUAT, TRUNK_ONLY, WALK, Progress, analyse, resume
+from sagittal.core.pipeline.stages import PipelineStage
 
 __all__ = [
     "ACTIVITY",

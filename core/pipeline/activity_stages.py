@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from core.activity.monitor import Progress, monitor_activity
-from core.activity.result import ActivityResult
-from core.errors import SignalError
-from core.frames import Segment
-from core.pipeline.analysis import TakeAnalysis
-from core.pipeline.config import PipelineConfig
-from core.pipeline.stages import PipelineStage
-from core.quality.assessment import Level, QualityReport
-from core.recording import Recording, as_long_stream
-from core.sample_blocks import LongStream
+from sagittal.core.activity.monitor import Progress, monitor_activity
+from sagittal.core.activity.result import ActivityResult
+from sagittal.core.errors import SignalError
+from sagittal.core.frames import Segment
+from sagittal.core.pipeline.analysis import TakeAnalysis
+from sagittal.core.pipeline.config import PipelineConfig
+from sagittal.core.pipeline.stages import PipelineStage
+from sagittal.core.quality.assessment import Level, QualityReport
+from sagittal.core.recording import Recording, as_long_stream
+from sagittal.core.sample_blocks import LongStream
 
 TRUNK: Final[tuple[Segment, ...]] = ("chest", "pelvis")
 """Where the sensor of daily life is worn, the published place first."""

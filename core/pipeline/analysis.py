@@ -6,31 +6,31 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
-from core.activity.parameters import measure_day
-from core.activity.result import ActivityResult
-from core.agreement import Agreement
-from core.angles import JointAngles
-from core.body.chain.leg import LegMotion
-from core.body.estimate import PoseEstimate
-from core.body.feet import FootTracks
-from core.body.mounting import MountedSensors
-from core.body.poses import Poses
-from core.calibration.result import CalibratedRecording, Calibration
-from core.calibration.score import CalibrationScore
-from core.errors import Notice, ParameterError
-from core.events.result import GaitEvents, Strides
-from core.events.steps import Steps
-from core.events.turns import Turn
-from core.frames import Side
-from core.functional_tests.result import FunctionalTest
-from core.fusion.orientations import Orientations
-from core.measure import MeasuredGait, Tracks
-from core.parameters.result import Parameter
-from core.pipeline.config import PipelineConfig
-from core.quality import QualityReport
-from core.recording import Recording, UniformRecording
-from core.setup import SetupRepair
-from core.squat.measures import SquatSide
+from sagittal.core.activity.parameters import measure_day
+from sagittal.core.activity.result import ActivityResult
+from sagittal.core.agreement import Agreement
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.chain.leg import LegMotion
+from sagittal.core.body.estimate import PoseEstimate
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.body.mounting import MountedSensors
+from sagittal.core.body.poses import Poses
+from sagittal.core.calibration.result import CalibratedRecording, Calibration
+from sagittal.core.calibration.score import CalibrationScore
+from sagittal.core.errors import Notice, ParameterError
+from sagittal.core.events.result import GaitEvents, Strides
+from sagittal.core.events.steps import Steps
+from sagittal.core.events.turns import Turn
+from sagittal.core.frames import Side
+from sagittal.core.functional_tests.result import FunctionalTest
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.measure import MeasuredGait, Tracks
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.pipeline.config import PipelineConfig
+from sagittal.core.quality import QualityReport
+from sagittal.core.recording import Recording, UniformRecording
+from sagittal.core.setup import SetupRepair
+from sagittal.core.squat.measures import SquatSide
 
 SCHEMA: Final = 1
 """Version of the Analysis bundle and of analysis.json."""
@@ -69,7 +69,7 @@ class TakeAnalysis:
     """Everything one take gave; what was not reached is None and `problem` says why.
 
     A stage sets its own field and none of another stage, so that the chain can go on from any stage
-    (`core.pipeline.resume`). Users read the properties.
+    (`sagittal.core.pipeline.resume`). Users read the properties.
 
     Parameters
     ----------

@@ -9,24 +9,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, TypeVar, get_args
 
-from core.activity.params import ActivityParams
-from core.agreement import AgreementParams
-from core.body.pose_params import PoseParams
-from core.calibration import CalibrationParams
-from core.errors import ParameterError
-from core.events import FootContactParams, FootPitchParams, StrideParams
-from core.events.alternation import AlternationParams
-from core.events.bouts import BoutParams
-from core.events.consensus import ConsensusParams
-from core.events.lumbar import LumbarParams
-from core.events.turns import TurnParams
-from core.functional_tests.params import FunctionalTestParams
-from core.fusion.mahony import MahonyParams
-from core.quality import QualityParams
-from core.quality.stuck import StuckParams
-from core.setup import SetupParams
-from core.squat.params import SquatParams
-from core.timeline import TimelineParams
+from sagittal.core.activity.params import ActivityParams
+from sagittal.core.agreement import AgreementParams
+from sagittal.core.body.pose_params import PoseParams
+from sagittal.core.calibration import CalibrationParams
+from sagittal.core.errors import ParameterError
+from sagittal.core.events import FootContactParams, FootPitchParams, StrideParams
+from sagittal.core.events.alternation import AlternationParams
+from sagittal.core.events.bouts import BoutParams
+from sagittal.core.events.consensus import ConsensusParams
+from sagittal.core.events.lumbar import LumbarParams
+from sagittal.core.events.turns import TurnParams
+from sagittal.core.functional_tests.params import FunctionalTestParams
+from sagittal.core.fusion.mahony import MahonyParams
+from sagittal.core.quality import QualityParams
+from sagittal.core.quality.stuck import StuckParams
+from sagittal.core.setup import SetupParams
+from sagittal.core.squat.params import SquatParams
+from sagittal.core.timeline import TimelineParams
 
 Settings = TypeVar("Settings")
 

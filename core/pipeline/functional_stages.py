@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from core.functional_tests.chair import measure_chair_rises
-from core.functional_tests.sway import measure_sway
-from core.functional_tests.trunk import follow_trunk
-from core.functional_tests.tug import measure_tug
-from core.functional_tests.walks import measure_six_minutes, measure_ten_metres
-from core.pipeline.analysis import TakeAnalysis
-from core.pipeline.config import PipelineConfig
-from core.pipeline.stages import PipelineStage
-from core.quality.stuck import drop_stuck_sensors
+from sagittal.core.functional_tests.chair import measure_chair_rises
+from sagittal.core.functional_tests.sway import measure_sway
+from sagittal.core.functional_tests.trunk import follow_trunk
+from sagittal.core.functional_tests.tug import measure_tug
+from sagittal.core.functional_tests.walks import measure_six_minutes, measure_ten_metres
+from sagittal.core.pipeline.analysis import TakeAnalysis
+from sagittal.core.pipeline.config import PipelineConfig
+from sagittal.core.pipeline.stages import PipelineStage
+from sagittal.core.quality.stuck import drop_stuck_sensors
 
 
 def measure_trunk_test(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:

@@ -10,13 +10,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
-from core.errors import Notice, ParameterError, SagittalError
-from core.pipeline.activity_stages import ACTIVITY_MONITOR, ACTIVITY_QUALITY
-from core.pipeline.analysis import TakeAnalysis
-from core.pipeline.config import PipelineConfig
-from core.pipeline.functional_stages import TRUNK_TEST, WALK_TEST
-from core.pipeline.squat_stages import SQUAT_ANGLES, SQUAT_CALIBRATION, SQUAT_LEG, SQUAT_PARAMETERS
-from core.pipeline.stages import (
+from sagittal.core.errors import Notice, ParameterError, SagittalError
+from sagittal.core.pipeline.activity_stages import ACTIVITY_MONITOR, ACTIVITY_QUALITY
+from sagittal.core.pipeline.analysis import TakeAnalysis
+from sagittal.core.pipeline.config import PipelineConfig
+from sagittal.core.pipeline.functional_stages import TRUNK_TEST, WALK_TEST
+from sagittal.core.pipeline.squat_stages import SQUAT_ANGLES, SQUAT_CALIBRATION, SQUAT_LEG, SQUAT_PARAMETERS
+from sagittal.core.pipeline.stages import (
     AGREEMENT,
     ANGLES,
     CALIBRATION,
@@ -32,8 +32,8 @@ from core.pipeline.stages import (
     TRUNK_PARAMETERS,
     PipelineStage,
 )
-from core.quality.stuck import drop_stuck_sensors
-from core.recording import Recording
+from sagittal.core.quality.stuck import drop_stuck_sensors
+from sagittal.core.recording import Recording
 
 Progress = Callable[[str, float], None]
 """Called with the stage that starts and the share of the work done before it, 0 to 1."""
@@ -78,7 +78,7 @@ def analyse(
 
     Parameters
     ----------
-    recording : streams with their segments, as core.formats reads them.
+    recording : streams with their segments, as sagittal.core.formats reads them.
     config : parameters of the stages; None = the defaults.
     progress : called before each stage.
     version : of the code, kept in the provenance.

@@ -5,25 +5,25 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from core.angles.measure import measure_angles
-from core.body.chain.figure import draw_legs
-from core.body.chain.geometry import LegGeometry
-from core.body.chain.leg import estimate_leg
-from core.body.chain.model import leg_segments
-from core.body.model import NOMINAL_HEIGHT_M
-from core.calibration.fixed_offset import make_fixed_mounts
-from core.calibration.known_mounts import FIXED_OFFSET, TABLE_TOP, calibrate_with_mounts
-from core.calibration.score import score_calibration
-from core.calibration.standing_leg import find_standing_legs
-from core.calibration.table_top import calibrate_table_top, crop, find_worn_standing
-from core.errors import Notice
-from core.frames import SUFFIX
-from core.pipeline.analysis import TakeAnalysis, require_stage
-from core.pipeline.config import PipelineConfig
-from core.pipeline.stages import PipelineStage
-from core.quality.stuck import drop_stuck_sensors
-from core.squat.measures import measure_squats
-from core.squat.side import find_squat_sides
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body.chain.figure import draw_legs
+from sagittal.core.body.chain.geometry import LegGeometry
+from sagittal.core.body.chain.leg import estimate_leg
+from sagittal.core.body.chain.model import leg_segments
+from sagittal.core.body.model import NOMINAL_HEIGHT_M
+from sagittal.core.calibration.fixed_offset import make_fixed_mounts
+from sagittal.core.calibration.known_mounts import FIXED_OFFSET, TABLE_TOP, calibrate_with_mounts
+from sagittal.core.calibration.score import score_calibration
+from sagittal.core.calibration.standing_leg import find_standing_legs
+from sagittal.core.calibration.table_top import calibrate_table_top, crop, find_worn_standing
+from sagittal.core.errors import Notice
+from sagittal.core.frames import SUFFIX
+from sagittal.core.pipeline.analysis import TakeAnalysis, require_stage
+from sagittal.core.pipeline.config import PipelineConfig
+from sagittal.core.pipeline.stages import PipelineStage
+from sagittal.core.quality.stuck import drop_stuck_sensors
+from sagittal.core.squat.measures import measure_squats
+from sagittal.core.squat.side import find_squat_sides
 
 AGREED: Final = Notice(
     "mounting_agreed",

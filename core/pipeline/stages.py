@@ -12,39 +12,39 @@ from typing import Final
 
 import numpy as np
 
-from core import body, calibration, quality, timeline
-from core.agreement import Agreement, check_agreement
-from core.agreement.joints import LEG_JOINTS
-from core.angles.measure import measure_angles
-from core.body.estimate import estimate_poses
-from core.body.l7s.inputs import remove_gravity
-from core.body.mounting import mount_sensors
-from core.body.poses import figure_precision
-from core.body.walking_frame import in_walking_frame
-from core.calibration.declared import propose_mountings
-from core.calibration.result import CalibratedRecording
-from core.calibration.score import score_calibration
-from core.errors import Notice
-from core.events.alternation import tell_foot_lag
-from core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
-from core.events.detection import detect_contacts as detect_foot_contacts
-from core.events.foot_movement import measure_foot_movements
-from core.events.lumbar import detect_steps, split_about_vertical, trunk_sensor
-from core.events.result import GaitEvents
-from core.events.turns import body_yaw_rate, find_turns
-from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import LastReading, Orientations
-from core.measure import Tracks, measure_gait
-from core.memory import give_memory_back
-from core.parameters.spatial import surface_of
-from core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
-from core.pipeline.config import PipelineConfig
-from core.quality.stuck import drop_stuck_sensors, mark_stuck
-from core.recording import UniformRecording
-from core.rest import STANDING, Window, find_rest_windows
-from core.setup.propose import propose_labels, propose_repair
-from core.withheld import list_fixed, withhold, withhold_at_slips, withhold_distances
+from sagittal.core import body, calibration, quality, timeline
+from sagittal.core.agreement import Agreement, check_agreement
+from sagittal.core.agreement.joints import LEG_JOINTS
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body.estimate import estimate_poses
+from sagittal.core.body.l7s.inputs import remove_gravity
+from sagittal.core.body.mounting import mount_sensors
+from sagittal.core.body.poses import figure_precision
+from sagittal.core.body.walking_frame import in_walking_frame
+from sagittal.core.calibration.declared import propose_mountings
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.calibration.score import score_calibration
+from sagittal.core.errors import Notice
+from sagittal.core.events.alternation import tell_foot_lag
+from sagittal.core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
+from sagittal.core.events.detection import detect_contacts as detect_foot_contacts
+from sagittal.core.events.foot_movement import measure_foot_movements
+from sagittal.core.events.lumbar import detect_steps, split_about_vertical, trunk_sensor
+from sagittal.core.events.result import GaitEvents
+from sagittal.core.events.turns import body_yaw_rate, find_turns
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import LastReading, Orientations
+from sagittal.core.measure import Tracks, measure_gait
+from sagittal.core.memory import give_memory_back
+from sagittal.core.parameters.spatial import surface_of
+from sagittal.core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
+from sagittal.core.pipeline.config import PipelineConfig
+from sagittal.core.quality.stuck import drop_stuck_sensors, mark_stuck
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import STANDING, Window, find_rest_windows
+from sagittal.core.setup.propose import propose_labels, propose_repair
+from sagittal.core.withheld import list_fixed, withhold, withhold_at_slips, withhold_distances
 
 CHAIN: Final[frozenset[Segment]] = frozenset(s for joint in LEG_JOINTS for s in joint)
 """With all of these worn the joints compare the clocks of both feet."""

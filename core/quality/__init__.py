@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from core.quality.assessment import (
+from sagittal.core.quality.assessment import (
     QualityParams,
     QualityReport,
     SensorQuality,
@@ -10,8 +10,8 @@ from core.quality.assessment import (
     concern_paths_alone,
     find_shown_level,
 )
-from core.quality.inspection import DeviceFacts, Inspection, describe
-from core.quality.suggestion import Suggestion, suggest, suggest_segments
+from sagittal.core.quality.inspection import DeviceFacts, Inspection, describe
+from sagittal.core.quality.suggestion import Suggestion, suggest, suggest_segments
 
 __all__ = [
     "DeviceFacts",

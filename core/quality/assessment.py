@@ -9,15 +9,15 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from core.errors import Notice
-from core.frames import GRAVITY, Segment
-from core.plurals import plural
-from core.quality.inspection import measure_losses
-from core.quality.signals import magnetic_share, measure_stream, saturation
-from core.quality.suspicion import list_suspicions
-from core.recording import Recording, SensorSignals, UniformRecording
-from core.rest import QuietParams, Window, find_rest_windows, find_runs, index_window
-from core.rotation import find_lengths
+from sagittal.core.errors import Notice
+from sagittal.core.frames import GRAVITY, Segment
+from sagittal.core.plurals import plural
+from sagittal.core.quality.inspection import measure_losses
+from sagittal.core.quality.signals import magnetic_share, measure_stream, saturation
+from sagittal.core.quality.suspicion import list_suspicions
+from sagittal.core.recording import Recording, SensorSignals, UniformRecording
+from sagittal.core.rest import QuietParams, Window, find_rest_windows, find_runs, index_window
+from sagittal.core.rotation import find_lengths
 
 Level = Literal["good", "usable", "poor"]
 """Best first."""

@@ -13,8 +13,8 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.frames import Floats
-from core.quality.devices import DeviceCheck
+from sagittal.core.frames import Floats
+from sagittal.core.quality.devices import DeviceCheck
 
 Quantity = Literal["gyro_bias", "scale", "scale_off", "gyro_noise", "acc_noise"]
 """scale: against earlier checks in the same posture; scale_off: against gravity."""

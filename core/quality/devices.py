@@ -13,10 +13,10 @@ from typing import Any, Final, Literal, Self
 
 import numpy as np
 
-from core.frames import GRAVITY, Floats
-from core.held_samples import is_complete
-from core.recording import ImuStream, SensorSignals
-from core.rest import (
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.held_samples import is_complete
+from sagittal.core.recording import ImuStream, SensorSignals
+from sagittal.core.rest import (
     RestParams,
     Window,
     find_windows,

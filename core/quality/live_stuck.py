@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.errors import Notice
-from core.frames import Segment
-from core.quality.stuck import CLIPPED, StuckParams, StuckWatch
-from core.timeline.live import UniformBlock
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Segment
+from sagittal.core.quality.stuck import CLIPPED, StuckParams, StuckWatch
+from sagittal.core.timeline.live import UniformBlock
 
 
 class StuckSensors:

@@ -14,9 +14,9 @@ from typing import Final
 
 import numpy as np
 
-from core import rotation
-from core.frames import Bools, Floats
-from core.quality.signals import STILL
+from sagittal.core import rotation
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.quality.signals import STILL
 
 SMOOTH_S: Final = 0.2
 SLOW_S: Final = 2.0

@@ -9,11 +9,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import GRAVITY, Floats
-from core.held_samples import is_complete
-from core.recording import ImuStream
-from core.rest import find_runs
-from core.rotation import find_lengths, find_squares
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.held_samples import is_complete
+from sagittal.core.recording import ImuStream
+from sagittal.core.rest import find_runs
+from sagittal.core.rotation import find_lengths, find_squares
 
 STILL: Final = 0.03
 """A second is still when acc varies less than this share of its mean (0.25 m/s²:

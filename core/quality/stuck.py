@@ -16,11 +16,11 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.errors import Notice
-from core.frames import GRAVITY, Bools, Floats, Segment
-from core.quality.signals import RANGES
-from core.recording import SensorSignals, UniformRecording
-from core.rest import find_runs
+from sagittal.core.errors import Notice
+from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
+from sagittal.core.quality.signals import RANGES
+from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.rest import find_runs
 
 CHANNELS: Final = 6
 """Of a sensor: three axes of the accelerometer, three of the gyroscope."""

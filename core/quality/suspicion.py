@@ -10,11 +10,11 @@ from typing import Final
 
 import numpy as np
 
-from core import rotation
-from core.errors import Notice, Severity
-from core.frames import GRAVITY, Floats
-from core.held_samples import is_complete
-from core.quality.signals import Facts
+from sagittal.core import rotation
+from sagittal.core.errors import Notice, Severity
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.held_samples import is_complete
+from sagittal.core.quality.signals import Facts
 
 TOLERANCE: Final = 0.10
 FAR_OFF: Final = 0.25

@@ -4,10 +4,10 @@ Hamilton, scalar first (w, x, y, z); q maps body to world: v_W = q ⊗ v_B ⊗ q
 Source: docs/coordinate-systems.md, "Frames"; references in docs/science/orientation.md.
 
 What this package gives itself is numpy and takes arrays with any leading axes. Compiled loops import
-`core.rotation.compiled`, which brings numba; readers of results do without.
+`sagittal.core.rotation.compiled`, which brings numba; readers of results do without.
 """
 
-from core.rotation.arrays import (
+from sagittal.core.rotation.arrays import (
     about,
     angle_between,
     conjugate,

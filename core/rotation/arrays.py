@@ -10,8 +10,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from core.frames import Floats
-from core.held_samples import AT_A_TIME, cut_blocks
+from sagittal.core.frames import Floats
+from sagittal.core.held_samples import AT_A_TIME, cut_blocks
 
 _SMALL = 1e-8
 

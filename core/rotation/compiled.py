@@ -11,8 +11,8 @@ from math import cos, pi, sin, sqrt
 import numba
 import numpy as np
 
-from core.frames import Floats
-from core.inner import inner_njit
+from sagittal.core.frames import Floats
+from sagittal.core.inner import inner_njit
 
 SMALL = 1e-8
 """Below this angle in rad the series of one term replaces the sine."""

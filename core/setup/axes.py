@@ -15,13 +15,13 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.terms import find_bias
-from core.frames import Bools, Floats
-from core.fusion.attitude import AttitudeParams, AttitudeState, advance
-from core.recording import SensorSignals
-from core.rest import find_runs, measure_quietness
-from core.rotation import rotate
-from core.setup.params import SetupParams
+from sagittal.core.agreement.terms import find_bias
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.fusion.attitude import AttitudeParams, AttitudeState, advance
+from sagittal.core.recording import SensorSignals
+from sagittal.core.rest import find_runs, measure_quietness
+from sagittal.core.rotation import rotate
+from sagittal.core.setup.params import SetupParams
 
 CHOICES: Final[Floats] = np.array(
     [

@@ -1,29 +1,29 @@
 """Simulated walkers and sensors with exact truth, for tests, demo and CLI (docs/simulation.md)."""
 
-from core.simulate.chest import ChestSimulation, ChestTruth, PostureHold, simulate_day
-from core.simulate.functional import (
+from sagittal.core.simulate.chest import ChestSimulation, ChestTruth, PostureHold, simulate_day
+from sagittal.core.simulate.functional import (
     FunctionalSimulation,
     FunctionalTruth,
     SwingsAndBows,
     simulate_swings_and_bows,
 )
-from core.simulate.magnetics import Dipole
-from core.simulate.mems import SensorNoise
-from core.simulate.movements import MOVEMENTS, Movement, simulate_movement
-from core.simulate.mt_text import mt_files, mt_text
-from core.simulate.patients import PATIENTS, SimulatedPatient
-from core.simulate.phases import Phase, phase_table
-from core.simulate.script import Arc, Pivot, Script, SingleSteps, Stand, Straight
-from core.simulate.scripts import SCRIPTS, Scenario, simulate_scenario
-from core.simulate.setup import Dropout, Lag, RecordingSetup
-from core.simulate.simulation import Simulation, simulate
-from core.simulate.soft_tissue import SoftTissue
-from core.simulate.squat import Squats, SquatSimulation, SquatTruth, simulate_squats
-from core.simulate.standing import Sway, SwaySimulation, SwayTruth, simulate_sway
-from core.simulate.tables import angle_table, event_table, stride_table
-from core.simulate.truth import WalkTruth
-from core.simulate.tug import ChairSimulation, ChairTruth, simulate_chair_rises, simulate_tug
-from core.simulate.walker import STEADY, SideGait, Variability, Walker
+from sagittal.core.simulate.magnetics import Dipole
+from sagittal.core.simulate.mems import SensorNoise
+from sagittal.core.simulate.movements import MOVEMENTS, Movement, simulate_movement
+from sagittal.core.simulate.mt_text import mt_files, mt_text
+from sagittal.core.simulate.patients import PATIENTS, SimulatedPatient
+from sagittal.core.simulate.phases import Phase, phase_table
+from sagittal.core.simulate.script import Arc, Pivot, Script, SingleSteps, Stand, Straight
+from sagittal.core.simulate.scripts import SCRIPTS, Scenario, simulate_scenario
+from sagittal.core.simulate.setup import Dropout, Lag, RecordingSetup
+from sagittal.core.simulate.simulation import Simulation, simulate
+from sagittal.core.simulate.soft_tissue import SoftTissue
+from sagittal.core.simulate.squat import Squats, SquatSimulation, SquatTruth, simulate_squats
+from sagittal.core.simulate.standing import Sway, SwaySimulation, SwayTruth, simulate_sway
+from sagittal.core.simulate.tables import angle_table, event_table, stride_table
+from sagittal.core.simulate.truth import WalkTruth
+from sagittal.core.simulate.tug import ChairSimulation, ChairTruth, simulate_chair_rises, simulate_tug
+from sagittal.core.simulate.walker import STEADY, SideGait, Variability, Walker
 
 __all__ = [
     "MOVEMENTS",

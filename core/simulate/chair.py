@@ -12,8 +12,8 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.frames import Floats
-from core.simulate.shapes import bump, smoothstep
+from sagittal.core.frames import Floats
+from sagittal.core.simulate.shapes import bump, smoothstep
 
 LEAN: Final = radians(35.0)
 """The trunk leans forward by so much on the way up from a chair, and down to it."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.frames import Floats
+from sagittal.core.frames import Floats
 
 
 @dataclass(frozen=True)

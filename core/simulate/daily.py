@@ -16,13 +16,13 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import ParameterError
-from core.formats.draft import signal_digest
-from core.frames import GRAVITY, Floats
-from core.recording import ImuStream, Recording, Subject
-from core.rotation import about, conjugate, multiply, rotate
-from core.sample_blocks import LongStream, SampleBlock
-from core.simulate.chest import (
+from sagittal.core.errors import ParameterError
+from sagittal.core.formats.draft import signal_digest
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.recording import ImuStream, Recording, Subject
+from sagittal.core.rotation import about, conjugate, multiply, rotate
+from sagittal.core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.simulate.chest import (
     POSTURES,
     STEPPING,
     ChestStyle,
@@ -30,11 +30,11 @@ from core.simulate.chest import (
     PostureHold,
     simulate_day,
 )
-from core.simulate.phases import Phase
-from core.simulate.scripts import ON_SKIN
-from core.simulate.sensors import Mount, draw_mounts
-from core.simulate.stance import Q_NEUTRAL
-from core.simulate.walker import Walker
+from sagittal.core.simulate.phases import Phase
+from sagittal.core.simulate.scripts import ON_SKIN
+from sagittal.core.simulate.sensors import Mount, draw_mounts
+from sagittal.core.simulate.stance import Q_NEUTRAL
+from sagittal.core.simulate.walker import Walker
 
 NOISE: Final = 0.03
 """White noise of the accelerometer, m/s²: that of wearables which record for days [our choice]."""

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.errors import ParameterError
-from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
-from core.rotation import about, from_matrix, multiply, rotate
-from core.simulate import pelvis
-from core.simulate.chair import ChairChange, sit_and_rise
-from core.simulate.script import Plan
-from core.simulate.stance import Sole, StanceFoot, foot_orientation
-from core.simulate.swing import FootMotion, foot_motion
-from core.simulate.timing import FootTiming, amplitude, body_phase, foot_timing, gait_phase
-from core.simulate.walker import SIGN, Walker
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from sagittal.core.rotation import about, from_matrix, multiply, rotate
+from sagittal.core.simulate import pelvis
+from sagittal.core.simulate.chair import ChairChange, sit_and_rise
+from sagittal.core.simulate.script import Plan
+from sagittal.core.simulate.stance import Sole, StanceFoot, foot_orientation
+from sagittal.core.simulate.swing import FootMotion, foot_motion
+from sagittal.core.simulate.timing import FootTiming, amplitude, body_phase, foot_timing, gait_phase
+from sagittal.core.simulate.walker import SIGN, Walker
 
 HINGE_FROM_PELVIS = 0.65
 """Share of the pelvis in the direction of the knee hinge; the rest follows the foot's heading."""
@@ -32,7 +32,7 @@ class BodyPath:
 
     Parameters
     ----------
-    t_s : (n,). q : segment → (n, 4). p : segment → (n, 3) m, origins as in core.body.poses.
+    t_s : (n,). q : segment → (n, 4). p : segment → (n, 3) m, origins as in sagittal.core.body.poses.
     """
 
     t_s: Floats

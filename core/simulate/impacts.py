@@ -14,8 +14,8 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment, Side
-from core.simulate.human import Motion
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment, Side
+from sagittal.core.simulate.human import Motion
 
 
 @dataclass(frozen=True)

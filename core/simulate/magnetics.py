@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import ParameterError
-from core.frames import Floats
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats
 
 FIELD_DIP: Final = radians(65.0)
 """Inclination of the Earth's field below the horizon in central Europe."""

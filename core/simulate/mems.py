@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import GRAVITY, Bools, Floats
-from core.simulate.sensors import SimulatedSignals
+from sagittal.core.frames import GRAVITY, Bools, Floats
+from sagittal.core.simulate.sensors import SimulatedSignals
 
 ACC_RANGE: Final = 16.0 * GRAVITY
 GYR_RANGE: Final = radians(2000.0)

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from core.errors import ParameterError
-from core.simulate.chest import ChestSimulation, Day, PostureHold, simulate_day
-from core.simulate.functional import FunctionalSimulation, SwingsAndBows, simulate_swings_and_bows
-from core.simulate.patients import PATIENTS
-from core.simulate.scripts import ON_SKIN
-from core.simulate.squat import Squats, SquatSimulation, simulate_squats
-from core.simulate.squat_chain import place_as_agreed
-from core.simulate.tug import ChairSimulation, simulate_chair_rises, simulate_tug
+from sagittal.core.errors import ParameterError
+from sagittal.core.simulate.chest import ChestSimulation, Day, PostureHold, simulate_day
+from sagittal.core.simulate.functional import FunctionalSimulation, SwingsAndBows, simulate_swings_and_bows
+from sagittal.core.simulate.patients import PATIENTS
+from sagittal.core.simulate.scripts import ON_SKIN
+from sagittal.core.simulate.squat import Squats, SquatSimulation, simulate_squats
+from sagittal.core.simulate.squat_chain import place_as_agreed
+from sagittal.core.simulate.tug import ChairSimulation, simulate_chair_rises, simulate_tug
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from math import radians as deg
 from types import MappingProxyType
 from typing import Final
 
-from core.frames import Side
-from core.simulate.walker import SideGait, Variability, Walker
+from sagittal.core.frames import Side
+from sagittal.core.simulate.walker import SideGait, Variability, Walker
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,15 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from core.frames import SIDES, Bools, Floats, Side
-from core.rotation import about, multiply, rotate
-from core.simulate.curves import PELVIS_OBLIQUITY, PELVIS_ROTATION, PELVIS_TILT
-from core.simulate.script import Plan
-from core.simulate.shapes import phase_bump, smooth, smooth_max, smoothstep
-from core.simulate.stance import Q_NEUTRAL
-from core.simulate.targets import DEGREE, knee_flexion
-from core.simulate.timing import FootTiming, size_window
-from core.simulate.walker import SIGN, Walker, leg_reach
+from sagittal.core.frames import SIDES, Bools, Floats, Side
+from sagittal.core.rotation import about, multiply, rotate
+from sagittal.core.simulate.curves import PELVIS_OBLIQUITY, PELVIS_ROTATION, PELVIS_TILT
+from sagittal.core.simulate.script import Plan
+from sagittal.core.simulate.shapes import phase_bump, smooth, smooth_max, smoothstep
+from sagittal.core.simulate.stance import Q_NEUTRAL
+from sagittal.core.simulate.targets import DEGREE, knee_flexion
+from sagittal.core.simulate.timing import FootTiming, size_window
+from sagittal.core.simulate.walker import SIGN, Walker, leg_reach
 
 FULL_FORWARD = 0.94
 """From this share of the reference step on the pelvis is fully ahead of the feet at contact."""

@@ -13,12 +13,12 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import GRAVITY, SIDES, Bools, Floats, Side
-from core.rotation import about, conjugate, multiply, rotate
-from core.simulate.shapes import bump, smoothstep
-from core.simulate.spline import differentiate_pose
-from core.simulate.stance import Q_NEUTRAL
-from core.simulate.walker import SIGN
+from sagittal.core.frames import GRAVITY, SIDES, Bools, Floats, Side
+from sagittal.core.rotation import about, conjugate, multiply, rotate
+from sagittal.core.simulate.shapes import bump, smoothstep
+from sagittal.core.simulate.spline import differentiate_pose
+from sagittal.core.simulate.stance import Q_NEUTRAL
+from sagittal.core.simulate.walker import SIGN
 
 LEG_M: Final = 0.92
 HIP_WIDTH_M: Final = 0.39

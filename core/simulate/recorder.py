@@ -9,12 +9,12 @@ from typing import Final
 
 import numpy as np
 
-from core.formats.draft import signal_digest
-from core.frames import Bools, Floats, Protocol, Segment
-from core.recording import ImuStream, Recording, Subject
-from core.simulate.mems import DrawnErrors, add_sensor_errors, clip_signals
-from core.simulate.sensors import SensorPath, SimulatedSignals, ideal_signals
-from core.simulate.setup import RecordingSetup
+from sagittal.core.formats.draft import signal_digest
+from sagittal.core.frames import Bools, Floats, Protocol, Segment
+from sagittal.core.recording import ImuStream, Recording, Subject
+from sagittal.core.simulate.mems import DrawnErrors, add_sensor_errors, clip_signals
+from sagittal.core.simulate.sensors import SensorPath, SimulatedSignals, ideal_signals
+from sagittal.core.simulate.setup import RecordingSetup
 
 FINE_RATE_HZ: Final = 400.0
 """The motion is worked out at least this fine, and at least four times as fine as the recording."""

@@ -12,9 +12,9 @@ from math import cos, inf, sin, sqrt
 
 import numpy as np
 
-from core.errors import ParameterError
-from core.frames import SIDES, Side
-from core.simulate.walker import SIGN, Walker
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.simulate.walker import SIGN, Walker
 
 CLOSING = 0.4
 """Length of a closing step relative to the step before."""

@@ -8,15 +8,15 @@ from math import pi, radians
 from types import MappingProxyType
 from typing import Final
 
-from core.errors import ParameterError
-from core.frames import Segment
-from core.simulate.mems import MEMS
-from core.simulate.patients import PATIENTS, QUICKLY, SLOWLY, SimulatedPatient
-from core.simulate.script import Arc, Pivot, Script, SingleSteps, Stand, Straight, scale_script
-from core.simulate.setup import Dropout, RecordingSetup
-from core.simulate.simulation import Simulation, simulate
-from core.simulate.soft_tissue import SoftTissue
-from core.simulate.walker import Walker
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Segment
+from sagittal.core.simulate.mems import MEMS
+from sagittal.core.simulate.patients import PATIENTS, QUICKLY, SLOWLY, SimulatedPatient
+from sagittal.core.simulate.script import Arc, Pivot, Script, SingleSteps, Stand, Straight, scale_script
+from sagittal.core.simulate.setup import Dropout, RecordingSetup
+from sagittal.core.simulate.simulation import Simulation, simulate
+from sagittal.core.simulate.soft_tissue import SoftTissue
+from sagittal.core.simulate.walker import Walker
 
 ON_SKIN: Final = RecordingSetup(tissue=SoftTissue(), impacts=True)
 """Named scripts are recorded with sensors on skin and the shock of contact: fixed to the bone, without

@@ -12,13 +12,13 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.frames import GRAVITY, Floats, Segment
-from core.rotation import about, conjugate, exp, log, multiply, rotate
-from core.simulate.human import BodyPath
-from core.simulate.impacts import Impact, shake_sensor
-from core.simulate.magnetics import Dipole, field_at
-from core.simulate.soft_tissue import SoftTissue, skin_motion
-from core.simulate.spline import differentiate_pose, resample_pose, sign_continuous
+from sagittal.core.frames import GRAVITY, Floats, Segment
+from sagittal.core.rotation import about, conjugate, exp, log, multiply, rotate
+from sagittal.core.simulate.human import BodyPath
+from sagittal.core.simulate.impacts import Impact, shake_sensor
+from sagittal.core.simulate.magnetics import Dipole, field_at
+from sagittal.core.simulate.soft_tissue import SoftTissue, skin_motion
+from sagittal.core.simulate.spline import differentiate_pose, resample_pose, sign_continuous
 
 Sampling = Literal["instant", "increment"]
 """instant: values at the sample; increment: mean over the interval before it, as strapdown devices send."""

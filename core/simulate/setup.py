@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 
-from core.errors import ParameterError
-from core.frames import SEGMENTS, Segment
-from core.simulate.magnetics import Dipole
-from core.simulate.mems import ACC_RANGE, GYR_RANGE, MEMS, SensorNoise
-from core.simulate.sensors import Sampling
-from core.simulate.soft_tissue import SoftTissue
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import SEGMENTS, Segment
+from sagittal.core.simulate.magnetics import Dipole
+from sagittal.core.simulate.mems import ACC_RANGE, GYR_RANGE, MEMS, SensorNoise
+from sagittal.core.simulate.sensors import Sampling
+from sagittal.core.simulate.soft_tissue import SoftTissue
 
 
 @dataclass(frozen=True)

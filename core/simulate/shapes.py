@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from core.frames import Floats
+from sagittal.core.frames import Floats
 
 
 def smoothstep(u: Floats) -> Floats:

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.frames import Segment
-from core.simulate.human import move
-from core.simulate.impacts import draw_impacts
-from core.simulate.recorder import Draws, Recorded, oversampling, record
-from core.simulate.script import Script, plan
-from core.simulate.sensors import PLACES, draw_mounts, place_sensor
-from core.simulate.setup import RecordingSetup
-from core.simulate.truth import WalkTruth, truth_of
-from core.simulate.walker import Walker
+from sagittal.core.frames import Segment
+from sagittal.core.simulate.human import move
+from sagittal.core.simulate.impacts import draw_impacts
+from sagittal.core.simulate.recorder import Draws, Recorded, oversampling, record
+from sagittal.core.simulate.script import Script, plan
+from sagittal.core.simulate.sensors import PLACES, draw_mounts, place_sensor
+from sagittal.core.simulate.setup import RecordingSetup
+from sagittal.core.simulate.truth import WalkTruth, truth_of
+from sagittal.core.simulate.walker import Walker
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,9 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import SHANK, SIDES, THIGH, Floats, Segment, Side
-from core.rotation import conjugate, exp, multiply, to_matrix
-from core.simulate.walker import SIGN
+from sagittal.core.frames import SHANK, SIDES, THIGH, Floats, Segment, Side
+from sagittal.core.rotation import conjugate, exp, multiply, to_matrix
+from sagittal.core.simulate.walker import SIGN
 
 SHANK_SHARE: Final = 0.6
 """Rotation of a shank sensor relative to a thigh sensor's; there is less muscle under it."""

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from core.frames import Floats
-from core.rotation import conjugate, multiply, normalise
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import conjugate, multiply, normalise
 
 
 def differentiate_pose(t: Floats, p: Floats, q: Floats) -> tuple[Floats, Floats, Floats]:

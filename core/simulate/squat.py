@@ -15,18 +15,18 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.errors import ParameterError
-from core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
-from core.rotation import about, multiply, rotate
-from core.simulate.human import BodyPath
-from core.simulate.phases import Phase
-from core.simulate.recorder import Draws, Recorded, oversampling, record
-from core.simulate.sensors import PLACES, Mount, draw_mounts, place_sensor
-from core.simulate.setup import RecordingSetup
-from core.simulate.shapes import smoothstep
-from core.simulate.stance import Q_NEUTRAL
-from core.simulate.truth import joint_angles
-from core.simulate.walker import SIGN, Anatomy, Walker
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
+from sagittal.core.rotation import about, multiply, rotate
+from sagittal.core.simulate.human import BodyPath
+from sagittal.core.simulate.phases import Phase
+from sagittal.core.simulate.recorder import Draws, Recorded, oversampling, record
+from sagittal.core.simulate.sensors import PLACES, Mount, draw_mounts, place_sensor
+from sagittal.core.simulate.setup import RecordingSetup
+from sagittal.core.simulate.shapes import smoothstep
+from sagittal.core.simulate.stance import Q_NEUTRAL
+from sagittal.core.simulate.truth import joint_angles
+from sagittal.core.simulate.walker import SIGN, Anatomy, Walker
 
 DOWN: Final = 0.52
 """Share of the moving time spent on the way down."""

@@ -9,12 +9,12 @@ from typing import Final
 
 import numpy as np
 
-from core.body.chain.geometry import LegGeometry
-from core.calibration.fixed_offset import make_fixed_mounts
-from core.frames import SHANK, THIGH, Floats, Segment, Side
-from core.rotation import exp, from_matrix, to_matrix
-from core.simulate.sensors import Mount
-from core.simulate.walker import Walker
+from sagittal.core.body.chain.geometry import LegGeometry
+from sagittal.core.calibration.fixed_offset import make_fixed_mounts
+from sagittal.core.frames import SHANK, THIGH, Floats, Segment, Side
+from sagittal.core.rotation import exp, from_matrix, to_matrix
+from sagittal.core.simulate.sensors import Mount
+from sagittal.core.simulate.walker import Walker
 
 TURNED: Final = radians(10.0)
 """Largest turn of a sensor about each axis where a hand put it on."""

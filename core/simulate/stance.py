@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.frames import R_NEUTRAL, Floats, Side
-from core.rotation import about, from_matrix, multiply, rotate
-from core.simulate.curves import FOOT_PITCH
-from core.simulate.script import Footprint, Plan
-from core.simulate.shapes import smoothstep
-from core.simulate.timing import RELEASE_PHASE, FootTiming
-from core.simulate.walker import Walker
+from sagittal.core.frames import R_NEUTRAL, Floats, Side
+from sagittal.core.rotation import about, from_matrix, multiply, rotate
+from sagittal.core.simulate.curves import FOOT_PITCH
+from sagittal.core.simulate.script import Footprint, Plan
+from sagittal.core.simulate.shapes import smoothstep
+from sagittal.core.simulate.timing import RELEASE_PHASE, FootTiming
+from sagittal.core.simulate.walker import Walker
 
 Q_NEUTRAL = from_matrix(R_NEUTRAL)
 """Orientation of every segment in neutral standing with heading +x."""

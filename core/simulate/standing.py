@@ -13,15 +13,15 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import ParameterError
-from core.frames import GRAVITY, Segment
-from core.rotation import about, multiply, rotate
-from core.simulate.recorder import Draws, Recorded, oversampling, record
-from core.simulate.sensors import Mount, SensorPath, draw_mounts
-from core.simulate.setup import RecordingSetup
-from core.simulate.spline import sign_continuous
-from core.simulate.stance import Q_NEUTRAL
-from core.simulate.walker import Walker
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import GRAVITY, Segment
+from sagittal.core.rotation import about, multiply, rotate
+from sagittal.core.simulate.recorder import Draws, Recorded, oversampling, record
+from sagittal.core.simulate.sensors import Mount, SensorPath, draw_mounts
+from sagittal.core.simulate.setup import RecordingSetup
+from sagittal.core.simulate.spline import sign_continuous
+from sagittal.core.simulate.stance import Q_NEUTRAL
+from sagittal.core.simulate.walker import Walker
 
 HEIGHTS_M: Final[dict[Segment, float]] = {"pelvis": 0.95, "chest": 1.30}
 """Sensors above the ankles of the reference person."""

@@ -9,14 +9,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.frames import Floats
-from core.rotation import about, multiply, rotate
-from core.simulate.pelvis import hip_offset
-from core.simulate.shapes import bump, join, phase_bump, smooth_max, smoothstep
-from core.simulate.stance import StanceFoot, foot_orientation
-from core.simulate.targets import DEGREE, ankle_dorsiflexion, hip_adduction, hip_flexion, knee_flexion
-from core.simulate.timing import RELEASE_PHASE
-from core.simulate.walker import SIGN, leg_reach
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import about, multiply, rotate
+from sagittal.core.simulate.pelvis import hip_offset
+from sagittal.core.simulate.shapes import bump, join, phase_bump, smooth_max, smoothstep
+from sagittal.core.simulate.stance import StanceFoot, foot_orientation
+from sagittal.core.simulate.targets import (
+    DEGREE,
+    ankle_dorsiflexion,
+    hip_adduction,
+    hip_flexion,
+    knee_flexion,
+)
+from sagittal.core.simulate.timing import RELEASE_PHASE
+from sagittal.core.simulate.walker import SIGN, leg_reach
 
 UP = np.array([0.0, 1.0, 0.0])
 LEAVE, LAND = 0.22, 0.25

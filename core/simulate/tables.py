@@ -5,8 +5,8 @@ Writing degrees and bytes is the business of the server (spec: one place where d
 
 from __future__ import annotations
 
-from core.frames import SIDES, Floats
-from core.simulate.truth import WalkTruth
+from sagittal.core.frames import SIDES, Floats
+from sagittal.core.simulate.truth import WalkTruth
 
 Column = list[float] | list[float | None] | list[str]
 

@@ -11,10 +11,10 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import Floats
-from core.simulate.curves import ANKLE_DORSIFLEXION, HIP_ADDUCTION, HIP_FLEXION, KNEE_FLEXION
-from core.simulate.shapes import phase_bump
-from core.simulate.walker import SideGait
+from sagittal.core.frames import Floats
+from sagittal.core.simulate.curves import ANKLE_DORSIFLEXION, HIP_ADDUCTION, HIP_FLEXION, KNEE_FLEXION
+from sagittal.core.simulate.shapes import phase_bump
+from sagittal.core.simulate.walker import SideGait
 
 DEGREE: Final = radians(1.0)
 

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from core.frames import Bools, Floats, Side
-from core.simulate.script import Plan
-from core.simulate.shapes import smooth
-from core.simulate.walker import SideGait, Walker
+from sagittal.core.frames import Bools, Floats, Side
+from sagittal.core.simulate.script import Plan
+from sagittal.core.simulate.shapes import smooth
+from sagittal.core.simulate.walker import SideGait, Walker
 
 RELEASE_PHASE = 0.59
 """Phase at which the foot leaves the floor; WBDS foot-off, 0.62, is about when the sole is 5 mm up."""

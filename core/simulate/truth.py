@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.body.model import BodyModel
-from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
-from core.rotation import to_matrix
-from core.simulate.human import Motion
-from core.simulate.mems import DrawnErrors
-from core.simulate.script import Footprint
-from core.simulate.sensors import Mount
-from core.simulate.timing import FootTiming
-from core.simulate.walker import SIGN
+from sagittal.core.body.model import BodyModel
+from sagittal.core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
+from sagittal.core.rotation import to_matrix
+from sagittal.core.simulate.human import Motion
+from sagittal.core.simulate.mems import DrawnErrors
+from sagittal.core.simulate.script import Footprint
+from sagittal.core.simulate.sensors import Mount
+from sagittal.core.simulate.timing import FootTiming
+from sagittal.core.simulate.walker import SIGN
 
 LIFT_M = 0.005
 """Foot off the floor as detectors see it: lowest sole point this high

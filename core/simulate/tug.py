@@ -15,21 +15,21 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from core.errors import ParameterError
-from core.frames import Floats, Segment
-from core.rotation import about, multiply, rotate
-from core.simulate.chair import ChairChange, sit_and_rise
-from core.simulate.chest import CHANGE_S, POSTURES
-from core.simulate.human import Motion, move
-from core.simulate.impacts import draw_impacts
-from core.simulate.patients import PATIENTS
-from core.simulate.phases import Phase
-from core.simulate.recorder import Draws, Recorded, oversampling, record
-from core.simulate.script import Item, Pivot, Stand, Straight, plan
-from core.simulate.sensors import PLACES, Mount, SensorPath, draw_mounts, place_sensor
-from core.simulate.setup import RecordingSetup
-from core.simulate.spline import sign_continuous
-from core.simulate.stance import Q_NEUTRAL
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.rotation import about, multiply, rotate
+from sagittal.core.simulate.chair import ChairChange, sit_and_rise
+from sagittal.core.simulate.chest import CHANGE_S, POSTURES
+from sagittal.core.simulate.human import Motion, move
+from sagittal.core.simulate.impacts import draw_impacts
+from sagittal.core.simulate.patients import PATIENTS
+from sagittal.core.simulate.phases import Phase
+from sagittal.core.simulate.recorder import Draws, Recorded, oversampling, record
+from sagittal.core.simulate.script import Item, Pivot, Stand, Straight, plan
+from sagittal.core.simulate.sensors import PLACES, Mount, SensorPath, draw_mounts, place_sensor
+from sagittal.core.simulate.setup import RecordingSetup
+from sagittal.core.simulate.spline import sign_continuous
+from sagittal.core.simulate.stance import Q_NEUTRAL
 
 WALK_M: Final = 3.0
 """Way to the mark (Podsiadlo and Richardson 1991)."""

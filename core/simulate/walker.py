@@ -8,9 +8,9 @@ from math import radians
 
 import numpy as np
 
-from core.body.model import BodyModel
-from core.errors import ParameterError
-from core.frames import Floats, Side
+from sagittal.core.body.model import BodyModel
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats, Side
 
 REFERENCE_HEIGHT_M = 1.745
 """Height of the person the target curves were fitted for: leg and ankle height 0.925 m = 0.53 of body height

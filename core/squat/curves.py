@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import JointAngles
-from core.frames import SUFFIX, Floats, Side
-from core.parameters.resample import resample
+from sagittal.core.angles import JointAngles
+from sagittal.core.frames import SUFFIX, Floats, Side
+from sagittal.core.parameters.resample import resample
 
 KNEE: Final = "knee_flexion"
 INWARD: Final = ("hip_adduction", "hip_rotation")

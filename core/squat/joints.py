@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import SIGNS, cardan_zxy
-from core.frames import SUFFIX, Floats, Side
-from core.rotation import about, multiply
+from sagittal.core.angles import SIGNS, cardan_zxy
+from sagittal.core.frames import SUFFIX, Floats, Side
+from sagittal.core.rotation import about, multiply
 
 JOINTS: Final = (
     "ankle_rotation", "ankle_inversion", "ankle_dorsiflexion", "knee_flexion", "hip_flexion", "hip_adduction",

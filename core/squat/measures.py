@@ -12,16 +12,16 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import JointAngles
-from core.body.chain.leg import LegMotion
-from core.frames import FOOT, SUFFIX, Floats, Side
-from core.parameters.catalogue import list_names, unit_of
-from core.parameters.catalogue.entry import SQUAT
-from core.parameters.result import Parameter
-from core.parameters.variability import summarise_values
-from core.recording import UniformRecording
-from core.squat.curves import CURVES, INWARD, KNEE, cut_curves
-from core.squat.repetitions import FOOT_LIFTED, Repetition, RepetitionParams, find_repetitions
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.chain.leg import LegMotion
+from sagittal.core.frames import FOOT, SUFFIX, Floats, Side
+from sagittal.core.parameters.catalogue import list_names, unit_of
+from sagittal.core.parameters.catalogue.entry import SQUAT
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.variability import summarise_values
+from sagittal.core.recording import UniformRecording
+from sagittal.core.squat.curves import CURVES, INWARD, KNEE, cut_curves
+from sagittal.core.squat.repetitions import FOOT_LIFTED, Repetition, RepetitionParams, find_repetitions
 
 MEASURES: Final = list_names(SQUAT, "take")
 """Names in the order of the table; what each is: docs/science/squat.md, "Measures"."""
@@ -52,7 +52,7 @@ def measure_squats(
     recording: UniformRecording | None = None,
     params: RepetitionParams | None = None,
 ) -> SquatSide:
-    """Find and measure the squats of one leg; two legs are compared by `core.parameters.symmetry`.
+    """Find and measure the squats of one leg; two legs are compared by `sagittal.core.parameters.symmetry`.
 
     Parameters
     ----------

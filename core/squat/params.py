@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from core.body.chain.filter import ChainFilterParams
-from core.calibration.table_top import TableTopParams
-from core.errors import ParameterError
-from core.squat.repetitions import RepetitionParams
+from sagittal.core.body.chain.filter import ChainFilterParams
+from sagittal.core.calibration.table_top import TableTopParams
+from sagittal.core.errors import ParameterError
+from sagittal.core.squat.repetitions import RepetitionParams
 
 SquatMounting = Literal["fixed_offset", "table_top"]
 

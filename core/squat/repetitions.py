@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import ParameterError
-from core.frames import Bools, Floats, Side
-from core.peaks import find_peaks
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Bools, Floats, Side
+from sagittal.core.peaks import find_peaks
 
 FOOT_LIFTED: Final = "foot_lifted"
 CODES: Final = (FOOT_LIFTED, "incomplete", "signal_lost", "foot_moved")

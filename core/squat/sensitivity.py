@@ -14,18 +14,18 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import cardan_zxy
-from core.body.chain.filter import ChainFilter, ChainFilterParams
-from core.body.chain.geometry import LegGeometry
-from core.body.chain.leg import read_leg_signals
-from core.body.chain.model import build_leg_chain, leg_segments
-from core.calibration.fixed_offset import BACK, FRONT
-from core.calibration.result import CalibratedRecording
-from core.calibration.standing_leg import find_standing_legs
-from core.errors import EstimationError, ParameterError
-from core.frames import SUFFIX, Bools, Floats, Segment, Side
-from core.rotation import about, from_matrix, to_matrix
-from core.squat.joints import JOINTS, name_joint_angles
+from sagittal.core.angles import cardan_zxy
+from sagittal.core.body.chain.filter import ChainFilter, ChainFilterParams
+from sagittal.core.body.chain.geometry import LegGeometry
+from sagittal.core.body.chain.leg import read_leg_signals
+from sagittal.core.body.chain.model import build_leg_chain, leg_segments
+from sagittal.core.calibration.fixed_offset import BACK, FRONT
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.calibration.standing_leg import find_standing_legs
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.frames import SUFFIX, Bools, Floats, Segment, Side
+from sagittal.core.rotation import about, from_matrix, to_matrix
+from sagittal.core.squat.joints import JOINTS, name_joint_angles
 
 UP, FORWARD, RIGHT = 1, 0, 2
 

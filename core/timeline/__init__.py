@@ -1,6 +1,6 @@
 """Packet counters and device clocks → ONE uniform axis and a validity mask per sensor, of a file or live."""
 
-from core.timeline.params import TimelineParams
-from core.timeline.synchronise import synchronise
+from sagittal.core.timeline.params import TimelineParams
+from sagittal.core.timeline.synchronise import synchronise
 
 __all__ = ["TimelineParams", "synchronise"]

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from core.formats.live_clock import Micros
-from core.frames import Bools, Floats
-from core.timeline.grid import MEASURED, NEVER_S, append_good, find_known_until, lay_points
-from core.timeline.params import TimelineParams
+from sagittal.core.formats.live_clock import Micros
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.timeline.grid import MEASURED, NEVER_S, append_good, find_known_until, lay_points
+from sagittal.core.timeline.params import TimelineParams
 
 Ints = NDArray[np.int64]
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import Bools, Floats, Segment
+from sagittal.core.frames import Bools, Floats, Segment
 
 Columns = NDArray[np.int64] | None
 """Places of some sensors among others; None = all of these in the same order, nothing is copied."""

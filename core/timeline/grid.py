@@ -12,8 +12,8 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.frames import Bools, Floats
-from core.timeline.params import TimelineParams
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.timeline.params import TimelineParams
 
 NEVER_S: Final = -1e12
 """Time of the sample before the first: further back than any hole that is filled."""

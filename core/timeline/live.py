@@ -14,13 +14,20 @@ from math import floor
 
 import numpy as np
 
-from core.errors import Notice, SignalError
-from core.formats.live_clock import LiveClock, sample_times_us
-from core.formats.live_log import Hello, SampleBatch, SensorInfo, StreamInfo, decode_batch, encode_batch
-from core.frames import Bools, Floats, Segment
-from core.timeline.buffer import SampleBuffer
-from core.timeline.params import TimelineParams
-from core.timeline.queue import StreamQueue
+from sagittal.core.errors import Notice, SignalError
+from sagittal.core.formats.live_clock import LiveClock, sample_times_us
+from sagittal.core.formats.live_log import (
+    Hello,
+    SampleBatch,
+    SensorInfo,
+    StreamInfo,
+    decode_batch,
+    encode_batch,
+)
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.timeline.buffer import SampleBuffer
+from sagittal.core.timeline.params import TimelineParams
+from sagittal.core.timeline.queue import StreamQueue
 
 
 @dataclass(frozen=True)

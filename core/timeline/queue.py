@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.formats.live_clock import Micros
-from core.formats.live_hello import StreamInfo
-from core.formats.live_log import SampleBatch
+from sagittal.core.formats.live_clock import Micros
+from sagittal.core.formats.live_hello import StreamInfo
+from sagittal.core.formats.live_log import SampleBatch
 
 LONGEST_SPAN_US: Final = 1_000_000
 """A sender may gather samples for so long; a stream is not overdue while its usual batch can be gathered."""

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.errors import Notice, SignalError
-from core.frames import Bools, Floats, Segment
-from core.held_samples import is_complete
-from core.recording import ImuStream, Recording, SensorSignals, UniformRecording
-from core.timeline.grid import lay_signal
-from core.timeline.params import TimelineParams
+from sagittal.core.errors import Notice, SignalError
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.held_samples import is_complete
+from sagittal.core.recording import ImuStream, Recording, SensorSignals, UniformRecording
+from sagittal.core.timeline.grid import lay_signal
+from sagittal.core.timeline.params import TimelineParams
 
 
 def synchronise(recording: Recording, params: TimelineParams | None = None) -> UniformRecording:

@@ -3,7 +3,7 @@
 import sqlalchemy as sa
 from alembic import op
 
-from server.storage.migration_steps import forbid_changes, is_sqlite
+from sagittal.server.storage.migration_steps import forbid_changes, is_sqlite
 
 revision = "0001"
 down_revision = None

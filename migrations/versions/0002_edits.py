@@ -3,7 +3,7 @@
 import sqlalchemy as sa
 from alembic import op
 
-from server.storage.migration_steps import forbid_changes
+from sagittal.server.storage.migration_steps import forbid_changes
 
 revision = "0002"
 down_revision = "0001"

@@ -3,7 +3,7 @@
 import sqlalchemy as sa
 from alembic import op
 
-from server.storage.migration_steps import rebuild
+from sagittal.server.storage.migration_steps import rebuild
 
 revision = "0006"
 down_revision = "0005"

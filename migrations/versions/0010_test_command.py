@@ -3,7 +3,7 @@
 import sqlalchemy as sa
 from alembic import op
 
-from server.storage.migration_steps import forbid_changes, is_sqlite, rebuild
+from sagittal.server.storage.migration_steps import forbid_changes, is_sqlite, rebuild
 
 revision = "0010"
 down_revision = "0009"

@@ -8,11 +8,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints
 
-from server.api.schemas import Line, Request
-from server.auth import api_tokens
-from server.auth.api_tokens import Scope
-from server.auth.passwords import MAX_LENGTH, MIN_LENGTH
-from server.auth.roles import Role
+from sagittal.server.api.schemas import Line, Request
+from sagittal.server.auth import api_tokens
+from sagittal.server.auth.api_tokens import Scope
+from sagittal.server.auth.passwords import MAX_LENGTH, MIN_LENGTH
+from sagittal.server.auth.roles import Role
 
 SignInName = Annotated[
     str, StringConstraints(min_length=1, max_length=64, pattern=r"^[a-z0-9][a-z0-9._@-]*$")

@@ -7,16 +7,16 @@ from typing import Annotated
 from fastapi import APIRouter
 from starlette.responses import Response
 
-from server.api import schemas
-from server.api.documents import refusals
-from server.api.downloads import ANY_FILE, attachment
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Db, Id, OpenTrail, Queue
-from server.http.json_body import StrictJsonRoute
-from server.jobs.queue import JobView
-from server.services import analyses, recordings, sessions
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.downloads import ANY_FILE, attachment
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Db, Id, OpenTrail, Queue
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.jobs.queue import JobView
+from sagittal.server.services import analyses, recordings, sessions
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["analyses"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

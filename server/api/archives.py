@@ -9,13 +9,13 @@ from typing import IO, Annotated
 from fastapi import APIRouter
 from starlette.responses import StreamingResponse
 
-from server.api.downloads import BINARY
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Db, Id, OpenTrail, Reviewed
-from server.report.tables import curves_csv, parameters_csv
-from server.services import (
+from sagittal.server.api.downloads import BINARY
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Db, Id, OpenTrail, Reviewed
+from sagittal.server.report.tables import curves_csv, parameters_csv
+from sagittal.server.services import (
     analyses,
     archives,
     controls,

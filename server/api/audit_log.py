@@ -6,14 +6,14 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from server import audit
-from server.api import schemas
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db
-from server.services.errors import NotFound
-from server.storage.high_water import read_newest
+from sagittal.server import audit
+from sagittal.server.api import schemas
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db
+from sagittal.server.services.errors import NotFound
+from sagittal.server.storage.high_water import read_newest
 
 router = APIRouter(prefix="/audit", tags=["audit"])
 

@@ -6,15 +6,15 @@ from typing import Annotated
 
 from fastapi import APIRouter, Request
 
-from server.api import schemas
-from server.api.documents import refusals
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Failures, Id, OpenTrail, address_of
-from server.http.json_body import StrictJsonRoute
-from server.services import care_teams, patients
-from server.services.errors import NotFound
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Failures, Id, OpenTrail, address_of
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.services import care_teams, patients
+from sagittal.server.services.errors import NotFound
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["care teams"])
 Admin = Annotated[Identity, require(Action.MANAGE_USERS)]

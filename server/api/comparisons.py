@@ -8,20 +8,20 @@ from fastapi import APIRouter
 from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
-from server.api import trend_schemas
-from server.api.documents import refusals
-from server.api.downloads import BINARY, attachment
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id, OpenTrail, Reviewed
-from server.report.columns import reduce_to_plain
-from server.report.comparison import comparison_csv
-from server.services import comparisons
-from server.services.comparisons import SessionPair
-from server.services.histories import AnalysedSession
-from server.storage.db import Database
-from server.trail import AuditTrail
+from sagittal.server.api import trend_schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.downloads import BINARY, attachment
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id, OpenTrail, Reviewed
+from sagittal.server.report.columns import reduce_to_plain
+from sagittal.server.report.comparison import comparison_csv
+from sagittal.server.services import comparisons
+from sagittal.server.services.comparisons import SessionPair
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.storage.db import Database
+from sagittal.server.trail import AuditTrail
 
 router = APIRouter(prefix="/sessions/{session_id}/compare", tags=["trends"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

@@ -10,15 +10,15 @@ from typing import Annotated, Final, Literal
 from fastapi import APIRouter
 from starlette.responses import Response
 
-from server.api.downloads import BINARY, attachment
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, DeviceId
-from server.report.columns import write_csv
-from server.report.device_words import judge_device
-from server.services import devices
-from server.services.devices import DatedCheck, KnownDevice
+from sagittal.server.api.downloads import BINARY, attachment
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, DeviceId
+from sagittal.server.report.columns import write_csv
+from sagittal.server.report.device_words import judge_device
+from sagittal.server.services import devices
+from sagittal.server.services.devices import DatedCheck, KnownDevice
 
 router = APIRouter(tags=["devices"])
 Reader = Annotated[Identity, require(Action.READ_DEVICE)]

@@ -8,8 +8,8 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import TypeAdapter
 
-from server.api.schemas import ProblemDetails
-from server.http.problems import MEDIA_TYPE
+from sagittal.server.api.schemas import ProblemDetails
+from sagittal.server.http.problems import MEDIA_TYPE
 
 _WORDS = {
     "400": "The request cannot be read, or its host name is not ours",

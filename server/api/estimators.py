@@ -8,11 +8,11 @@ from typing import Annotated
 from fastapi import APIRouter
 from pydantic import Field
 
-from core.estimators import ESTIMATORS, PaperReference, PoseEstimator
-from core.frames import SEGMENTS, Segment
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
+from sagittal.core.estimators import ESTIMATORS, PaperReference, PoseEstimator
+from sagittal.core.frames import SEGMENTS, Segment
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
 
 router = APIRouter(prefix="/estimators", tags=["analyses"])
 

@@ -7,16 +7,16 @@ from typing import Annotated
 from fastapi import APIRouter
 from pydantic import Field
 
-from server.api import schemas
-from server.api.documents import refusals
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id, OpenTrail, Queue
-from server.export.kinds import ExportName
-from server.http.json_body import StrictJsonRoute
-from server.jobs.queue import JobView
-from server.services import analyses, exports, patients, sessions
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id, OpenTrail, Queue
+from sagittal.server.export.kinds import ExportName
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.jobs.queue import JobView
+from sagittal.server.services import analyses, exports, patients, sessions
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["exports"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints
 
-from server.api.schemas import HexId, Request, Side
+from sagittal.server.api.schemas import HexId, Request, Side
 
-# limits of the numbers are those of core.feedback.Prescription, whose sentences say what was expected
+# limits of the numbers are those of sagittal.core.feedback.Prescription; its errors say what was expected
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Source = Literal["norm", "own_better_side", "own_baseline", "manual"]
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9_]{1,64}$")]

@@ -12,15 +12,15 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 
-from server.api import schemas
-from server.api.documents import refusals
-from server.api.downloads import BINARY, attachment
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Config, Db, Id, OpenTrail
-from server.http.problems import Problem
-from server.services import recordings
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.downloads import BINARY, attachment
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Config, Db, Id, OpenTrail
+from sagittal.server.http.problems import Problem
+from sagittal.server.services import recordings
 
 router = APIRouter(prefix="/sessions/{session_id}/files", tags=["files"])
 

@@ -8,15 +8,15 @@ from fastapi import APIRouter, Depends, Header, Path, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
-from server.api import live_schemas as schemas
-from server.api.documents import PUBLIC, refusals
-from server.api.files import RAW_BODY, read_size
-from server.auth.access import require
-from server.auth.roles import Action
-from server.context import Films, Id
-from server.http.json_body import StrictJsonRoute
-from server.http.problems import Problem
-from server.services import films
+from sagittal.server.api import live_schemas as schemas
+from sagittal.server.api.documents import PUBLIC, refusals
+from sagittal.server.api.files import RAW_BODY, read_size
+from sagittal.server.auth.access import require
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Films, Id
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.http.problems import Problem
+from sagittal.server.services import films
 
 router = APIRouter(
     route_class=StrictJsonRoute,

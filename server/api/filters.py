@@ -11,19 +11,19 @@ from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from core.estimators import PaperReference
-from server.api import schemas
-from server.api.documents import refusals
-from server.api.downloads import ANY_FILE, attachment
-from server.api.files import RAW_BODY, read_size, receive_body
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Config, Db, Id, OpenTrail, Queue
-from server.http.json_body import StrictJsonRoute
-from server.jobs.queue import JobView
-from server.report.filter_list import FILTERS
-from server.services import filter_runs, recordings, reference_files, sessions
+from sagittal.core.estimators import PaperReference
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.downloads import ANY_FILE, attachment
+from sagittal.server.api.files import RAW_BODY, read_size, receive_body
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Config, Db, Id, OpenTrail, Queue
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.jobs.queue import JobView
+from sagittal.server.report.filter_list import FILTERS
+from sagittal.server.services import filter_runs, recordings, reference_files, sessions
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["filters"])
 references = APIRouter(prefix="/sessions/{session_id}/references", tags=["filters"])

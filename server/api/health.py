@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from server.api import schemas
-from server.api.documents import PUBLIC
-from server.auth.access import require
-from server.auth.roles import Action
-from server.storage.readiness import Readiness
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import PUBLIC
+from sagittal.server.auth.access import require
+from sagittal.server.auth.roles import Action
+from sagittal.server.storage.readiness import Readiness
 
 router = APIRouter(prefix="/health", tags=["health"], dependencies=[])
 _DOOR = [require(Action.CHECK_HEALTH)]

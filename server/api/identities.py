@@ -6,15 +6,15 @@ from typing import Annotated
 
 from fastapi import APIRouter
 
-from server.api import schemas
-from server.api.documents import refusals
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Config, Db, Id, OpenTrail
-from server.http.json_body import StrictJsonRoute
-from server.services import identities
-from server.services.identities import PatientIdentity
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Config, Db, Id, OpenTrail
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.services import identities
+from sagittal.server.services.identities import PatientIdentity
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["patients"])
 

@@ -12,14 +12,14 @@ from pydantic import TypeAdapter
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
-from server import context
-from server.auth.access import find_end, require, wait_for_end
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id, OpenTrail
-from server.jobs.feed import JobFeed
-from server.jobs.queue import JobView
-from server.services import jobs
+from sagittal.server import context
+from sagittal.server.auth.access import find_end, require, wait_for_end
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id, OpenTrail
+from sagittal.server.jobs.feed import JobFeed
+from sagittal.server.jobs.queue import JobView
+from sagittal.server.services import jobs
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 KEEP_ALIVE_S = 15.0

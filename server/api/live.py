@@ -7,15 +7,15 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 
-from server.api import live_schemas as schemas
-from server.api.documents import PUBLIC, refusals
-from server.api.schemas import make_answer
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Failures, Id, LiveHub, OpenTrail, address_of
-from server.http.json_body import StrictJsonRoute
-from server.services import live, sessions
+from sagittal.server.api import live_schemas as schemas
+from sagittal.server.api.documents import PUBLIC, refusals
+from sagittal.server.api.schemas import make_answer
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Failures, Id, LiveHub, OpenTrail, address_of
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.services import live, sessions
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["live"])
 Therapist = Annotated[Identity, require(Action.RUN_LIVE)]

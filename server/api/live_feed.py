@@ -16,16 +16,16 @@ from sqlalchemy.exc import SQLAlchemyError
 from starlette.status import WS_1008_POLICY_VIOLATION, WS_1012_SERVICE_RESTART
 from starlette.websockets import WebSocketDisconnect
 
-from core.errors import SagittalError
-from server.auth.access import find_end, require, wait_for_end
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Id
-from server.live.hub import MIND_S, Hub
-from server.live.room import BrowserQueue
-from server.nodes.pins import Pin, find_owner
-from server.nodes.registry import Nodes
-from server.services import sessions
+from sagittal.core.errors import SagittalError
+from sagittal.server.auth.access import find_end, require, wait_for_end
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Id
+from sagittal.server.live.hub import MIND_S, Hub
+from sagittal.server.live.room import BrowserQueue
+from sagittal.server.nodes.pins import Pin, find_owner
+from sagittal.server.nodes.registry import Nodes
+from sagittal.server.services import sessions
 
 router = APIRouter(include_in_schema=False)
 

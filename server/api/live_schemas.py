@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
-from server.api.schemas import HexId, Request
-from server.live.take import TherapistMark
+from sagittal.server.api.schemas import HexId, Request
+from sagittal.server.live.take import TherapistMark
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 
-from server.auth.access import require
-from server.auth.roles import Action
-from server.metrics import RequestMetrics
+from sagittal.server.auth.access import require
+from sagittal.server.auth.roles import Action
+from sagittal.server.metrics import RequestMetrics
 
 router = APIRouter(include_in_schema=False)
 

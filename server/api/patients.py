@@ -10,16 +10,16 @@ from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import StreamingResponse
 from sqlalchemy import Connection
 
-from server.api import schemas
-from server.api.documents import refusals
-from server.api.downloads import BINARY, write_disposition
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.auth.sight import may_open
-from server.context import Blobs, Config, Db, Failures, Id, LiveHub, OpenTrail, Reviewed, address_of
-from server.http.json_body import StrictJsonRoute
-from server.services import care_teams, erasure, patient_export, patients, programmes, sessions
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.downloads import BINARY, write_disposition
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.auth.sight import may_open
+from sagittal.server.context import Blobs, Config, Db, Failures, Id, LiveHub, OpenTrail, Reviewed, address_of
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.services import care_teams, erasure, patient_export, patients, programmes, sessions
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/patients", tags=["patients"])
 

@@ -7,24 +7,24 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query
 from starlette.responses import Response
 
-from core.feedback.prescription import SOURCES
-from core.parameters.catalogue import list_trainable
-from server.api import feedback_schemas as schemas
-from server.api.documents import refusals
-from server.api.downloads import BINARY, attachment
-from server.api.schemas import Side
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id, OpenTrail, Reviewed
-from server.http.json_body import StrictJsonRoute
-from server.http.problems import Problem
-from server.report.feedback_words import prescription_words
-from server.report.tables import feedback_csv
-from server.services import feedback, histories, patients, prescriptions, sessions, targets
-from server.services.prescriptions import PatientPrescription
-from server.storage.db import Database
-from server.trail import AuditTrail
+from sagittal.core.feedback.prescription import SOURCES
+from sagittal.core.parameters.catalogue import list_trainable
+from sagittal.server.api import feedback_schemas as schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.downloads import BINARY, attachment
+from sagittal.server.api.schemas import Side
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id, OpenTrail, Reviewed
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.http.problems import Problem
+from sagittal.server.report.feedback_words import prescription_words
+from sagittal.server.report.tables import feedback_csv
+from sagittal.server.services import feedback, histories, patients, prescriptions, sessions, targets
+from sagittal.server.services.prescriptions import PatientPrescription
+from sagittal.server.storage.db import Database
+from sagittal.server.trail import AuditTrail
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["feedback"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

@@ -6,14 +6,14 @@ from typing import Annotated
 
 from fastapi import APIRouter
 
-from server.api import schemas
-from server.api.documents import refusals
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id, OpenTrail
-from server.http.json_body import StrictJsonRoute
-from server.services import patients, programmes
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id, OpenTrail
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.services import patients, programmes
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["programmes"])
 Planner = Annotated[Identity, require(Action.WRITE_SESSION)]

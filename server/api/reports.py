@@ -7,15 +7,15 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path
 from starlette.responses import Response
 
-from server.api import schemas
-from server.api.downloads import BINARY, attachment
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id, OpenTrail, Reviewed
-from server.report.model import ReportModel
-from server.report.tables import curves_csv, parameters_csv
-from server.services import (
+from sagittal.server.api import schemas
+from sagittal.server.api.downloads import BINARY, attachment
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id, OpenTrail, Reviewed
+from sagittal.server.report.model import ReportModel
+from sagittal.server.report.tables import curves_csv, parameters_csv
+from sagittal.server.services import (
     analyses,
     comparisons,
     controls,
@@ -25,9 +25,9 @@ from server.services import (
     reports,
     sessions,
 )
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.db import Database
-from server.trail import AuditTrail
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.db import Database
+from sagittal.server.trail import AuditTrail
 
 router = APIRouter(prefix="/sessions/{session_id}", tags=["report"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from server.api.schemas import Line, Request
+from sagittal.server.api.schemas import Line, Request
 
 Seconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False, description="s from the start")]
 

@@ -11,24 +11,24 @@ from fastapi import APIRouter, Query
 from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
-from core.events.edits import read_edit
-from core.events.result import list_known
-from server.api import review_schemas as schemas
-from server.api.documents import refusals
-from server.api.downloads import BINARY, attachment
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id, OpenTrail, Reviewed
-from server.http.json_body import StrictJsonRoute
-from server.report.analysis_json import parameter_row
-from server.report.exports import events_csv, strides_csv
-from server.report.wording import explain_exclusion
-from server.services import analyses, edit_log, reviews, signals
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.db import Database
-from server.trail import AuditTrail
-from web.user_text import encode_user_text
+from sagittal.core.events.edits import read_edit
+from sagittal.core.events.result import list_known
+from sagittal.server.api import review_schemas as schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.downloads import BINARY, attachment
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id, OpenTrail, Reviewed
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.report.analysis_json import parameter_row
+from sagittal.server.report.exports import events_csv, strides_csv
+from sagittal.server.report.wording import explain_exclusion
+from sagittal.server.services import analyses, edit_log, reviews, signals
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.db import Database
+from sagittal.server.trail import AuditTrail
+from sagittal.web.user_text import encode_user_text
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}", tags=["review"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

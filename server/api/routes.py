@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request
 from starlette.routing import Match
 from starlette.types import Scope
 
-from server.api import (
+from sagittal.server.api import (
     analyses,
     archives,
     audit_log,
@@ -48,11 +48,11 @@ from server.api import (
     users,
     videos,
 )
-from server.api.documents import openapi
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.live import tablet
+from sagittal.server.api.documents import openapi
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.live import tablet
 
 BESIDE: tuple[APIRouter, ...] = (sign_in.address_router, health.router, metrics.router, live_feed.router)
 """Routes outside /api/v1."""

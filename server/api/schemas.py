@@ -8,17 +8,17 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
-from core.frames import Protocol
-from server.jobs.queue import JobView
-from server.report.behind import StrideValue
-from server.services import report_links, signed_reports
-from server.services.care_teams import REASON, EmergencyAccess, TeamMember
-from server.services.identities import MOST
-from server.services.notes import MOST_CHARACTERS
-from server.services.recordings import RecordedFile, RecordingState
-from server.services.tunings import MOST_OF_SWARM, Scheme
-from server.storage.tables import now
+from sagittal.core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
+from sagittal.core.frames import Protocol
+from sagittal.server.jobs.queue import JobView
+from sagittal.server.report.behind import StrideValue
+from sagittal.server.services import report_links, signed_reports
+from sagittal.server.services.care_teams import REASON, EmergencyAccess, TeamMember
+from sagittal.server.services.identities import MOST
+from sagittal.server.services.notes import MOST_CHARACTERS
+from sagittal.server.services.recordings import RecordedFile, RecordingState
+from sagittal.server.services.tunings import MOST_OF_SWARM, Scheme
+from sagittal.server.storage.tables import now
 
 _HIDDEN = "\u00ad\u200b\u200e\u200f\u202a-\u202e\u2060-\u206f\ufeff"
 """What is not seen or turns the text beside it round (Unicode, category Cf)."""

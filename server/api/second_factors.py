@@ -6,15 +6,15 @@ from typing import Annotated
 
 from fastapi import APIRouter, Request
 
-from server import audit
-from server.api import account_schemas
-from server.api.documents import refusals
-from server.auth import accounts, second_factor
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Config, Db, Failures, OpenTrail, address_of
-from server.http.json_body import StrictJsonRoute
+from sagittal.server import audit
+from sagittal.server.api import account_schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.auth import accounts, second_factor
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Config, Db, Failures, OpenTrail, address_of
+from sagittal.server.http.json_body import StrictJsonRoute
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/account/second-factor", tags=["account"])
 Self = Annotated[Identity, require(Action.USE_ACCOUNT)]

@@ -7,17 +7,17 @@ from typing import Annotated
 from fastapi import APIRouter, Request
 from sqlalchemy import Connection
 
-from server import audit
-from server.api import account_schemas, schemas
-from server.api.documents import refusals
-from server.auth import accounts, second_factor, security_keys
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.auth.security_keys import site_of
-from server.context import Config, Db, Failures, Id, OpenTrail, address_of
-from server.http.json_body import StrictJsonRoute
-from server.http.problems import Problem
+from sagittal.server import audit
+from sagittal.server.api import account_schemas, schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.auth import accounts, second_factor, security_keys
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.auth.security_keys import site_of
+from sagittal.server.context import Config, Db, Failures, Id, OpenTrail, address_of
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.http.problems import Problem
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/account", tags=["account"])
 Self = Annotated[Identity, require(Action.USE_ACCOUNT)]

@@ -6,17 +6,17 @@ from typing import Annotated
 
 from fastapi import APIRouter
 
-from server.api import schemas
-from server.api.documents import refusals
-from server.api.schemas import make_answer
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Config, Db, Id, LiveHub, OpenTrail, Queue, Reviewed
-from server.http.json_body import StrictJsonRoute
-from server.jobs.queue import JobView
-from server.services import erasure, recordings, sessions, tables
-from server.services.errors import NotFound
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.schemas import make_answer
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Config, Db, Id, LiveHub, OpenTrail, Queue, Reviewed
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.jobs.queue import JobView
+from sagittal.server.services import erasure, recordings, sessions, tables
+from sagittal.server.services.errors import NotFound
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}", tags=["sessions"])
 

@@ -15,25 +15,25 @@ from sqlalchemy.exc import OperationalError
 from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, RedirectResponse
 
-from server import audit
-from server.api import account_schemas
-from server.api.documents import PUBLIC, refusals
-from server.api.users import user_answer
-from server.auth import accounts, one_time, second_factor
-from server.auth.access import require
-from server.auth.cookie import clear_token, read_token, set_token
-from server.auth.identity import Identity
-from server.auth.passwords import hash_password
-from server.auth.roles import POLICY, Action, Role
-from server.auth.security_keys import begin_sign_in, site_of
-from server.auth.sessions import Logins
-from server.auth.tokens import token_hash
-from server.context import Config, Db, Failures, OpenLogins, OpenTrail, address_of
-from server.http.json_body import StrictJsonRoute
-from server.http.local_path import local_path
-from server.http.problems import SENTENCES, Problem
-from server.storage.refusal import refusal_of
-from server.trail import AuditTrail
+from sagittal.server import audit
+from sagittal.server.api import account_schemas
+from sagittal.server.api.documents import PUBLIC, refusals
+from sagittal.server.api.users import user_answer
+from sagittal.server.auth import accounts, one_time, second_factor
+from sagittal.server.auth.access import require
+from sagittal.server.auth.cookie import clear_token, read_token, set_token
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.passwords import hash_password
+from sagittal.server.auth.roles import POLICY, Action, Role
+from sagittal.server.auth.security_keys import begin_sign_in, site_of
+from sagittal.server.auth.sessions import Logins
+from sagittal.server.auth.tokens import token_hash
+from sagittal.server.context import Config, Db, Failures, OpenLogins, OpenTrail, address_of
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.http.local_path import local_path
+from sagittal.server.http.problems import SENTENCES, Problem
+from sagittal.server.storage.refusal import refusal_of
+from sagittal.server.trail import AuditTrail
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["account"])
 address_router = APIRouter(include_in_schema=False)

@@ -8,16 +8,16 @@ from typing import Annotated
 import segno
 from fastapi import APIRouter, Request
 
-from server.api import schemas
-from server.api.documents import refusals
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id, OpenTrail
-from server.http.json_body import StrictJsonRoute
-from server.services import report_links, sessions, signed_reports
-from server.services.report_links import ReportLink
-from server.services.signed_reports import SignedReport
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id, OpenTrail
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.services import report_links, sessions, signed_reports
+from sagittal.server.services.report_links import ReportLink
+from sagittal.server.services.signed_reports import SignedReport
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["report"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

@@ -7,13 +7,13 @@ from typing import Annotated, Any
 from fastapi import APIRouter
 from starlette.responses import Response
 
-from server.api.documents import refusals
-from server.api.downloads import BINARY, attachment
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Config, Db, OpenTrail, StudyVisits
-from server.services import study_maker
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.downloads import BINARY, attachment
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Config, Db, OpenTrail, StudyVisits
+from sagittal.server.services import study_maker
 
 router = APIRouter(tags=["exports"])
 _ANSWERS: dict[int | str, dict[str, Any]] = refusals(409, 503) | {

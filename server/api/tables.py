@@ -7,15 +7,15 @@ from typing import Annotated
 from fastapi import APIRouter
 from pydantic import Field
 
-from server.api import schemas
-from server.api.documents import refusals
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Db, Id, OpenTrail
-from server.http.json_body import StrictJsonRoute
-from server.services import tables
-from server.services.tables import TableReading, TableShape
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Db, Id, OpenTrail
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.services import tables
+from sagittal.server.services.tables import TableReading, TableShape
 
 router = APIRouter(
     prefix="/sessions/{session_id}/tables",

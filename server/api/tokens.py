@@ -6,16 +6,16 @@ from typing import Annotated
 
 from fastapi import APIRouter, Request
 
-from server import audit
-from server.api.account_schemas import ApiToken, ApiTokenNew, NewApiToken
-from server.api.documents import refusals
-from server.api.schemas import make_answer
-from server.auth import accounts, api_tokens
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Failures, Id, OpenTrail, address_of
-from server.http.json_body import StrictJsonRoute
+from sagittal.server import audit
+from sagittal.server.api.account_schemas import ApiToken, ApiTokenNew, NewApiToken
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.schemas import make_answer
+from sagittal.server.auth import accounts, api_tokens
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Failures, Id, OpenTrail, address_of
+from sagittal.server.http.json_body import StrictJsonRoute
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/account/tokens", tags=["account"])
 Self = Annotated[Identity, require(Action.USE_ACCOUNT)]

@@ -6,8 +6,8 @@ import datetime as dt
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from core.change import Change
-from core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
+from sagittal.core.change import Change
+from sagittal.core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
 
 
 @dataclass(frozen=True)

@@ -9,24 +9,24 @@ from fastapi import APIRouter, Query
 from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
-from core.condition import WalkingCondition
-from core.frames import Protocol
-from server.api import trend_schemas
-from server.api.downloads import BINARY, attachment
-from server.api.schemas import HexId
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id, OpenTrail, Reviewed
-from server.report.change_words import change_words
-from server.report.columns import reduce_to_plain
-from server.report.tables import trends_csv
-from server.report.trends import Trend, TrendSeries, follow_figures, names_in
-from server.services import histories, patients
-from server.services.histories import PatientHistory
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.db import Database
-from server.trail import AuditTrail
+from sagittal.core.condition import WalkingCondition
+from sagittal.core.frames import Protocol
+from sagittal.server.api import trend_schemas
+from sagittal.server.api.downloads import BINARY, attachment
+from sagittal.server.api.schemas import HexId
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id, OpenTrail, Reviewed
+from sagittal.server.report.change_words import change_words
+from sagittal.server.report.columns import reduce_to_plain
+from sagittal.server.report.tables import trends_csv
+from sagittal.server.report.trends import Trend, TrendSeries, follow_figures, names_in
+from sagittal.server.services import histories, patients
+from sagittal.server.services.histories import PatientHistory
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.db import Database
+from sagittal.server.trail import AuditTrail
 
 router = APIRouter(prefix="/patients/{patient_id}", tags=["trends"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

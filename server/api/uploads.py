@@ -9,16 +9,16 @@ from pydantic import Field, StringConstraints
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
-from server.api import schemas
-from server.api.documents import refusals
-from server.api.files import RAW_BODY, read_megabytes, read_size
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Config, Db, Id, OpenTrail
-from server.http.json_body import StrictJsonRoute
-from server.http.problems import Problem
-from server.services import recordings, uploads
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.files import RAW_BODY, read_megabytes, read_size
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Config, Db, Id, OpenTrail
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.http.problems import Problem
+from sagittal.server.services import recordings, uploads
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}/uploads", tags=["files"])
 

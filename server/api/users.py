@@ -7,18 +7,18 @@ from typing import Annotated, Any
 from fastapi import APIRouter
 from sqlalchemy import Row
 
-from server import audit
-from server.api import account_schemas, schemas
-from server.api.documents import refusals
-from server.auth import accounts, api_tokens, second_factor
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.passwords import hash_password
-from server.auth.roles import Action, Role
-from server.context import Db, Failures, Id, OpenLogins
-from server.http.json_body import StrictJsonRoute
-from server.http.problems import Problem
-from server.services import report_links
+from sagittal.server import audit
+from sagittal.server.api import account_schemas, schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.auth import accounts, api_tokens, second_factor
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.passwords import hash_password
+from sagittal.server.auth.roles import Action, Role
+from sagittal.server.context import Db, Failures, Id, OpenLogins
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.http.problems import Problem
+from sagittal.server.services import report_links
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/users", tags=["users"])
 Admin = Annotated[Identity, require(Action.MANAGE_USERS)]

@@ -9,17 +9,17 @@ from fastapi import APIRouter, Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
-from server.api import schemas
-from server.api.documents import refusals
-from server.api.downloads import BINARY
-from server.api.files import RAW_BODY, read_size, receive_body
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Config, Db, Id, OpenTrail
-from server.http.json_body import StrictJsonRoute
-from server.http.ranges import answer_range
-from server.services import recordings, videos
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.downloads import BINARY
+from sagittal.server.api.files import RAW_BODY, read_size, receive_body
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Config, Db, Id, OpenTrail
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.http.ranges import answer_range
+from sagittal.server.services import recordings, videos
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}/video", tags=["sessions"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

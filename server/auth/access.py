@@ -10,15 +10,15 @@ from fastapi import Depends
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.requests import HTTPConnection
 
-from server.auth.api_tokens import find_bearer, read_bearer
-from server.auth.cookie import read_token
-from server.auth.identity import Identity
-from server.auth.roles import PUBLIC, Action
-from server.auth.sessions import CHECK_EVERY_S, Logins
-from server.auth.sight import list_hidden, may_open
-from server.http.problems import SENTENCES, Problem
-from server.storage.db import Database
-from server.trail import AuditTrail
+from sagittal.server.auth.api_tokens import find_bearer, read_bearer
+from sagittal.server.auth.cookie import read_token
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import PUBLIC, Action
+from sagittal.server.auth.sessions import CHECK_EVERY_S, Logins
+from sagittal.server.auth.sight import list_hidden, may_open
+from sagittal.server.http.problems import SENTENCES, Problem
+from sagittal.server.storage.db import Database
+from sagittal.server.trail import AuditTrail
 
 
 class RouteAccess:

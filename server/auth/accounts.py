@@ -11,15 +11,15 @@ from typing import Any
 from sqlalchemy import Connection, Row, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
-from server.auth import second_factor, security_keys
-from server.auth.passwords import verify_password
-from server.auth.roles import Role
-from server.auth.security_keys import Site
-from server.auth.throttle import Throttle
-from server.http.problems import Problem
-from server.storage.db import Database
-from server.storage.tables import new_id, now, user
-from server.trail import AuditTrail
+from sagittal.server.auth import second_factor, security_keys
+from sagittal.server.auth.passwords import verify_password
+from sagittal.server.auth.roles import Role
+from sagittal.server.auth.security_keys import Site
+from sagittal.server.auth.throttle import Throttle
+from sagittal.server.http.problems import Problem
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import new_id, now, user
+from sagittal.server.trail import AuditTrail
 
 
 def create(c: Connection, name: str, display_name: str | None, role: Role, password_hash: str) -> Row[Any]:

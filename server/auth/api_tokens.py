@@ -18,15 +18,15 @@ from sqlalchemy import Connection, Row, delete, insert, select, update
 from sqlalchemy.exc import OperationalError
 from starlette.requests import HTTPConnection
 
-from server.auth.identity import Identity
-from server.auth.roles import Action, Role
-from server.auth.sight import NOTHING, opens_parts
-from server.auth.tokens import new_token, token_hash
-from server.http.problems import Problem
-from server.storage.db import Database
-from server.storage.person_tables import api_token
-from server.storage.refusal import refusal_of
-from server.storage.tables import new_id, now, user
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action, Role
+from sagittal.server.auth.sight import NOTHING, opens_parts
+from sagittal.server.auth.tokens import new_token, token_hash
+from sagittal.server.http.problems import Problem
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.person_tables import api_token
+from sagittal.server.storage.refusal import refusal_of
+from sagittal.server.storage.tables import new_id, now, user
 
 PREFIX: Final = "sgt_"
 """By it a token is known where one has leaked."""

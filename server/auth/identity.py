@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from server.auth.roles import Action, Role, is_permitted
+from sagittal.server.auth.roles import Action, Role, is_permitted
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ import hmac
 
 from sqlalchemy import Connection, delete, func, insert, select, update
 
-from server.auth.tokens import new_token, token_hash
-from server.http.problems import Problem
-from server.storage.tables import now, one_time_token, user
+from sagittal.server.auth.tokens import new_token, token_hash
+from sagittal.server.http.problems import Problem
+from sagittal.server.storage.tables import now, one_time_token, user
 
 LIFE = dt.timedelta(hours=24)
 

@@ -11,7 +11,7 @@ from pwdlib import PasswordHash
 from pwdlib.exceptions import PwdlibError
 from pwdlib.hashers.argon2 import Argon2Hasher
 
-from server.http.problems import Problem
+from sagittal.server.http.problems import Problem
 
 MIN_LENGTH = 12  # OWASP ASVS 4.0.3, 2.1.1
 MAX_LENGTH = 128  # OWASP ASVS 4.0.3, 2.1.2

@@ -10,9 +10,9 @@ from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute, APIWebSocketRoute
 from starlette.routing import BaseRoute
 
-from server.auth.access import RouteAccess
-from server.auth.roles import Action
-from server.auth.sight import OF_NOBODY, OWNER
+from sagittal.server.auth.access import RouteAccess
+from sagittal.server.auth.roles import Action
+from sagittal.server.auth.sight import OF_NOBODY, OWNER
 
 
 class UndeclaredRouteError(RuntimeError):

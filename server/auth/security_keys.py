@@ -21,12 +21,12 @@ from typing import Any, Final, Literal
 from sqlalchemy import Connection, Row, delete, insert, select, update
 from starlette.requests import HTTPConnection
 
-from server.auth import second_factor
-from server.auth.tokens import token_hash
-from server.http.hosts import host_name
-from server.http.problems import Problem
-from server.storage.person_tables import security_key, security_key_challenge
-from server.storage.tables import new_id, now
+from sagittal.server.auth import second_factor
+from sagittal.server.auth.tokens import token_hash
+from sagittal.server.http.hosts import host_name
+from sagittal.server.http.problems import Problem
+from sagittal.server.storage.person_tables import security_key, security_key_challenge
+from sagittal.server.storage.tables import new_id, now
 
 log = logging.getLogger(__name__)
 

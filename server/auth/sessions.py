@@ -10,13 +10,13 @@ from typing import Final
 from sqlalchemy import Connection, delete, insert, select, update
 from sqlalchemy.exc import OperationalError
 
-from server.auth.identity import Identity
-from server.auth.roles import Role
-from server.auth.sight import NOTHING, opens_parts
-from server.auth.tokens import new_token, token_hash
-from server.storage.db import Database
-from server.storage.refusal import is_busy, refusal_of
-from server.storage.tables import login_session, now, user
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Role
+from sagittal.server.auth.sight import NOTHING, opens_parts
+from sagittal.server.auth.tokens import new_token, token_hash
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.refusal import is_busy, refusal_of
+from sagittal.server.storage.tables import login_session, now, user
 
 TOUCH_EVERY = dt.timedelta(seconds=30)
 """Activity is written at most this often: each write costs one fsync."""

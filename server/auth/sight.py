@@ -13,13 +13,13 @@ from typing import Any, Final
 
 from sqlalchemy import ColumnElement, Connection, Row, Select, and_, exists, literal, or_, select, true
 
-from server.auth.identity import Identity
-from server.auth.roles import Role
-from server.storage.care_tables import care_team_member, clinic_option, emergency_access
-from server.storage.live_tables import live_take
-from server.storage.person_tables import consent
-from server.storage.report_tables import report_link, signed_report
-from server.storage.tables import (
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Role
+from sagittal.server.storage.care_tables import care_team_member, clinic_option, emergency_access
+from sagittal.server.storage.live_tables import live_take
+from sagittal.server.storage.person_tables import consent
+from sagittal.server.storage.report_tables import report_link, signed_report
+from sagittal.server.storage.tables import (
     analysis,
     file_upload,
     filter_run,

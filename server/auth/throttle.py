@@ -15,11 +15,11 @@ from typing import Protocol, TypeVar
 from sqlalchemy import ColumnElement, Connection, and_, delete, insert, select
 from sqlalchemy.exc import OperationalError
 
-from server.http.problems import Problem
-from server.storage.db import Database
-from server.storage.node_tables import failed_attempt
-from server.storage.refusal import refusal_of
-from server.storage.tables import new_id
+from sagittal.server.http.problems import Problem
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.node_tables import failed_attempt
+from sagittal.server.storage.refusal import refusal_of
+from sagittal.server.storage.tables import new_id
 
 WINDOW_S = 15 * 60.0
 MAX_PER_PAIR = 10

@@ -6,15 +6,15 @@ import sys
 from contextlib import closing
 from pathlib import Path
 
-from server.settings import load_settings
+from sagittal.server.settings import load_settings
 
 
 def accept(data_dir: Path | None) -> int:
     """Trust the database from now on; 1 when it cannot be used."""
-    from server.services import custody
-    from server.storage.blob_opening import open_blobs
-    from server.storage.db import Database
-    from server.storage.migrate import MigrationError, require_database, upgrade
+    from sagittal.server.services import custody
+    from sagittal.server.storage.blob_opening import open_blobs
+    from sagittal.server.storage.db import Database
+    from sagittal.server.storage.migrate import MigrationError, require_database, upgrade
 
     settings = load_settings({"data_dir": data_dir})
     try:

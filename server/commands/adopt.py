@@ -6,13 +6,13 @@ import sys
 from contextlib import closing
 from pathlib import Path
 
-from server.settings import Settings, load_settings
+from sagittal.server.settings import Settings, load_settings
 
 
 def adopt(data_dir: Path | None, take: str | None, session: str | None) -> int:
     """List the logs, or make `take` a recording of `session`; 1 when that is not possible."""
-    from server.services.errors import ServiceError
-    from server.storage.migrate import MigrationError, require_current
+    from sagittal.server.services.errors import ServiceError
+    from sagittal.server.storage.migrate import MigrationError, require_current
 
     settings = load_settings({"data_dir": data_dir})
     if (take is None) != (session is None):
@@ -29,8 +29,8 @@ def adopt(data_dir: Path | None, take: str | None, session: str | None) -> int:
 
 
 def _list(settings: Settings) -> int:
-    from server.services import live_logs
-    from server.storage.db import Database
+    from sagittal.server.services import live_logs
+    from sagittal.server.storage.db import Database
 
     with closing(Database(settings.database_source)) as db, db.read() as c:
         strangers = [log for log in live_logs.list_logs(c, settings) if not log.known]
@@ -46,10 +46,10 @@ def _list(settings: Settings) -> int:
 
 
 def _adopt(settings: Settings, take: str, session: str) -> int:
-    from server.jobs.opening import open_queue
-    from server.services import live_logs
-    from server.storage.blob_opening import open_blobs
-    from server.storage.db import Database
+    from sagittal.server.jobs.opening import open_queue
+    from sagittal.server.services import live_logs
+    from sagittal.server.storage.blob_opening import open_blobs
+    from sagittal.server.storage.db import Database
 
     with closing(Database(settings.database_source)) as db:
         queue = open_queue(db, settings.lease_s)

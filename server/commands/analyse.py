@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from core.errors import InputError, SagittalError
-from core.formats.json_tree import read_json
-from server.processes.compiling import OFFLINE, compile_filters_once, is_compiling
-from server.report import activity_files
-from server.report.estimator import estimator_view
-from server.storage import fs
-from server.storage.compile_cache import has_compiled_filters
+from sagittal.core.errors import InputError, SagittalError
+from sagittal.core.formats.json_tree import read_json
+from sagittal.server.processes.compiling import OFFLINE, compile_filters_once, is_compiling
+from sagittal.server.report import activity_files
+from sagittal.server.report.estimator import estimator_view
+from sagittal.server.storage import fs
+from sagittal.server.storage.compile_cache import has_compiled_filters
 
 
 def analyse(
@@ -36,8 +36,8 @@ def analyse(
     -------
     0 when at least one parameter was found, 1 when nothing could be analysed.
     """
-    from core.formats import list_source_files, read_named_file
-    from server.services import analysing
+    from sagittal.core.formats import list_source_files, read_named_file
+    from sagittal.server.services import analysing
 
     try:
         overrides = read_overrides(config, estimator)

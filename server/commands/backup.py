@@ -6,16 +6,16 @@ import sys
 from contextlib import closing
 from pathlib import Path
 
-from server.settings import load_settings
+from sagittal.server.settings import load_settings
 
 
 def backup(data_dir: Path | None, target: Path, key: Path | None, prune: bool) -> int:
     """Make one backup; 1 when there is none, or when a stored file was already gone or damaged."""
-    from server.services import backups
-    from server.services.tombstones import TombstoneError
-    from server.storage.archive import BackupFileError, read_key
-    from server.storage.db import Database
-    from server.storage.migrate import MigrationError, require_current
+    from sagittal.server.services import backups
+    from sagittal.server.services.tombstones import TombstoneError
+    from sagittal.server.storage.archive import BackupFileError, read_key
+    from sagittal.server.storage.db import Database
+    from sagittal.server.storage.migrate import MigrationError, require_current
 
     settings = load_settings({"data_dir": data_dir})
     try:

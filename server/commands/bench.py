@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from server.storage import fs
+from sagittal.server.storage import fs
 
 if TYPE_CHECKING:
-    from core.fusion.algorithms.benchmark import OrientationScore, ReferenceTrial
-    from core.fusion.algorithms.choice import OwnFilter
-    from core.fusion.algorithms.listed import Algorithm
+    from sagittal.core.fusion.algorithms.benchmark import OrientationScore, ReferenceTrial
+    from sagittal.core.fusion.algorithms.choice import OwnFilter
+    from sagittal.core.fusion.algorithms.listed import Algorithm
 
 HEADER = (
     "algorithm", "recording", "total_deg", "heading_deg", "inclination_deg", "total_with_bias_deg",
@@ -32,10 +32,10 @@ def bench(what: str, folder: Path | None, show_list: bool, out: Path | None, eve
     if folder is None or not folder.is_dir():
         sys.stderr.write(f"sagittal bench {what} needs a folder of recordings with reference, or --list.\n")
         return 2
-    from core.errors import FormatError
-    from core.fusion.algorithms.benchmark import read_trial
-    from core.fusion.algorithms.choice import LABELS, OWN
-    from core.fusion.algorithms.listed import ALGORITHMS
+    from sagittal.core.errors import FormatError
+    from sagittal.core.fusion.algorithms.benchmark import read_trial
+    from sagittal.core.fusion.algorithms.choice import LABELS, OWN
+    from sagittal.core.fusion.algorithms.listed import ALGORITHMS
 
     trials = []
     for path in sorted(folder.glob("*.npz")):
@@ -66,7 +66,7 @@ def bench(what: str, folder: Path | None, show_list: bool, out: Path | None, eve
 
 
 def _list_algorithms() -> list[Sequence[str]]:
-    from core.fusion.algorithms.listed import ALGORITHMS, ENGINES, GRADES
+    from sagittal.core.fusion.algorithms.listed import ALGORITHMS, ENGINES, GRADES
 
     rows: list[Sequence[str]] = [("name", "algorithm", "engine", "grade", "magnetometer", "source")]
     for a in ALGORITHMS:
@@ -76,8 +76,8 @@ def _list_algorithms() -> list[Sequence[str]]:
 
 
 def _score(algorithm: Algorithm, trial: ReferenceTrial) -> Row:
-    from core.errors import SagittalError
-    from core.fusion.algorithms.benchmark import run_trial, score_orientation
+    from sagittal.core.errors import SagittalError
+    from sagittal.core.fusion.algorithms.benchmark import run_trial, score_orientation
 
     found: list[float | None] = []
     try:
@@ -91,8 +91,8 @@ def _score(algorithm: Algorithm, trial: ReferenceTrial) -> Row:
 
 
 def _score_own(own: OwnFilter, trial: ReferenceTrial) -> Row:
-    from core.errors import SagittalError
-    from core.fusion.algorithms.benchmark import run_own, score_orientation
+    from sagittal.core.errors import SagittalError
+    from sagittal.core.fusion.algorithms.benchmark import run_own, score_orientation
 
     try:
         found = _degrees(score_orientation(run_own(trial, both_ways=own.both_ways), trial), has_heading=True)
@@ -133,7 +133,7 @@ def _table(rows: Sequence[Sequence[str]]) -> str:
 
 
 def _write(out: Path, rows: Sequence[Row]) -> None:
-    from server.report.columns import write_csv
+    from sagittal.server.report.columns import write_csv
 
     fs.make_folder(out.parent)
     fs.write_file(out, write_csv(HEADER, [(a, b, *values, reason) for a, b, values, reason in rows]))

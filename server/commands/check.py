@@ -6,7 +6,7 @@ import sys
 from contextlib import closing
 from pathlib import Path
 
-from server.settings import load_settings
+from sagittal.server.settings import load_settings
 
 
 def check(data_dir: Path | None, head: Path | None = None) -> int:
@@ -14,10 +14,10 @@ def check(data_dir: Path | None, head: Path | None = None) -> int:
 
     `head`: a file of the audit log's newest row as it once was, kept elsewhere.
     """
-    from server.services import checks
-    from server.storage.blob_opening import open_blobs
-    from server.storage.db import Database
-    from server.storage.migrate import MigrationError, require_current
+    from sagittal.server.services import checks
+    from sagittal.server.storage.blob_opening import open_blobs
+    from sagittal.server.storage.db import Database
+    from sagittal.server.storage.migrate import MigrationError, require_current
 
     settings = load_settings({"data_dir": data_dir})
     try:

@@ -13,21 +13,21 @@ from pathlib import Path
 
 from sqlalchemy import func, select
 
-from server.commands.serve import run, say
-from server.processes.compiling import is_compiling
-from server.settings import load_settings
-from server.storage.compile_cache import has_compiled_filters
-from server.storage.db import Database, Source
+from sagittal.server.commands.serve import run, say
+from sagittal.server.processes.compiling import is_compiling
+from sagittal.server.settings import load_settings
+from sagittal.server.storage.compile_cache import has_compiled_filters
+from sagittal.server.storage.db import Database, Source
 
 DEMO_WORKERS = 2
 
 
 def demo(port: int | None) -> int:
     """Serve a clinic of simulated patients on 127.0.0.1 until Ctrl-C; the folder is removed at the end."""
-    from server.auth import accounts, one_time
-    from server.auth.passwords import hash_password
-    from server.auth.roles import Role
-    from server.processes.environment import make_environment
+    from sagittal.server.auth import accounts, one_time
+    from sagittal.server.auth.passwords import hash_password
+    from sagittal.server.auth.roles import Role
+    from sagittal.server.processes.environment import make_environment
 
     with tempfile.TemporaryDirectory(prefix="sagittal-demo-") as folder:
         settings = load_settings(
@@ -60,9 +60,9 @@ def demo(port: int | None) -> int:
             say(f"Open {address}/sign-in/{token}")
             say("(signs you in once; everything is simulated and is removed when you stop with Ctrl-C)")
             # simulating takes seconds of computing: never in the web process
-            start("server.demo.clinic")
+            start("sagittal.server.demo.clinic")
             _report(settings.database_source)
-            start("server.demo.live", address)
+            start("sagittal.server.demo.live", address)
             if _wait_for_live(settings.database_source, helpers[-1]):
                 say("One of the patients is walking live now: the first in the list of patients.")
 
@@ -76,7 +76,7 @@ def demo(port: int | None) -> int:
 
 def _wait_for_live(database: Source, helper: subprocess.Popen[bytes]) -> bool:
     """Wait until the walk of a helper streams; False when the helper ended before."""
-    from server.services import live
+    from sagittal.server.services import live
 
     pause = threading.Event()
     with closing(Database(database)) as db:
@@ -90,9 +90,9 @@ def _wait_for_live(database: Source, helper: subprocess.Popen[bytes]) -> bool:
 
 def _report(database: Source) -> None:
     """Say on the console what is being waited for, until every session is analysed."""
-    from server.demo.clinic import VISITS
-    from server.services.recordings import ANALYSE
-    from server.storage.tables import job
+    from sagittal.server.demo.clinic import VISITS
+    from sagittal.server.services.recordings import ANALYSE
+    from sagittal.server.storage.tables import job
 
     began, told = time.monotonic(), ""
     if is_compiling() or not has_compiled_filters():

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from core.errors import InputError, SagittalError
-from server.storage import fs
+from sagittal.core.errors import InputError, SagittalError
+from sagittal.server.storage import fs
 
 
 def export(folder: Path, kind: str, out: Path | None, code: str) -> int:
@@ -16,10 +16,10 @@ def export(folder: Path, kind: str, out: Path | None, code: str) -> int:
     ----------
     out : file to write, None = `export-<format>.<ending>` in that folder. code : pseudonym of the person.
     """
-    from server.export.content import VisitFacts, open_content
-    from server.export.kinds import EXPORTED, find_kind, write_export
-    from server.services.provenance import CODE_VERSION
-    from server.viewer import recorded_walk  # noqa: F401 - registers what is drawn
+    from sagittal.server.export.content import VisitFacts, open_content
+    from sagittal.server.export.kinds import EXPORTED, find_kind, write_export
+    from sagittal.server.services.provenance import CODE_VERSION
+    from sagittal.server.viewer import recorded_walk  # noqa: F401 - registers what is drawn
 
     try:
         ending = find_kind(kind).ending

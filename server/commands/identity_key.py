@@ -6,15 +6,15 @@ import sys
 from contextlib import closing
 from pathlib import Path
 
-from server.settings import load_settings
+from sagittal.server.settings import load_settings
 
 
 def identity_key(data_dir: Path | None, what: str, really: bool, without_key: bool) -> int:
     """Make the key, change it, or list and remove what it does not open; 1 when that is not possible."""
-    from core.errors import SagittalError
-    from server.services import identities
-    from server.storage.db import Database
-    from server.storage.migrate import MigrationError, require_current
+    from sagittal.core.errors import SagittalError
+    from sagittal.server.services import identities
+    from sagittal.server.storage.db import Database
+    from sagittal.server.storage.migrate import MigrationError, require_current
 
     settings = load_settings({"data_dir": data_dir})
     file = settings.identity_key_file

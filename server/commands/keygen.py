@@ -8,7 +8,7 @@ from pathlib import Path
 
 def keygen(path: Path) -> int:
     """Write a new key pair; 1 when the file exists."""
-    from server.storage.archive import BackupFileError, make_key
+    from sagittal.server.storage.archive import BackupFileError, make_key
 
     try:
         public = make_key(path.absolute())

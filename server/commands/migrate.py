@@ -5,12 +5,12 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from server.settings import load_settings
+from sagittal.server.settings import load_settings
 
 
 def migrate(data_dir: Path | None) -> int:
     """Upgrade the database in one transaction, after a backup; 1 when it belongs to a newer version."""
-    from server.storage.migrate import MigrationError, require_database, upgrade
+    from sagittal.server.storage.migrate import MigrationError, require_database, upgrade
 
     settings = load_settings({"data_dir": data_dir})
     try:

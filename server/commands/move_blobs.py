@@ -5,12 +5,12 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from server.settings import load_settings
+from sagittal.server.settings import load_settings
 
 
 def move_blobs(data_dir: Path | None) -> int:
     """Move stored files into SAGITTAL_BUCKET; 1 when that is not possible, or damaged ones stay."""
-    from server.storage import blob_moving, fs
+    from sagittal.server.storage import blob_moving, fs
 
     settings = load_settings({"data_dir": data_dir})
     if not settings.blobs.is_dir():

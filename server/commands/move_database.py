@@ -6,15 +6,15 @@ import sys
 from contextlib import closing
 from pathlib import Path
 
-from server.settings import load_settings
+from sagittal.server.settings import load_settings
 
 
 def move_database(data_dir: Path | None) -> int:
     """Copy every row to SAGITTAL_DATABASE_URL and put the file aside; 1 when that is not possible."""
-    from server import audit
-    from server.storage import fs
-    from server.storage.db import Database
-    from server.storage.migrate import MigrationError, copy_database, require_current
+    from sagittal.server import audit
+    from sagittal.server.storage import fs
+    from sagittal.server.storage.db import Database
+    from sagittal.server.storage.migrate import MigrationError, copy_database, require_current
 
     settings = load_settings({"data_dir": data_dir})
     aside = settings.backups / "before-postgresql.db"

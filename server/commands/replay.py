@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from core.errors import InputError, SagittalError
+from sagittal.core.errors import InputError, SagittalError
 
 if TYPE_CHECKING:
-    from core.recording import Recording
-    from server.live.client import StreamReport
-    from server.live.playback import DueBatch
+    from sagittal.core.recording import Recording
+    from sagittal.server.live.client import StreamReport
+    from sagittal.server.live.playback import DueBatch
 
 
 def replay(
@@ -37,9 +37,9 @@ def replay(
     -------
     0 when everything is acknowledged and the take is finished, 1 when not.
     """
-    from server.live.client import StreamFaults, stream
-    from server.live.pairing import pair
-    from server.live.playback import cut, hello_of, pace_batches
+    from sagittal.server.live.client import StreamFaults, stream
+    from sagittal.server.live.pairing import pair
+    from sagittal.server.live.playback import cut, hello_of, pace_batches
 
     try:
         _check(speed, drop, jitter)
@@ -81,7 +81,7 @@ def _check(speed: float, drop: float, jitter: float) -> None:
 
 
 def _read(paths: Sequence[Path], manifest: Path | None) -> Recording:
-    from core.formats import list_source_files, parse_manifest, read_named_file, read_recording
+    from sagittal.core.formats import list_source_files, parse_manifest, read_named_file, read_recording
 
     declared = parse_manifest(read_named_file(manifest)) if manifest else None
     return read_recording(list(list_source_files(paths)), declared)

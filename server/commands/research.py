@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
-from server.settings import load_settings
+from sagittal.server.settings import load_settings
 
 
 def research(
@@ -27,12 +27,12 @@ def research(
         none = all. without_consent : also those who have no consent to research written down.
     who : a pseudonym; nothing is written.
     """
-    from core.errors import SagittalError
-    from server.services import deidentified
-    from server.storage import fs
-    from server.storage.blob_opening import open_blobs
-    from server.storage.db import Database
-    from server.storage.migrate import MigrationError, require_current
+    from sagittal.core.errors import SagittalError
+    from sagittal.server.services import deidentified
+    from sagittal.server.storage import fs
+    from sagittal.server.storage.blob_opening import open_blobs
+    from sagittal.server.storage.db import Database
+    from sagittal.server.storage.migrate import MigrationError, require_current
 
     settings = load_settings({"data_dir": data_dir})
     try:

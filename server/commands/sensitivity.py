@@ -8,15 +8,15 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from core.errors import InputError, SagittalError
-from server.storage import fs
+from sagittal.core.errors import InputError, SagittalError
+from sagittal.server.storage import fs
 
 if TYPE_CHECKING:
-    from core.body.chain.geometry import LegGeometry
-    from core.calibration.result import CalibratedRecording
-    from core.frames import Floats, Segment
-    from core.recording import UniformRecording
-    from core.squat.sensitivity import SensitivityTable, SquatCase
+    from sagittal.core.body.chain.geometry import LegGeometry
+    from sagittal.core.calibration.result import CalibratedRecording
+    from sagittal.core.frames import Floats, Segment
+    from sagittal.core.recording import UniformRecording
+    from sagittal.core.squat.sensitivity import SensitivityTable, SquatCase
 
 Side = Literal["left", "right"]
 
@@ -36,7 +36,7 @@ def sensitivity(
     seed: int,
 ) -> int:
     """Analyse a take, against a reference where one is given, or a simulated one; 1 = not possible."""
-    from server.report.sensitivity import sensitivity_csv, summarise_sensitivity, tell_sensitivity
+    from sagittal.server.report.sensitivity import sensitivity_csv, summarise_sensitivity, tell_sensitivity
 
     try:
         if paths:
@@ -59,18 +59,18 @@ def sensitivity(
 
 def analyse_simulated(seed: int, side: Side) -> dict[Side, SensitivityTable]:
     """The sensitivity analysis of `simulate_case`."""
-    from core.squat.sensitivity import analyse_sensitivity
+    from sagittal.core.squat.sensitivity import analyse_sensitivity
 
     return {side: analyse_sensitivity(simulate_case(seed, side))}
 
 
 def simulate_case(seed: int, side: Side) -> SquatCase:
     """Half a minute of squats with noise and skin; how sensors sit and the body are known exactly."""
-    from core.calibration.known_mounts import calibrate_with_mounts
-    from core.simulate import RecordingSetup, SoftTissue, Squats, simulate_squats
-    from core.simulate.squat_chain import draw_leg, place_sensors
-    from core.squat.sensitivity import ReferenceAngles, make_case
-    from core.timeline import synchronise
+    from sagittal.core.calibration.known_mounts import calibrate_with_mounts
+    from sagittal.core.simulate import RecordingSetup, SoftTissue, Squats, simulate_squats
+    from sagittal.core.simulate.squat_chain import draw_leg, place_sensors
+    from sagittal.core.squat.sensitivity import ReferenceAngles, make_case
+    from sagittal.core.timeline import synchronise
 
     leg, mounts = draw_leg(HEIGHT_M, side, seed)
     made = simulate_squats(
@@ -94,11 +94,11 @@ def _analyse_take(
     measures: Path | None,
     from_standing: bool,
 ) -> dict[Side, SensitivityTable]:
-    from core.body.chain.geometry import LegGeometry
-    from core.formats import read_named_file
-    from core.squat.sensitivity import analyse_legs
-    from core.squat.side import find_squat_sides
-    from server.services.sensitivities import read_reference
+    from sagittal.core.body.chain.geometry import LegGeometry
+    from sagittal.core.formats import read_named_file
+    from sagittal.core.squat.sensitivity import analyse_legs
+    from sagittal.core.squat.side import find_squat_sides
+    from sagittal.server.services.sensitivities import read_reference
 
     take = _read_take(paths, manifest)
     sides = find_squat_sides(take) if side is None else (side,)
@@ -112,9 +112,9 @@ def _analyse_take(
 
 
 def _read_take(paths: Sequence[Path], manifest: Path | None) -> UniformRecording:
-    from core.formats import list_source_files, read_named_file, read_recording
-    from core.formats.manifest import parse_manifest
-    from core.timeline import synchronise
+    from sagittal.core.formats import list_source_files, read_named_file, read_recording
+    from sagittal.core.formats.manifest import parse_manifest
+    from sagittal.core.timeline import synchronise
 
     declared = parse_manifest(read_named_file(manifest)) if manifest else None
     return synchronise(read_recording(list(list_source_files(paths)), declared))
@@ -123,9 +123,9 @@ def _read_take(paths: Sequence[Path], manifest: Path | None) -> UniformRecording
 def _calibrate(
     take: UniformRecording, sides: Sequence[Side], table: UniformRecording | None
 ) -> CalibratedRecording:
-    from core.calibration.fixed_offset import make_fixed_mounts
-    from core.calibration.known_mounts import FIXED_OFFSET, TABLE_TOP, calibrate_with_mounts
-    from core.calibration.table_top import calibrate_table_top
+    from sagittal.core.calibration.fixed_offset import make_fixed_mounts
+    from sagittal.core.calibration.known_mounts import FIXED_OFFSET, TABLE_TOP, calibrate_with_mounts
+    from sagittal.core.calibration.table_top import calibrate_table_top
 
     if table is None:
         return calibrate_with_mounts(take, make_fixed_mounts(*sides), "fixed_offset", FIXED_OFFSET)
@@ -135,8 +135,8 @@ def _calibrate(
 
 def _measure(nominal: LegGeometry, path: Path | None) -> LegGeometry:
     """The geometry with the lengths of a JSON file put in."""
-    from core.formats import read_named_file
-    from core.formats.json_tree import read_json
+    from sagittal.core.formats import read_named_file
+    from sagittal.core.formats.json_tree import read_json
 
     if path is None:
         return nominal

@@ -11,14 +11,14 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
-from server.settings import Settings, SettingsError, load_settings
+from sagittal.server.settings import Settings, SettingsError, load_settings
 
 
 def serve(data_dir: Path | None, host: str | None, port: int | None, workers: int | None) -> int:
     """Serve until SIGTERM or Ctrl-C; 1 when the folder is in use or belongs to a newer version."""
-    from server.auth import one_time
-    from server.nodes.passage import read_key
-    from server.storage.db import Database
+    from sagittal.server.auth import one_time
+    from sagittal.server.nodes.passage import read_key
+    from sagittal.server.storage.db import Database
 
     settings = load_settings({"data_dir": data_dir, "host": host, "port": port, "workers": workers})
 
@@ -41,25 +41,25 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
     SettingsError
         it would listen on a network without TLS.
     """
-    from core.errors import SagittalError
-    from server.app import create_app
-    from server.log import start_log
-    from server.nodes.registry import Nodes
-    from server.processes.supervisor import Workers
-    from server.services.custody import (
+    from sagittal.core.errors import SagittalError
+    from sagittal.server.app import create_app
+    from sagittal.server.log import start_log
+    from sagittal.server.nodes.registry import Nodes
+    from sagittal.server.processes.supervisor import Workers
+    from sagittal.server.services.custody import (
         StrangersError,
         refuse_half_restored,
         refuse_strangers,
         refuse_wrong_clock,
     )
-    from server.storage import fs
-    from server.storage.blob_opening import note_bucket, open_blobs, require_use, warn_of_leftovers
-    from server.storage.db import Database
-    from server.storage.migrate import MigrationError, read_revision, upgrade
-    from server.web_server.build import build_server
-    from server.web_server.connection import ConnectionLimits
-    from server.web_server.listener import make_room, open_listener
-    from server.worker.backing_up import BackupKeeper
+    from sagittal.server.storage import fs
+    from sagittal.server.storage.blob_opening import note_bucket, open_blobs, require_use, warn_of_leftovers
+    from sagittal.server.storage.db import Database
+    from sagittal.server.storage.migrate import MigrationError, read_revision, upgrade
+    from sagittal.server.web_server.build import build_server
+    from sagittal.server.web_server.connection import ConnectionLimits
+    from sagittal.server.web_server.listener import make_room, open_listener
+    from sagittal.server.worker.backing_up import BackupKeeper
 
     settings.require_private_traffic()
     start_log(settings)

@@ -10,11 +10,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from server.storage import fs
+from sagittal.server.storage import fs
 
 if TYPE_CHECKING:
-    from core.simulate import ChestTruth, FunctionalTruth, SquatTruth, WalkTruth
-    from core.simulate.tug import ChairTruth
+    from sagittal.core.simulate import ChestTruth, FunctionalTruth, SquatTruth, WalkTruth
+    from sagittal.core.simulate.tug import ChairTruth
 
 
 ACTIVITY: Final = "activity"
@@ -32,11 +32,11 @@ def simulate(out: Path, script: str, seed: int, hours: float = 24.0) -> int:
     ----------
     hours : of the script "activity".
     """
-    from core.formats import write_recording
-    from core.simulate import MOVEMENTS, SCRIPTS, Simulation, simulate_movement, simulate_scenario
-    from core.simulate.functional import FunctionalSimulation
-    from core.simulate.squat import SquatSimulation
-    from core.simulate.tug import ChairSimulation
+    from sagittal.core.formats import write_recording
+    from sagittal.core.simulate import MOVEMENTS, SCRIPTS, Simulation, simulate_movement, simulate_scenario
+    from sagittal.core.simulate.functional import FunctionalSimulation
+    from sagittal.core.simulate.squat import SquatSimulation
+    from sagittal.core.simulate.tug import ChairSimulation
 
     if script == ACTIVITY:
         return _simulate_activity(out, seed, hours)
@@ -69,10 +69,10 @@ def simulate(out: Path, script: str, seed: int, hours: float = 24.0) -> int:
 
 def _simulate_activity(out: Path, seed: int, hours: float) -> int:
     """Write hours of daily life of one sensor on the chest."""
-    from core.errors import ParameterError
-    from core.formats import write_recording
-    from core.simulate import phase_table
-    from core.simulate.daily import plan_daily_life, record_daily_life, simulate_daily_life
+    from sagittal.core.errors import ParameterError
+    from sagittal.core.formats import write_recording
+    from sagittal.core.simulate import phase_table
+    from sagittal.core.simulate.daily import plan_daily_life, record_daily_life, simulate_daily_life
 
     try:
         made = simulate_daily_life(plan_daily_life(hours, seed), seed=seed)
@@ -101,9 +101,9 @@ Made = tuple[dict[str, bytes], dict[str, object]]
 
 
 def _walk(truth: WalkTruth) -> Made:
-    from core.angles import JointAngles
-    from core.simulate import event_table, stride_table
-    from server.report.exports import angles_parquet
+    from sagittal.core.angles import JointAngles
+    from sagittal.core.simulate import event_table, stride_table
+    from sagittal.server.report.exports import angles_parquet
 
     strides: dict[str, Sequence[object]] = dict(stride_table(truth))
     del strides["turn_rad"]
@@ -120,9 +120,9 @@ def _walk(truth: WalkTruth) -> Made:
 
 
 def _squats(truth: SquatTruth) -> Made:
-    from core.angles import JointAngles
-    from core.simulate import phase_table
-    from server.report.exports import angles_parquet
+    from sagittal.core.angles import JointAngles
+    from sagittal.core.simulate import phase_table
+    from sagittal.server.report.exports import angles_parquet
 
     files = {
         "truth/angles.parquet": angles_parquet(
@@ -134,9 +134,9 @@ def _squats(truth: SquatTruth) -> Made:
 
 
 def _functional(truth: FunctionalTruth) -> Made:
-    from core.angles import JointAngles
-    from core.simulate import phase_table
-    from server.report.exports import angles_parquet
+    from sagittal.core.angles import JointAngles
+    from sagittal.core.simulate import phase_table
+    from sagittal.server.report.exports import angles_parquet
 
     zero = {name: float(values[0]) for name, values in truth.angles.items()}
     from_standing = {name: values - zero[name] for name, values in truth.angles.items()}
@@ -148,7 +148,7 @@ def _functional(truth: FunctionalTruth) -> Made:
 
 
 def _chair(truth: ChairTruth) -> Made:
-    from core.simulate import phase_table
+    from sagittal.core.simulate import phase_table
 
     trunk = {
         "t_s": truth.t_s.tolist(),
@@ -166,7 +166,7 @@ def _chair(truth: ChairTruth) -> Made:
 
 
 def _chest(truth: ChestTruth) -> Made:
-    from core.simulate import phase_table
+    from sagittal.core.simulate import phase_table
 
     trunk = {
         "t_s": truth.t_s.tolist(),
@@ -179,6 +179,6 @@ def _chest(truth: ChestTruth) -> Made:
 
 
 def _csv(columns: Mapping[str, Sequence[object]]) -> bytes:
-    from server.report.columns import write_csv
+    from sagittal.server.report.columns import write_csv
 
     return write_csv(tuple(columns), list(zip(*columns.values(), strict=True)))

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from core.errors import SagittalError
-from server.storage import fs
+from sagittal.core.errors import SagittalError
+from sagittal.server.storage import fs
 
 
 def stairs(
@@ -30,10 +30,10 @@ def stairs(
     -------
     0, or 1 when the recording does not give them.
     """
-    from core.activity.monitor import calibrate_on_walks
-    from core.formats import list_source_files, read_named_file, read_recording
-    from core.formats.manifest import parse_manifest
-    from core.pipeline.activity_stages import find_trunk_stream
+    from sagittal.core.activity.monitor import calibrate_on_walks
+    from sagittal.core.formats import list_source_files, read_named_file, read_recording
+    from sagittal.core.formats.manifest import parse_manifest
+    from sagittal.core.pipeline.activity_stages import find_trunk_stream
 
     try:
         declared = parse_manifest(read_named_file(manifest)) if manifest else None

@@ -13,14 +13,14 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from core.errors import SagittalError
-from server.processes.compiling import OFFLINE, compile_filters_once
-from server.services.provenance import CODE_VERSION
-from server.storage import fs
+from sagittal.core.errors import SagittalError
+from sagittal.server.processes.compiling import OFFLINE, compile_filters_once
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.storage import fs
 
 if TYPE_CHECKING:
-    from core.formats.takes import FoundTake
-    from server.report.study_tables import StudyTake
+    from sagittal.core.formats.takes import FoundTake
+    from sagittal.server.report.study_tables import StudyTake
 
 TAKES: Final = "takes"
 KEPT: Final = ("analysis.json", "strides.csv")
@@ -39,9 +39,9 @@ def study(folder: Path, out: Path, config: Path | None = None, jobs: int | None 
     -------
     0 when at least one take was analysed, 1 when none was or there is none.
     """
-    from core.formats.takes import find_takes
-    from server.commands.analyse import read_overrides
-    from server.report.study_tables import write_study
+    from sagittal.core.formats.takes import find_takes
+    from sagittal.server.commands.analyse import read_overrides
+    from sagittal.server.report.study_tables import write_study
 
     started = dt.datetime.now(dt.UTC)
     try:
@@ -120,8 +120,8 @@ def analyse_take(
     paths: Sequence[Path], folder: Path, config: dict[str, Any], sha256: dict[str, str]
 ) -> dict[str, Any]:
     """Analyse one take in a process of its own; its state last, so that what was cut off is done again."""
-    from core.formats.source import SourceFile
-    from server.services import analysing
+    from sagittal.core.formats.source import SourceFile
+    from sagittal.server.services import analysing
 
     state: dict[str, Any] = {"sha256": sha256, "config": config, "code_version": CODE_VERSION}
     state |= {"code": None, "message": None}
@@ -139,7 +139,7 @@ def analyse_take(
 
 
 def _digests(take: FoundTake) -> dict[str, str]:
-    from core.formats.source import SourceFile, digest_file
+    from sagittal.core.formats.source import SourceFile, digest_file
 
     return {path.name: digest_file(SourceFile.of_path(path)) for path in take.paths}
 
@@ -157,7 +157,7 @@ def _read_state(folder: Path) -> dict[str, Any] | None:
 
 
 def _open_take(take: FoundTake, state: Mapping[str, Any], out: Path) -> StudyTake:
-    from server.report.study_tables import StudyTake
+    from sagittal.server.report.study_tables import StudyTake
 
     folder = _folder_of(out, take)
     strides = folder / "strides.csv"

@@ -6,15 +6,15 @@ import sys
 from contextlib import closing
 from pathlib import Path
 
-from server.settings import load_settings
+from sagittal.server.settings import load_settings
 
 
 def trash(data_dir: Path | None, restore: bool) -> int:
     """List the trash, or put back what the database refers to; 1 when the database cannot be used."""
-    from server.services import sweep
-    from server.storage.blob_opening import open_blobs
-    from server.storage.db import Database
-    from server.storage.migrate import MigrationError, require_current, require_database
+    from sagittal.server.services import sweep
+    from sagittal.server.storage.blob_opening import open_blobs
+    from sagittal.server.storage.db import Database
+    from sagittal.server.storage.migrate import MigrationError, require_current, require_database
 
     settings = load_settings({"data_dir": data_dir})
     if not restore:

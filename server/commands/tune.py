@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from server.storage import fs
+from sagittal.server.storage import fs
 
 
 def tune(folder: Path, out: Path, resume: Path | None, **order: Any) -> int:
@@ -21,9 +21,9 @@ def tune(folder: Path, out: Path, resume: Path | None, **order: Any) -> int:
     -------
     0 = done, better or not; 1 = not possible, 130 = interrupted.
     """
-    from core.errors import SagittalError
-    from core.formats import list_source_files, read_named_file
-    from server.services.tunings import TuningOrder, prepare, search
+    from sagittal.core.errors import SagittalError
+    from sagittal.core.formats import list_source_files, read_named_file
+    from sagittal.server.services.tunings import TuningOrder, prepare, search
 
     checkpoint = out.with_name(f"{out.name}.checkpoint")
 

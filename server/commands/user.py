@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sqlalchemy import select
 
-from server.settings import load_settings
+from sagittal.server.settings import load_settings
 
 
 def user(data_dir: Path | None, name: str, role: str) -> int:
@@ -17,14 +17,14 @@ def user(data_dir: Path | None, name: str, role: str) -> int:
 
     An existing user keeps the role, gets the new password, and loses second factor and tokens.
     """
-    from server import audit
-    from server.auth import accounts, api_tokens, second_factor
-    from server.auth.passwords import hash_password
-    from server.auth.roles import Role
-    from server.http.problems import Problem
-    from server.storage.db import Database
-    from server.storage.migrate import MigrationError, exists, upgrade
-    from server.storage.tables import user as table
+    from sagittal.server import audit
+    from sagittal.server.auth import accounts, api_tokens, second_factor
+    from sagittal.server.auth.passwords import hash_password
+    from sagittal.server.auth.roles import Role
+    from sagittal.server.http.problems import Problem
+    from sagittal.server.storage.db import Database
+    from sagittal.server.storage.migrate import MigrationError, exists, upgrade
+    from sagittal.server.storage.tables import user as table
 
     settings = load_settings({"data_dir": data_dir})
     password = (

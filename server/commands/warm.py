@@ -7,10 +7,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from server.commands.serve import say
-from server.processes.compiling import compile_filters
-from server.storage import fs
-from server.storage.compile_cache import VARIABLE
+from sagittal.server.commands.serve import say
+from sagittal.server.processes.compiling import compile_filters
+from sagittal.server.storage import fs
+from sagittal.server.storage.compile_cache import VARIABLE
 
 
 def warm() -> int:
@@ -36,8 +36,8 @@ def warm() -> int:
 
 def _analyse_walk() -> None:
     """By the real chain: which filters a walk asks for, only that knows."""
-    from core.pipeline import analyse
-    from core.simulate import simulate_scenario
+    from sagittal.core.pipeline import analyse
+    from sagittal.core.simulate import simulate_scenario
 
     made = analyse(simulate_scenario("comfortable", 1).recording)
     if made.problem is not None:

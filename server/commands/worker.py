@@ -6,16 +6,16 @@ import os
 import sys
 from pathlib import Path
 
-from server.log import start_log
-from server.settings import load_settings
+from sagittal.server.log import start_log
+from sagittal.server.settings import load_settings
 
 
 def worker(data_dir: Path | None) -> int:
     """Work until SIGTERM or Ctrl-C; 1 when database or folder are not the server's."""
-    from server.services.custody import StrangersError
-    from server.storage import fs
-    from server.storage.migrate import MigrationError
-    from server.worker.worker import run_worker
+    from sagittal.server.services.custody import StrangersError
+    from sagittal.server.storage import fs
+    from sagittal.server.storage.migrate import MigrationError
+    from sagittal.server.worker.worker import run_worker
 
     settings = load_settings({"data_dir": data_dir})
     start_log(settings)

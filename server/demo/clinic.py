@@ -13,20 +13,20 @@ from dataclasses import dataclass, replace
 from math import degrees, hypot, inf
 from typing import TYPE_CHECKING
 
-from core.condition import USUAL, WalkingCondition
-from core.frames import SEGMENTS, Segment, Side
-from server.jobs.opening import open_queue
-from server.services import analyses, patients, prescriptions, recordings, sessions
-from server.services.reviewed import ReviewedAnalyses
-from server.settings import Settings, load_settings
-from server.storage.blob_opening import open_blobs
-from server.storage.blobs import BlobStore
-from server.storage.db import Database
-from server.storage.tables import now
+from sagittal.core.condition import USUAL, WalkingCondition
+from sagittal.core.frames import SEGMENTS, Segment, Side
+from sagittal.server.jobs.opening import open_queue
+from sagittal.server.services import analyses, patients, prescriptions, recordings, sessions
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.settings import Settings, load_settings
+from sagittal.server.storage.blob_opening import open_blobs
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import now
 
 if TYPE_CHECKING:
-    from core.recording import Recording
-    from core.simulate import Simulation
+    from sagittal.core.recording import Recording
+    from sagittal.core.simulate import Simulation
 
 GONIOMETER = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 """Angles of standing that are entered."""
@@ -55,7 +55,7 @@ class DemoVisit:
 
     Parameters
     ----------
-    script, seed : of core.simulate. days_ago : when. worn : sensors, None = all seven.
+    script, seed : of sagittal.core.simulate. days_ago : when. worn : sensors, None = all seven.
     condition : how it is walked. fails : a sensor and the second of the take from which on it is silent.
     """
 
@@ -129,7 +129,7 @@ PRESCRIBED: tuple[DemoPerson, Mapping[str, object]] = (
 
 def record(visit: DemoVisit) -> Simulation:
     """Simulate the take of a visit."""
-    from core.simulate import Dropout, simulate_scenario
+    from sagittal.core.simulate import Dropout, simulate_scenario
 
     fails = visit.fails and (Dropout(*visit.fails, end_s=inf),)
     return simulate_scenario(visit.script, visit.seed, visit.person.height_m, worn=visit.worn, dropouts=fails)
@@ -144,7 +144,7 @@ def label_sensors(recording: Recording) -> Recording:
 
 def fill(settings: Settings) -> None:
     """Add all patients and visits and ask for their analyses."""
-    from core.simulate import mt_files
+    from sagittal.core.simulate import mt_files
 
     with closing(Database(settings.database_source)) as db:
         blobs = open_blobs(settings)

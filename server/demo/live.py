@@ -13,19 +13,19 @@ from contextlib import closing
 from math import pi
 from typing import TYPE_CHECKING, Any, Final
 
-from core.condition import USUAL
-from server.demo.clinic import STROKE
-from server.live.client import stream
-from server.live.pairing import pair
-from server.live.playback import DueBatch, cut, hello_of, pace_batches
-from server.services import live, patients, sessions
-from server.settings import Settings, load_settings
-from server.storage.db import Database
-from server.storage.tables import now
+from sagittal.core.condition import USUAL
+from sagittal.server.demo.clinic import STROKE
+from sagittal.server.live.client import stream
+from sagittal.server.live.pairing import pair
+from sagittal.server.live.playback import DueBatch, cut, hello_of, pace_batches
+from sagittal.server.services import live, patients, sessions
+from sagittal.server.settings import Settings, load_settings
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import now
 
 if TYPE_CHECKING:
-    from core.recording import Recording
-    from core.simulate import Simulation
+    from sagittal.core.recording import Recording
+    from sagittal.core.simulate import Simulation
 
 TITLE: Final = "Gait training with feedback, live"
 LAPS: Final = 10
@@ -36,9 +36,9 @@ PER_BATCH: Final = 5
 
 def plan_training(laps: int = LAPS, seed: int = 5) -> Simulation:
     """Laps of a corridor for about eight minutes, the steps longer from lap to lap."""
-    from core.simulate import PATIENTS, Arc, Script, Stand, Straight, simulate
-    from core.simulate.script import scale_script
-    from core.simulate.scripts import ON_SKIN
+    from sagittal.core.simulate import PATIENTS, Arc, Script, Stand, Straight, simulate
+    from sagittal.core.simulate.script import scale_script
+    from sagittal.core.simulate.scripts import ON_SKIN
 
     man = PATIENTS["hemi_mild"]
     walker = man.walker.scaled_to(STROKE.height_m)

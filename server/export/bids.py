@@ -13,11 +13,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from core.frames import SEGMENTS, Segment
-from server.export.ages import OLDEST
-from server.export.content import ExportContent
-from server.export.zipping import zip_files
-from server.report.columns import floats_of
+from sagittal.core.frames import SEGMENTS, Segment
+from sagittal.server.export.ages import OLDEST
+from sagittal.server.export.content import ExportContent
+from sagittal.server.export.zipping import zip_files
+from sagittal.server.report.columns import floats_of
 
 VERSION: Final = "1.9.0"
 TRACKSYS: Final = "imu"

@@ -17,12 +17,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from core.angles import SIGNS, JointAngles
-from core.errors import FormatError
-from core.events.result import GaitEvent
-from core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Floats
-from server.export.content import CycleRow, ExportContent
-from server.export.zipping import zip_files
+from sagittal.core.angles import SIGNS, JointAngles
+from sagittal.core.errors import FormatError
+from sagittal.core.events.result import GaitEvent
+from sagittal.core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Floats
+from sagittal.server.export.content import CycleRow, ExportContent
+from sagittal.server.export.zipping import zip_files
 
 FRAMES: Final = 65_535
 """Frames of a file at most."""

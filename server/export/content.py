@@ -9,21 +9,21 @@ from typing import Any, Self
 
 import pyarrow as pa
 
-from core.body.poses import Poses
-from core.errors import FormatError
-from core.events.edits import Edit
-from core.frames import Protocol, Side
-from core.measure import measure_gait
-from core.parameters.kinematic import cycle_curves
-from core.parameters.result import Parameter
-from core.parameters.rows import Column
-from server.report import signals, tracks
-from server.report.analysis_json import parameter_row
-from server.report.bundle import Bundle, apply_review, load_bundle, read_columns, read_poses
-from server.report.columns import read_table
-from server.report.estimator import list_estimated_angles, list_estimated_variables
-from server.report.level import level_column, level_parameters
-from server.report.numbers import numbers_of
+from sagittal.core.body.poses import Poses
+from sagittal.core.errors import FormatError
+from sagittal.core.events.edits import Edit
+from sagittal.core.frames import Protocol, Side
+from sagittal.core.measure import measure_gait
+from sagittal.core.parameters.kinematic import cycle_curves
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.rows import Column
+from sagittal.server.report import signals, tracks
+from sagittal.server.report.analysis_json import parameter_row
+from sagittal.server.report.bundle import Bundle, apply_review, load_bundle, read_columns, read_poses
+from sagittal.server.report.columns import read_table
+from sagittal.server.report.estimator import list_estimated_angles, list_estimated_variables
+from sagittal.server.report.level import level_column, level_parameters
+from sagittal.server.report.numbers import numbers_of
 
 POSES = "poses.parquet"
 LATER = (POSES, signals.NAME, tracks.NAME)
@@ -110,7 +110,7 @@ class ExportContent:
 
     Parameters
     ----------
-    files : of `server.report.exports`, name → reader of its bytes. bundle : with the edits applied.
+    files : of `sagittal.server.report.exports`, name → reader of its bytes. bundle : with the edits applied.
     columns : parameters of every stride of the list. edits : of a person, that count.
     signed : the report in force, None where none is or the format does not hand it on.
     """

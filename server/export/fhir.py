@@ -13,12 +13,12 @@ import uuid
 from collections.abc import Sequence
 from typing import Any, Final
 
-from core.frames import Side
-from core.parameters.catalogue import require_entries
-from core.parameters.result import Parameter
-from server.export.content import ExportContent, SignedForm
-from server.report.level import define_parameter, label_parameter
-from server.report.wording import reason_words
+from sagittal.core.frames import Side
+from sagittal.core.parameters.catalogue import require_entries
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.export.content import ExportContent, SignedForm
+from sagittal.server.report.level import define_parameter, label_parameter
+from sagittal.server.report.wording import reason_words
 
 CODES: Final = "urn:sagittal:gait-parameters"
 """System of our codes: names of the catalogue, which the bundle's CodeSystem defines."""
@@ -34,7 +34,7 @@ LOINC: Final = {
 }
 """Parameter → LOINC code and its name, of the same measurement."""
 
-require_entries(LOINC, "server.export.fhir")
+require_entries(LOINC, "sagittal.server.export.fhir")
 
 UCUM: Final = {
     "": "1",

@@ -6,9 +6,9 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
-from core.errors import InputError
-from server.export.content import POSES, ExportContent
-from server.report import signals
+from sagittal.core.errors import InputError
+from sagittal.server.export.content import POSES, ExportContent
+from sagittal.server.report import signals
 
 ExportName = Literal["xlsx", "csv", "opensim", "c3d", "bids", "fhir", "walk"]
 
@@ -103,27 +103,27 @@ def write_export(name: str, content: ExportContent) -> bytes:
     """Write one format; raises InputError `unknown_export`, and SagittalError where it cannot be written."""
     match find_kind(name).name:
         case "xlsx":
-            from server.export.workbook import write_workbook
+            from sagittal.server.export.workbook import write_workbook
 
             return write_workbook(content)
         case "csv":
-            from server.export.tidy import write_tidy
+            from sagittal.server.export.tidy import write_tidy
 
             return write_tidy(content)
         case "opensim":
-            from server.export.opensim import write_opensim
+            from sagittal.server.export.opensim import write_opensim
 
             return write_opensim(content)
         case "c3d":
-            from server.export.c3d import write_c3d
+            from sagittal.server.export.c3d import write_c3d
 
             return write_c3d(content)
         case "bids":
-            from server.export.bids import write_bids
+            from sagittal.server.export.bids import write_bids
 
             return write_bids(content)
         case "fhir":
-            from server.export.fhir import write_fhir
+            from sagittal.server.export.fhir import write_fhir
 
             return write_fhir(content)
         case drawn:

@@ -11,16 +11,16 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import JointAngles
-from core.angles.cardan import cardan_zxy
-from core.body.poses import Poses
-from core.errors import FormatError
-from core.frames import SIDES, SUFFIX, Floats, Segment
-from core.rotation import about, multiply
-from server.export import sheets
-from server.export.content import ExportContent
-from server.export.zipping import zip_files
-from server.report.columns import write_csv
+from sagittal.core.angles import JointAngles
+from sagittal.core.angles.cardan import cardan_zxy
+from sagittal.core.body.poses import Poses
+from sagittal.core.errors import FormatError
+from sagittal.core.frames import SIDES, SUFFIX, Floats, Segment
+from sagittal.core.rotation import about, multiply
+from sagittal.server.export import sheets
+from sagittal.server.export.content import ExportContent
+from sagittal.server.export.zipping import zip_files
+from sagittal.server.report.columns import write_csv
 
 LEG: Final = (
     ("hip_flexion", "hip_flexion"),

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from math import degrees, isfinite
 from typing import Final
 
-from core.frames import SUFFIX
-from core.parameters.catalogue import CATALOGUE, name_counted, unit_of
-from core.parameters.kinematic import POINTS, cycle_curves, mean_curve
-from core.parameters.result import MeanCurve
-from core.parameters.uncertainty import is_estimated
-from server.export.content import ExportContent
-from server.report.level import GROUP, define_parameter, from_standing, label_parameter
+from sagittal.core.frames import SUFFIX
+from sagittal.core.parameters.catalogue import CATALOGUE, name_counted, unit_of
+from sagittal.core.parameters.kinematic import POINTS, cycle_curves, mean_curve
+from sagittal.core.parameters.result import MeanCurve
+from sagittal.core.parameters.uncertainty import is_estimated
+from sagittal.server.export.content import ExportContent
+from sagittal.server.report.level import GROUP, define_parameter, from_standing, label_parameter
 
 Row = tuple[object, ...]
 

@@ -9,8 +9,8 @@ from typing import Final
 
 import xlsxwriter
 
-from server.export import sheets
-from server.export.content import ExportContent
+from sagittal.server.export import sheets
+from sagittal.server.export.content import ExportContent
 
 MADE: Final = dt.datetime(1980, 1, 1, tzinfo=dt.UTC)
 """Date in the file's properties; one date, so that the same analysis gives the same bytes."""

@@ -7,7 +7,7 @@ import re
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.http.problems import Problem, send_problem
+from sagittal.server.http.problems import Problem, send_problem
 
 MAX_BODY_BYTES = 1_000_000
 """A manifest of eight sensors has some 4 kB."""

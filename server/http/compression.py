@@ -18,7 +18,7 @@ from typing import Any, Final
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.http.cross_site import is_cross_site
+from sagittal.server.http.cross_site import is_cross_site
 
 LEVEL: Final = 5
 """A session page of 144 kB: 29 kB in 2.4 ms; level 9 takes twice as long for 28, level 1 half for 36."""

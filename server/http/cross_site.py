@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from server.http.problems import Problem, send_problem
+from sagittal.server.http.problems import Problem, send_problem
 
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 

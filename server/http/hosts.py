@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from server.http.problems import Problem, send_problem
+from sagittal.server.http.problems import Problem, send_problem
 
 LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 

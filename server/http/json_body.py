@@ -9,7 +9,7 @@ from typing import Any
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
 
-from core.formats.json_tree import read_json
+from sagittal.core.formats.json_tree import read_json
 
 
 class StrictJsonRequest(Request):

@@ -20,12 +20,12 @@ from starlette.routing import Match, Mount
 from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketState
 
-from core.errors import SagittalError
-from server.http.headers import add_security_headers
-from server.http.templates import render
-from server.log import request_id
-from server.storage.blobs import IntegrityError, StoreAway
-from server.storage.refusal import is_busy, refusal_of
+from sagittal.core.errors import SagittalError
+from sagittal.server.http.headers import add_security_headers
+from sagittal.server.http.templates import render
+from sagittal.server.log import request_id
+from sagittal.server.storage.blobs import IntegrityError, StoreAway
+from sagittal.server.storage.refusal import is_busy, refusal_of
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"

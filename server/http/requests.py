@@ -14,7 +14,7 @@ from typing import Final
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.log import request_id
+from sagittal.server.log import request_id
 
 log = logging.getLogger(__name__)
 

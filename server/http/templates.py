@@ -19,15 +19,15 @@ from starlette.requests import HTTPConnection
 from starlette.responses import Response
 from starlette.templating import Jinja2Templates
 
-import web
-from core.body.model import NOMINAL_HEIGHT_M
-from core.condition import CHOICES
-from core.plurals import plural
-from server.storage.compile_cache import VARIABLE
-from web.language import LANGUAGES, SOURCE, choose_language, load_catalogue, script_texts
-from web.shown import Shown
-from web.template_texts import speak_template
-from web.words import FILTERS
+from sagittal import web
+from sagittal.core.body.model import NOMINAL_HEIGHT_M
+from sagittal.core.condition import CHOICES
+from sagittal.core.plurals import plural
+from sagittal.server.storage.compile_cache import VARIABLE
+from sagittal.web.language import LANGUAGES, SOURCE, choose_language, load_catalogue, script_texts
+from sagittal.web.shown import Shown
+from sagittal.web.template_texts import speak_template
+from sagittal.web.words import FILTERS
 
 FOLDER: Final = Path(web.__file__).parent
 

@@ -22,9 +22,9 @@ from procrastinate.exceptions import ConnectorException
 from procrastinate.jobs import Status
 from sqlalchemy import Connection, func, select
 
-from server.jobs.queue import Wait
-from server.jobs.table import TableQueue
-from server.storage.postgres import APPLICATION, DELIVERY_SCHEMA
+from sagittal.server.jobs.queue import Wait
+from sagittal.server.jobs.table import TableQueue
+from sagittal.server.storage.postgres import APPLICATION, DELIVERY_SCHEMA
 
 log = logging.getLogger(__name__)
 

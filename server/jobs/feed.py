@@ -15,9 +15,9 @@ from collections.abc import AsyncIterator, Collection
 from sqlalchemy import select
 from sqlalchemy.exc import SQLAlchemyError
 
-from server.jobs.queue import VIEW_COLUMNS, JobView, job_view
-from server.storage.db import Database
-from server.storage.tables import job
+from sagittal.server.jobs.queue import VIEW_COLUMNS, JobView, job_view
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import job
 
 log = logging.getLogger(__name__)
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Callable
 
-from server.jobs.table import TableQueue
-from server.storage.db import Database
-from server.storage.tables import now
+from sagittal.server.jobs.table import TableQueue
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import now
 
 
 def open_queue(db: Database, lease_s: float, clock: Callable[[], dt.datetime] = now) -> TableQueue:
     """The queue of a database: on PostgreSQL the one whose jobs are delivered."""
     if isinstance(db.source, str):
-        from server.jobs.delivered import DeliveredQueue  # an extra
+        from sagittal.server.jobs.delivered import DeliveredQueue  # an extra
 
         return DeliveredQueue(db, lease_s, clock)
     return TableQueue(db, lease_s, clock)

@@ -13,9 +13,18 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, and_, insert, or_, select, update
 
-from server.jobs.queue import VIEW_COLUMNS, Claim, JobView, LeaseState, Priority, Publish, Wait, job_view
-from server.storage.db import Database
-from server.storage.tables import ACTIVE_STATES, job, new_id, now
+from sagittal.server.jobs.queue import (
+    VIEW_COLUMNS,
+    Claim,
+    JobView,
+    LeaseState,
+    Priority,
+    Publish,
+    Wait,
+    job_view,
+)
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import ACTIVE_STATES, job, new_id, now
 
 POLL_S = 0.2
 """Pause between two looks for work; a look is one read of an index."""

@@ -15,9 +15,9 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidStatus
 from websockets.typing import Subprotocol
 
-from core.formats.live_log import PROTOCOL, Hello, hello_json
-from server.live.protocol import FINAL, MOST_MESSAGE_BYTES
-from server.live.sender import LiveError, Sender, StreamFaults, StreamReport
+from sagittal.core.formats.live_log import PROTOCOL, Hello, hello_json
+from sagittal.server.live.protocol import FINAL, MOST_MESSAGE_BYTES
+from sagittal.server.live.sender import LiveError, Sender, StreamFaults, StreamReport
 
 __all__ = ["LiveError", "StreamFaults", "StreamReport", "stream"]
 

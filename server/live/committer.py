@@ -18,8 +18,8 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any, Protocol
 
-from server.storage.disk_log import DiskLog
-from server.storage.segments import TakeLog
+from sagittal.server.storage.disk_log import DiskLog
+from sagittal.server.storage.segments import TakeLog
 
 log = logging.getLogger(__name__)
 

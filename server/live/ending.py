@@ -12,22 +12,22 @@ import logging
 from collections.abc import Callable
 from typing import Final
 
-from server import audit
-from server.jobs.queue import JobQueue
-from server.live import protocol
-from server.live.intake import TakeEnd
-from server.live.journal import Journal
-from server.live.pool import EstimatorPool
-from server.live.protocol import CloseCode
-from server.live.rows import Rows
-from server.live.take import ActiveTake
-from server.services import live, live_recordings
-from server.services.errors import NotFound
-from server.settings import Settings
-from server.storage import fs
-from server.storage.blobs import BlobStore
-from server.storage.db import Database
-from server.storage.disk_log import DiskLog
+from sagittal.server import audit
+from sagittal.server.jobs.queue import JobQueue
+from sagittal.server.live import protocol
+from sagittal.server.live.intake import TakeEnd
+from sagittal.server.live.journal import Journal
+from sagittal.server.live.pool import EstimatorPool
+from sagittal.server.live.protocol import CloseCode
+from sagittal.server.live.rows import Rows
+from sagittal.server.live.take import ActiveTake
+from sagittal.server.services import live, live_recordings
+from sagittal.server.services.errors import NotFound
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.disk_log import DiskLog
 
 log = logging.getLogger(__name__)
 

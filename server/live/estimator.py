@@ -1,6 +1,6 @@
 """An estimator process: follows many takes, holds no connection to the database, ends with its parent.
 
-Started by server/live/pool.py as `python -m server.live.estimator <socket> <parent pid>`.
+Started by server/live/pool.py as `python -m sagittal.server.live.estimator <socket> <parent pid>`.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ import time
 from collections.abc import Callable
 from math import ceil
 
-from core.errors import SagittalError
-from server.live import follower
-from server.live.follower import Follower
-from server.live.messages import (
+from sagittal.core.errors import SagittalError
+from sagittal.server.live import follower
+from sagittal.server.live.follower import Follower
+from sagittal.server.live.messages import (
     Charge,
     Command,
     EstimateFailed,
@@ -28,10 +28,10 @@ from server.live.messages import (
     decode_order,
     encode,
 )
-from server.processes.channel import Channel
-from server.processes.child import enter_child
+from sagittal.server.processes.channel import Channel
+from sagittal.server.processes.child import enter_child
 
-log = logging.getLogger("server.live.estimator")
+log = logging.getLogger("sagittal.server.live.estimator")
 
 
 class EstimatorWorker:
@@ -134,8 +134,8 @@ def follow(line: Channel) -> None:
 
 def compile_kernels() -> None:
     """Compile the kernels or load them from the cache, before a patient stands there."""
-    from core.online import compile_live_kernels
-    from server.processes.compiling import OFFLINE, compile_filters_once
+    from sagittal.core.online import compile_live_kernels
+    from sagittal.server.processes.compiling import OFFLINE, compile_filters_once
 
     # what a walk needs first: workers analyse while the rest is compiled here
     compile_filters_once(OFFLINE)

@@ -14,19 +14,27 @@ from typing import Any, BinaryIO, Final, cast
 
 import msgspec
 
-from core.errors import InputError, Notice, SagittalError
-from core.events.result import GaitEvent
-from core.feedback import Baseline, Prescription
-from core.feedback.engine import COMMANDS, FeedbackEngine
-from core.formats.live_log import Hello, LogRecord, SampleBatch, decode_batch, parse_hello, scan, scan_records
-from core.frames import SIDES, Protocol, Side
-from core.functional_tests.result import GuidedTestView
-from core.online import OnlineSession
-from core.online.frame import AngleTrail, CalibrationView, LiveFrame
-from core.parameters.live_stride import LiveStride
-from core.recording import Subject
-from server.live import wire
-from server.live.messages import (
+from sagittal.core.errors import InputError, Notice, SagittalError
+from sagittal.core.events.result import GaitEvent
+from sagittal.core.feedback import Baseline, Prescription
+from sagittal.core.feedback.engine import COMMANDS, FeedbackEngine
+from sagittal.core.formats.live_log import (
+    Hello,
+    LogRecord,
+    SampleBatch,
+    decode_batch,
+    parse_hello,
+    scan,
+    scan_records,
+)
+from sagittal.core.frames import SIDES, Protocol, Side
+from sagittal.core.functional_tests.result import GuidedTestView
+from sagittal.core.online import OnlineSession
+from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame
+from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.recording import Subject
+from sagittal.server.live import wire
+from sagittal.server.live.messages import (
     STALE_S,
     Command,
     FeedbackStatus,
@@ -37,7 +45,7 @@ from server.live.messages import (
     Picture,
     Report,
 )
-from server.report.guided_words import tell_person
+from sagittal.server.report.guided_words import tell_person
 
 CHUNK_BYTES: Final = 1 << 14
 """Read and estimated in one turn, half a second of seven sensors: who catches up lets others through."""

@@ -15,15 +15,15 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy.exc import SQLAlchemyError
 
-from core.formats.live_log import Hello
-from server import audit
-from server.jobs.queue import JobQueue
-from server.live import protocol
-from server.live.committer import Committer
-from server.live.ending import Ending
-from server.live.intake import TakeEnd
-from server.live.journal import Journal
-from server.live.messages import (
+from sagittal.core.formats.live_log import Hello
+from sagittal.server import audit
+from sagittal.server.jobs.queue import JobQueue
+from sagittal.server.live import protocol
+from sagittal.server.live.committer import Committer
+from sagittal.server.live.ending import Ending
+from sagittal.server.live.intake import TakeEnd
+from sagittal.server.live.journal import Journal
+from sagittal.server.live.messages import (
     EstimateFailed,
     FeedbackStatus,
     FeedItem,
@@ -32,18 +32,18 @@ from server.live.messages import (
     Picture,
     Report,
 )
-from server.live.pool import EstimatorPool
-from server.live.protocol import CloseCode
-from server.live.recorder import open_recorder
-from server.live.room import Room
-from server.live.rows import Rows
-from server.live.take import ActiveTake, TabletLink, describe_unjoined
-from server.nodes.registry import Nodes
-from server.services import live, live_recordings
-from server.services.errors import NODE_AWAY, Conflict
-from server.services.reviewed import ReviewedAnalyses
-from server.settings import Settings
-from server.storage.db import Database
+from sagittal.server.live.pool import EstimatorPool
+from sagittal.server.live.protocol import CloseCode
+from sagittal.server.live.recorder import open_recorder
+from sagittal.server.live.room import Room
+from sagittal.server.live.rows import Rows
+from sagittal.server.live.take import ActiveTake, TabletLink, describe_unjoined
+from sagittal.server.nodes.registry import Nodes
+from sagittal.server.services import live, live_recordings
+from sagittal.server.services.errors import NODE_AWAY, Conflict
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database
 
 log = logging.getLogger(__name__)
 

@@ -10,8 +10,8 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from core.errors import InputError
-from core.formats.live_log import (
+from sagittal.core.errors import InputError
+from sagittal.core.formats.live_log import (
     Finish,
     Header,
     Hello,
@@ -26,8 +26,8 @@ from core.formats.live_log import (
     read_batch_header,
     view_samples,
 )
-from server.live import protocol
-from server.live.protocol import MOST_UNACKED, CloseCode, ProtocolError
+from sagittal.server.live import protocol
+from sagittal.server.live.protocol import MOST_UNACKED, CloseCode, ProtocolError
 
 MISMATCH = "finish_mismatch"
 

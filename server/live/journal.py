@@ -13,12 +13,12 @@ from typing import Any, Final
 from sqlalchemy import insert, select
 from sqlalchemy.exc import SQLAlchemyError
 
-from core.feedback import Cue
-from server.services.live_training import note_feedback
-from server.storage.db import Database
-from server.storage.disk_log import DiskLog
-from server.storage.live_tables import live_event, live_take
-from server.storage.tables import now
+from sagittal.core.feedback import Cue
+from sagittal.server.services.live_training import note_feedback
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.disk_log import DiskLog
+from sagittal.server.storage.live_tables import live_event, live_take
+from sagittal.server.storage.tables import now
 
 log = logging.getLogger(__name__)
 

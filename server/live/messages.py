@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 
 import msgspec
 
-from web.user_text import encode_user_text
+from sagittal.web.user_text import encode_user_text
 
 STALE_S: Final = 0.5
 """Data older than this are not fed back (docs/feedback.md, "Which strides get a cue")."""
@@ -36,7 +36,7 @@ class FollowTake(msgspec.Struct, frozen=True, tag=True):
     Parameters
     ----------
     size : bytes of the log that were there before; what comes out of them is late.
-    prescription, baseline : JSON of core.feedback, None = no feedback. commands : given so far.
+    prescription, baseline : JSON of sagittal.core.feedback, None = no feedback. commands : given so far.
     """
 
     take: str

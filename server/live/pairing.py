@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
-from core.formats.json_tree import read_json
-from server.live.sender import LiveError
+from sagittal.core.formats.json_tree import read_json
+from sagittal.server.live.sender import LiveError
 
 
 @dataclass(frozen=True)

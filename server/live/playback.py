@@ -14,8 +14,8 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import InputError
-from core.formats.live_log import (
+from sagittal.core.errors import InputError
+from sagittal.core.formats.live_log import (
     CHANNELS,
     MOST_SAMPLES,
     Hello,
@@ -24,9 +24,9 @@ from core.formats.live_log import (
     StreamInfo,
     encode_batch,
 )
-from core.frames import Floats
-from core.recording import ImuStream, Recording
-from core.rest import find_runs
+from sagittal.core.frames import Floats
+from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.rest import find_runs
 
 ON_GRID: Final = 0.01
 """Largest distance from the grid in samples, as core/timeline takes it."""

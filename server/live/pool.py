@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from server.live.messages import (
+from sagittal.server.live.messages import (
     Charge,
     Command,
     EstimatorReady,
@@ -22,13 +22,13 @@ from server.live.messages import (
     decode_report,
     encode,
 )
-from server.processes.kept_process import KeptProcess
-from server.settings import Settings
+from sagittal.server.processes.kept_process import KeptProcess
+from sagittal.server.settings import Settings
 
 BACKLOG_BYTES: Final = 1 << 16
 """While so much waits for a process to read it, it is told no further lengths."""
 LOOK_S: Final = 1.0
-MODULE: Final = "server.live.estimator"
+MODULE: Final = "sagittal.server.live.estimator"
 """What an estimator process runs."""
 
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Final, Literal
 
-from core.errors import InputError
-from core.formats.json_tree import read_json
-from core.formats.live_log import (
+from sagittal.core.errors import InputError
+from sagittal.core.formats.json_tree import read_json
+from sagittal.core.formats.live_log import (
     MOST_FRAME_BYTES,
     Finish,
     Hello,

@@ -16,12 +16,12 @@ import asyncio
 from pathlib import Path
 from typing import Protocol
 
-from core.formats.live_log import Hello, hello_json, record
-from server.live.committer import Committer, LogLane, Post
-from server.live.intake import Intake, IntakeAnswer, TakeEnd, refuse
-from server.live.protocol import CloseCode, ProtocolError
-from server.storage import segments
-from server.storage.refusal import FULL
+from sagittal.core.formats.live_log import Hello, hello_json, record
+from sagittal.server.live.committer import Committer, LogLane, Post
+from sagittal.server.live.intake import Intake, IntakeAnswer, TakeEnd, refuse
+from sagittal.server.live.protocol import CloseCode, ProtocolError
+from sagittal.server.storage import segments
+from sagittal.server.storage.refusal import FULL
 
 
 class RecorderListener(Protocol):

@@ -14,7 +14,7 @@ from typing import Final
 
 import msgspec
 
-from server.live.messages import Picture
+from sagittal.server.live.messages import Picture
 
 QUEUE: Final = 200
 """Strides, cues and notices kept for a browser that does not read: two minutes of walking."""

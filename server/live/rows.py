@@ -5,14 +5,14 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Collection
 
-from server import audit
-from server.live.intake import TakeEnd
-from server.services import live
-from server.services.errors import NotFound
-from server.services.live_claims import claim_take
-from server.services.live_training import LiveTraining, training_of
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.db import Database
+from sagittal.server import audit
+from sagittal.server.live.intake import TakeEnd
+from sagittal.server.services import live
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.live_claims import claim_take
+from sagittal.server.services.live_training import LiveTraining, training_of
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.db import Database
 
 
 class Rows:

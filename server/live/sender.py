@@ -16,9 +16,9 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import ConnectionClosed
 
-from core.errors import SagittalError
-from core.formats.json_tree import read_json
-from core.formats.live_log import Finish, finish_json, read_batch_header, view_samples
+from sagittal.core.errors import SagittalError
+from sagittal.core.formats.json_tree import read_json
+from sagittal.core.formats.live_log import Finish, finish_json, read_batch_header, view_samples
 
 
 class LiveError(SagittalError):

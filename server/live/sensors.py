@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from core.formats.live_log import Hello
-from server.live.messages import BATTERY_WARN_PCT
+from sagittal.core.formats.live_log import Hello
+from sagittal.server.live.messages import BATTERY_WARN_PCT
 
 
 def sensor_rows(

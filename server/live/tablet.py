@@ -13,19 +13,19 @@ from typing import Final, NoReturn
 from fastapi import APIRouter, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
-from core.errors import InputError
-from core.formats.live_log import PROTOCOL, Hello
-from server.auth.access import require
-from server.auth.roles import Action
-from server.live import protocol
-from server.live.hub import Hub
-from server.live.intake import IntakeAnswer
-from server.live.protocol import HELLO_WITHIN_S, CloseCode, ProtocolError
-from server.live.take import ActiveTake
-from server.nodes.forwarding import UnreachableError, carry_tablet
-from server.nodes.passage import ASKED_BY
-from server.services import live
-from server.services.errors import NodeAway, NotFound
+from sagittal.core.errors import InputError
+from sagittal.core.formats.live_log import PROTOCOL, Hello
+from sagittal.server.auth.access import require
+from sagittal.server.auth.roles import Action
+from sagittal.server.live import protocol
+from sagittal.server.live.hub import Hub
+from sagittal.server.live.intake import IntakeAnswer
+from sagittal.server.live.protocol import HELLO_WITHIN_S, CloseCode, ProtocolError
+from sagittal.server.live.take import ActiveTake
+from sagittal.server.nodes.forwarding import UnreachableError, carry_tablet
+from sagittal.server.nodes.passage import ASKED_BY
+from sagittal.server.services import live
+from sagittal.server.services.errors import NodeAway, NotFound
 
 router = APIRouter(include_in_schema=False)
 

@@ -14,17 +14,17 @@ from typing import Any, Final, Protocol
 
 import msgspec
 
-from server.live import protocol
-from server.live.intake import IntakeAnswer, TakeEnd
-from server.live.journal import Journal
-from server.live.messages import STALE_S, Charge, Command, FeedItem, FollowTake, Picture
-from server.live.pool import EstimatorPool
-from server.live.protocol import ProtocolError
-from server.live.recorder import Recorder
-from server.live.room import Room
-from server.live.sensors import sensor_rows
-from server.services.live import LiveEvent, LiveTakeRecord, is_own_notice
-from server.services.live_training import LiveTraining
+from sagittal.server.live import protocol
+from sagittal.server.live.intake import IntakeAnswer, TakeEnd
+from sagittal.server.live.journal import Journal
+from sagittal.server.live.messages import STALE_S, Charge, Command, FeedItem, FollowTake, Picture
+from sagittal.server.live.pool import EstimatorPool
+from sagittal.server.live.protocol import ProtocolError
+from sagittal.server.live.recorder import Recorder
+from sagittal.server.live.room import Room
+from sagittal.server.live.sensors import sensor_rows
+from sagittal.server.services.live import LiveEvent, LiveTakeRecord, is_own_notice
+from sagittal.server.services.live_training import LiveTraining
 
 STEERING: Final = frozenset({"feedback", "level", "pause", "stale", "redo_calibration", "test"})
 """Commands that change what the estimator says; each holds from a batch on."""

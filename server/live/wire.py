@@ -13,20 +13,20 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
-from core.calibration.score import CalibrationScore
-from core.errors import Notice
-from core.feedback import Cue, FeedbackState
-from core.frames import SIDES, SUFFIX, Floats, Side
-from core.functional_tests.result import GuidedTestView, TimedSegment
-from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SensorHealth
-from core.parameters.live_stride import LiveStride
-from core.parameters.result import Parameter
-from server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
-from server.report.calibration_checks import say_verdict
-from server.report.functional import segment_label
-from server.report.guided_words import tell_person
-from server.report.wording import place_words, reason_words, speak_places
-from web.user_text import encode_user_text
+from sagittal.core.calibration.score import CalibrationScore
+from sagittal.core.errors import Notice
+from sagittal.core.feedback import Cue, FeedbackState
+from sagittal.core.frames import SIDES, SUFFIX, Floats, Side
+from sagittal.core.functional_tests.result import GuidedTestView, TimedSegment
+from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame, SensorHealth
+from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
+from sagittal.server.report.calibration_checks import say_verdict
+from sagittal.server.report.functional import segment_label
+from sagittal.server.report.guided_words import tell_person
+from sagittal.server.report.wording import place_words, reason_words, speak_places
+from sagittal.web.user_text import encode_user_text
 
 LOST_WARN, LOST_BAD = 0.01, 0.20
 """Shares of lost samples, as the report judges a whole take (core/quality/assessment.py)."""

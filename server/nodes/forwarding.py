@@ -20,11 +20,11 @@ from starlette.websockets import WebSocket
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidStatus, WebSocketException
 
-from server.http.carrying import carry_messages
-from server.http.problems import Problem, send_problem
-from server.nodes import passage
-from server.nodes.pins import find_owner, find_pin
-from server.nodes.registry import Nodes, WebNode
+from sagittal.server.http.carrying import carry_messages
+from sagittal.server.http.problems import Problem, send_problem
+from sagittal.server.nodes import passage
+from sagittal.server.nodes.pins import find_owner, find_pin
+from sagittal.server.nodes.registry import Nodes, WebNode
 
 log = logging.getLogger(__name__)
 

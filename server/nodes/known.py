@@ -7,9 +7,9 @@ import time
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from server.http.problems import Problem, send_problem
-from server.nodes.passage import ASKED_BY, HEADER, LIFE_S, sign
-from server.nodes.registry import Nodes
+from sagittal.server.http.problems import Problem, send_problem
+from sagittal.server.nodes.passage import ASKED_BY, HEADER, LIFE_S, sign
+from sagittal.server.nodes.registry import Nodes
 
 
 class KnownNodes:

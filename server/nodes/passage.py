@@ -15,7 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
-from server.storage import fs
+from sagittal.server.storage import fs
 
 HEADER: Final = b"x-sagittal-node"
 ASKED_BY: Final = "sagittal.asked_by"

@@ -16,9 +16,9 @@ from urllib.parse import parse_qs
 from sqlalchemy import select
 from starlette.types import Scope
 
-from server.nodes.registry import Nodes, WebNode
-from server.storage.db import Database
-from server.storage.live_tables import OPEN_TAKE_STATES, live_take
+from sagittal.server.nodes.registry import Nodes, WebNode
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.live_tables import OPEN_TAKE_STATES, live_take
 
 _ID = "([0-9a-f]{32})"
 _SESSION: Final = re.compile(

@@ -20,13 +20,13 @@ from typing import Any, Final
 from sqlalchemy import delete, func, insert, select, update
 from sqlalchemy.exc import SQLAlchemyError
 
-from server.nodes.passage import read_key, write_line
-from server.services.custody import StrangersError
-from server.settings import Settings
-from server.storage.db import Database
-from server.storage.live_tables import live_take
-from server.storage.node_tables import web_node
-from server.storage.tables import now
+from sagittal.server.nodes.passage import read_key, write_line
+from sagittal.server.services.custody import StrangersError
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.live_tables import live_take
+from sagittal.server.storage.node_tables import web_node
+from sagittal.server.storage.tables import now
 
 FORGOTTEN: Final = dt.timedelta(days=30)
 """A server that was not heard of for so long is not listed any more."""

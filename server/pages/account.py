@@ -8,17 +8,17 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from server.auth import api_tokens, second_factor, security_keys
-from server.auth.access import require
-from server.auth.api_tokens import Scope
-from server.auth.identity import Identity
-from server.auth.passwords import MIN_LENGTH
-from server.auth.roles import Action
-from server.auth.security_keys import site_of
-from server.context import Config, Db
-from server.pages.shell import render_page
-from server.pages.words import ROLE_WORDS
-from server.storage.tables import now
+from sagittal.server.auth import api_tokens, second_factor, security_keys
+from sagittal.server.auth.access import require
+from sagittal.server.auth.api_tokens import Scope
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.passwords import MIN_LENGTH
+from sagittal.server.auth.roles import Action
+from sagittal.server.auth.security_keys import site_of
+from sagittal.server.context import Config, Db
+from sagittal.server.pages.shell import render_page
+from sagittal.server.pages.words import ROLE_WORDS
+from sagittal.server.storage.tables import now
 
 SCOPE_WORDS: Final = {
     Scope.READ: "Read patients, visits and results",

@@ -10,17 +10,17 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Db, Id
-from server.jobs.queue import COMPARE_FILTERS
-from server.pages.job_views import view_job
-from server.pages.session_context import lead_to_days, read_context
-from server.pages.shell import record_opening, render_page
-from server.report.filter_list import PROPOSED, list_engines
-from server.report.filter_view import NAME, view_comparison
-from server.services import analyses, filter_runs, jobs, reference_files
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Db, Id
+from sagittal.server.jobs.queue import COMPARE_FILTERS
+from sagittal.server.pages.job_views import view_job
+from sagittal.server.pages.session_context import lead_to_days, read_context
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.report.filter_list import PROPOSED, list_engines
+from sagittal.server.report.filter_view import NAME, view_comparison
+from sagittal.server.services import analyses, filter_runs, jobs, reference_files
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

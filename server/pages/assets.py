@@ -9,8 +9,8 @@ from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
-import web
-from server.auth.roles import Action
+from sagittal import web
+from sagittal.server.auth.roles import Action
 
 STATIC = Path(web.__file__).parent / "static"
 

@@ -8,13 +8,13 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from server import audit
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db
-from server.pages.audit_words import describe_rows
-from server.pages.shell import render_page
+from sagittal.server import audit
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db
+from sagittal.server.pages.audit_words import describe_rows
+from sagittal.server.pages.shell import render_page
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

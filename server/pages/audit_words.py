@@ -8,10 +8,10 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, Row, select
 
-from server.storage.care_tables import emergency_access
-from server.storage.tables import patient, session
-from web.user_text import UserText
-from web.words import day
+from sagittal.server.storage.care_tables import emergency_access
+from sagittal.server.storage.tables import patient, session
+from sagittal.web.user_text import UserText
+from sagittal.web.words import day
 
 DEEDS: Final[Mapping[str, str]] = {
     "sign_in": "signed in",

@@ -9,17 +9,17 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Db, Id
-from server.pages.session_context import lead_to_days, read_context
-from server.pages.shell import record_opening, render_page
-from server.report.body_lengths import view_lengths
-from server.report.bundle import read_warnings
-from server.report.calibration_checks import view_calibration_checks
-from server.report.sensor_places import view_sensor_places
-from server.services import analyses
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Db, Id
+from sagittal.server.pages.session_context import lead_to_days, read_context
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.report.body_lengths import view_lengths
+from sagittal.server.report.bundle import read_warnings
+from sagittal.server.report.calibration_checks import view_calibration_checks
+from sagittal.server.report.sensor_places import view_sensor_places
+from sagittal.server.services import analyses
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -8,13 +8,13 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.roles import Action
-from server.context import Config
-from server.http.headers import allow_camera
-from server.http.templates import render
-from server.pages.words import CALIBRATIONS, SEGMENT_NAMES
-from server.services.live import ALPHABET, CODE_LENGTH
+from sagittal.server.auth.access import require
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Config
+from sagittal.server.http.headers import allow_camera
+from sagittal.server.http.templates import render
+from sagittal.server.pages.words import CALIBRATIONS, SEGMENT_NAMES
+from sagittal.server.services.live import ALPHABET, CODE_LENGTH
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

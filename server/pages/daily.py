@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from core.activity.parameters import WORN_H
-from core.activity.result import KINDS
-from server.report.daily_charts import bouts_svg, inclination_svg, kind_swatch, ribbon_svg, steps_svg
-from server.report.daily_life import (
+from sagittal.core.activity.parameters import WORN_H
+from sagittal.core.activity.result import KINDS
+from sagittal.server.report.daily_charts import bouts_svg, inclination_svg, kind_swatch, ribbon_svg, steps_svg
+from sagittal.server.report.daily_life import (
     EVENTS_SHOWN,
     KIND_LABELS,
     KIND_WORDS,

@@ -12,19 +12,19 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Db, Id
-from server.export.kinds import EXPORTED
-from server.pages.job_views import follow_few, view_job
-from server.pages.session_context import read_context
-from server.pages.shell import record_opening, render_page
-from server.pages.words import SEGMENT_NAMES
-from server.report.estimator import choice_label, estimator_view
-from server.report.sensor_checks import sensor_checks
-from server.services import analyses, exports, recordings, repairs, videos
-from server.storage.blobs import BlobStore
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Db, Id
+from sagittal.server.export.kinds import EXPORTED
+from sagittal.server.pages.job_views import follow_few, view_job
+from sagittal.server.pages.session_context import read_context
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.pages.words import SEGMENT_NAMES
+from sagittal.server.report.estimator import choice_label, estimator_view
+from sagittal.server.report.sensor_checks import sensor_checks
+from sagittal.server.services import analyses, exports, recordings, repairs, videos
+from sagittal.server.storage.blobs import BlobStore
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -11,8 +11,8 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from core.frames import GRAVITY
-from core.quality.device_course import (
+from sagittal.core.frames import GRAVITY
+from sagittal.core.quality.device_course import (
     ACC_NOISE_ROSE,
     BIAS_MOVED,
     GYRO_NOISE_ROSE,
@@ -20,18 +20,18 @@ from core.quality.device_course import (
     SCALE_OFF,
     DeviceCourse,
 )
-from core.quality.devices import DeviceCheck
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, DeviceId
-from server.pages.shell import render_page
-from server.pages.words import SEGMENT_NAMES
-from server.report.device_chart import draw_device
-from server.report.device_words import judge_device
-from server.report.wording import format_number
-from server.services import devices
-from server.services.devices import KnownDevice
+from sagittal.core.quality.devices import DeviceCheck
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, DeviceId
+from sagittal.server.pages.shell import render_page
+from sagittal.server.pages.words import SEGMENT_NAMES
+from sagittal.server.report.device_chart import draw_device
+from sagittal.server.report.device_words import judge_device
+from sagittal.server.report.wording import format_number
+from sagittal.server.services import devices
+from sagittal.server.services.devices import KnownDevice
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

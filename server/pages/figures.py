@@ -6,18 +6,18 @@ import logging
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from core.errors import SagittalError
-from core.events.result import Strides
-from server.report.bundle import read_poses
-from server.report.model import ReportModel
-from server.services import analyses
-from server.services.histories import AnalysedSession
-from server.services.patients import Patient
-from server.services.reviewed import ReviewedAnalyses
-from server.viewer.client import client_version
-from server.viewer.first_picture import draw_first_picture
-from server.viewer.motion import prepare_motion
-from server.viewer.still import draw_still
+from sagittal.core.errors import SagittalError
+from sagittal.core.events.result import Strides
+from sagittal.server.report.bundle import read_poses
+from sagittal.server.report.model import ReportModel
+from sagittal.server.services import analyses
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.viewer.client import client_version
+from sagittal.server.viewer.first_picture import draw_first_picture
+from sagittal.server.viewer.motion import prepare_motion
+from sagittal.server.viewer.still import draw_still
 
 log = logging.getLogger(__name__)
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from core.parameters.catalogue import CATALOGUE
-from server.pages.words import PROTOCOL_NAMES
-from server.report.functional import MEANT, norm_words
-from server.report.guided_words import HINTS, TOTAL, tell_person
-from server.services.patients import Patient
-from server.services.sessions import Session
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.pages.words import PROTOCOL_NAMES
+from sagittal.server.report.functional import MEANT, norm_words
+from sagittal.server.report.guided_words import HINTS, TOTAL, tell_person
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.sessions import Session
 
 
 def view_guided_test(session: Session, patient: Patient) -> dict[str, Any] | None:

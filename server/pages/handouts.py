@@ -8,27 +8,27 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from core.change import Change
-from core.parameters.catalogue import CATALOGUE
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Config, Db, Id, OpenTrail, Reviewed
-from server.pages.paper import print_pdf
-from server.pages.shell import render_sheets
-from server.pages.trends import view_trends
-from server.pages.words import describe_person
-from server.report.comparison import compare_figures
-from server.report.feedback_words import side_words
-from server.report.leaflet import list_figures
-from server.report.numbers import Numbers
-from server.services import comparisons, histories, patients, prescriptions, sessions
-from server.services.errors import Conflict
-from server.services.provenance import CODE_VERSION
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.db import Database
-from server.storage.tables import now
-from web.words import day
+from sagittal.core.change import Change
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Config, Db, Id, OpenTrail, Reviewed
+from sagittal.server.pages.paper import print_pdf
+from sagittal.server.pages.shell import render_sheets
+from sagittal.server.pages.trends import view_trends
+from sagittal.server.pages.words import describe_person
+from sagittal.server.report.comparison import compare_figures
+from sagittal.server.report.feedback_words import side_words
+from sagittal.server.report.leaflet import list_figures
+from sagittal.server.report.numbers import Numbers
+from sagittal.server.services import comparisons, histories, patients, prescriptions, sessions
+from sagittal.server.services.errors import Conflict
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import now
+from sagittal.web.words import day
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

@@ -8,15 +8,15 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Config, Db, Id
-from server.pages.shell import render_page
-from server.services import identities, patients
-from server.settings import Settings
-from server.storage.db import Database
-from server.trail import AuditTrail
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Config, Db, Id
+from sagittal.server.pages.shell import render_page
+from sagittal.server.services import identities, patients
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database
+from sagittal.server.trail import AuditTrail
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -10,14 +10,14 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db
-from server.pages.job_views import follow_few, view_job
-from server.pages.shell import record_listing, render_page
-from server.services import jobs
-from web.words import seconds
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db
+from sagittal.server.pages.job_views import follow_few, view_job
+from sagittal.server.pages.shell import record_listing, render_page
+from sagittal.server.services import jobs
+from sagittal.web.words import seconds
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

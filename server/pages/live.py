@@ -10,18 +10,18 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
-from core.parameters.catalogue import CATALOGUE
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id
-from server.pages.guided_test import view_guided_test
-from server.pages.shell import record_opening, render_page
-from server.pages.words import PROTOCOL_NAMES, SEGMENT_NAMES
-from server.report.wording import VARIABLES, ZERO_WORDS, Variable
-from server.services import patients, prescriptions, sessions
-from server.services.patients import Patient
-from server.services.sessions import Session
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id
+from sagittal.server.pages.guided_test import view_guided_test
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.pages.words import PROTOCOL_NAMES, SEGMENT_NAMES
+from sagittal.server.report.wording import VARIABLES, ZERO_WORDS, Variable
+from sagittal.server.services import patients, prescriptions, sessions
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.sessions import Session
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

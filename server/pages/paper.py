@@ -14,13 +14,13 @@ from markupsafe import Markup
 from starlette.requests import Request
 from starlette.responses import Response
 
-from server.http.headers import allow_camera, lock_document
-from server.http.templates import TEMPLATES, language_of
-from server.pages.assets import STATIC
-from server.pages.words import PROTOCOL_NAMES
-from server.services import pdfs
-from server.settings import Settings
-from web.user_text import UserText
+from sagittal.server.http.headers import allow_camera, lock_document
+from sagittal.server.http.templates import TEMPLATES, language_of
+from sagittal.server.pages.assets import STATIC
+from sagittal.server.pages.words import PROTOCOL_NAMES
+from sagittal.server.services import pdfs
+from sagittal.server.settings import Settings
+from sagittal.web.user_text import UserText
 
 SHEETS: Final = ("base", "pages", "visits", "daily", "paper")
 """Style sheets of paper, in their order."""

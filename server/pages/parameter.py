@@ -8,13 +8,13 @@ from fastapi import APIRouter, Path, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id, Reviewed
-from server.pages.session_context import read_measured_context
-from server.pages.shell import record_opening, render_page
-from server.services import analyses, edit_log, reports
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id, Reviewed
+from sagittal.server.pages.session_context import read_measured_context
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.services import analyses, edit_log, reports
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

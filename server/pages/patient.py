@@ -11,25 +11,25 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
-from core.change import parameter_changes
-from core.parameters.catalogue import CATALOGUE
-from core.parameters.result import Parameter
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Config, Db, Id, Reviewed
-from server.pages.identity import offers_identity
-from server.pages.job_views import find_active_jobs, follow_few
-from server.pages.patients import view_patient
-from server.pages.prescription import make_card
-from server.pages.programme import view_programme
-from server.pages.shell import record_opening, render_page
-from server.pages.trends import draw_figures
-from server.pages.visit_state import describe_live, judge_visit
-from server.report.change_words import change_words
-from server.report.takes_chart import find_scale, takes_svg
-from server.report.trends import VisitKind
-from server.services import (
+from sagittal.core.change import parameter_changes
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Config, Db, Id, Reviewed
+from sagittal.server.pages.identity import offers_identity
+from sagittal.server.pages.job_views import find_active_jobs, follow_few
+from sagittal.server.pages.patients import view_patient
+from sagittal.server.pages.prescription import make_card
+from sagittal.server.pages.programme import view_programme
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.pages.trends import draw_figures
+from sagittal.server.pages.visit_state import describe_live, judge_visit
+from sagittal.server.report.change_words import change_words
+from sagittal.server.report.takes_chart import find_scale, takes_svg
+from sagittal.server.report.trends import VisitKind
+from sagittal.server.services import (
     care_teams,
     consents,
     edit_log,
@@ -41,13 +41,13 @@ from server.services import (
     sessions,
     visits,
 )
-from server.services.histories import AnalysedSession
-from server.services.programmes import PlannedVisit
-from server.services.reviewed import UNREADABLE, ReviewedAnalyses
-from server.services.visits import SPEED, ClinicVisit, TakesFigure
-from server.storage.blobs import StoreAway
-from server.storage.tables import now
-from web.words import number
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.services.programmes import PlannedVisit
+from sagittal.server.services.reviewed import UNREADABLE, ReviewedAnalyses
+from sagittal.server.services.visits import SPEED, ClinicVisit, TakesFigure
+from sagittal.server.storage.blobs import StoreAway
+from sagittal.server.storage.tables import now
+from sagittal.web.words import number
 
 PURPOSE_WORDS: Final = {
     "recording": "Measuring and storing",

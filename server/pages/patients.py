@@ -11,22 +11,31 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
-from core.parameters.catalogue import CATALOGUE
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Reviewed
-from server.pages.job_views import find_active_jobs, follow_few
-from server.pages.shell import record_listing, render_page
-from server.pages.visit_state import describe_live, judge_visit
-from server.pages.words import describe_person
-from server.report.change_words import change_words
-from server.services import analyses, care_teams, edit_log, live, patients, programmes, sessions, visits
-from server.services.patients import Patient
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.tables import now
-from web.user_text import UserText
-from web.words import number
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Reviewed
+from sagittal.server.pages.job_views import find_active_jobs, follow_few
+from sagittal.server.pages.shell import record_listing, render_page
+from sagittal.server.pages.visit_state import describe_live, judge_visit
+from sagittal.server.pages.words import describe_person
+from sagittal.server.report.change_words import change_words
+from sagittal.server.services import (
+    analyses,
+    care_teams,
+    edit_log,
+    live,
+    patients,
+    programmes,
+    sessions,
+    visits,
+)
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.tables import now
+from sagittal.web.user_text import UserText
+from sagittal.web.words import number
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -10,17 +10,17 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from core.feedback import Prescription
-from core.frames import Side
-from core.parameters.catalogue import CATALOGUE, list_trainable
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id
-from server.pages.shell import record_opening, render_page
-from server.report.feedback_words import name_target, prescription_words
-from server.services import patients, prescriptions
-from server.services.prescriptions import PatientPrescription
+from sagittal.core.feedback import Prescription
+from sagittal.core.frames import Side
+from sagittal.core.parameters.catalogue import CATALOGUE, list_trainable
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.report.feedback_words import name_target, prescription_words
+from sagittal.server.services import patients, prescriptions
+from sagittal.server.services.prescriptions import PatientPrescription
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

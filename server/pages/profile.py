@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from core.frames import SIDES
-from server.report.change_words import NO_LIMIT, ChangeWords, find_term, format_difference
-from server.report.model import ReportModel
-from server.report.profile import ProfileBar, bar_svg
-from server.report.wording import format_number
-from server.services import reports
-from server.services.reviewed import ReviewedAnalyses
+from sagittal.core.frames import SIDES
+from sagittal.server.report.change_words import NO_LIMIT, ChangeWords, find_term, format_difference
+from sagittal.server.report.model import ReportModel
+from sagittal.server.report.profile import ProfileBar, bar_svg
+from sagittal.server.report.wording import format_number
+from sagittal.server.services import reports
+from sagittal.server.services.reviewed import ReviewedAnalyses
 
 
 def view_profile(

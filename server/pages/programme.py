@@ -10,18 +10,18 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from core.plurals import plural
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id
-from server.pages.shell import record_opening, render_page
-from server.report.wording import format_number
-from server.services import patients, programmes, sessions
-from server.services.course import SIX_WEEKS
-from server.services.programmes import PlannedVisit, Programme
-from server.storage.tables import now
-from web.words import day
+from sagittal.core.plurals import plural
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.report.wording import format_number
+from sagittal.server.services import patients, programmes, sessions
+from sagittal.server.services.course import SIX_WEEKS
+from sagittal.server.services.programmes import PlannedVisit, Programme
+from sagittal.server.storage.tables import now
+from sagittal.web.words import day
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

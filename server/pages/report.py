@@ -8,25 +8,25 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.auth.sight import find_emergency
-from server.context import Blobs, Config, Db, Failures, Id, OpenTrail, Reviewed, address_of
-from server.http.json_body import StrictJsonRoute
-from server.http.templates import language_of
-from server.pages.identity import name_on_paper
-from server.pages.paper import hide_person, print_pdf, show_document, show_pdf, write_document
-from server.pages.session import PAPER, choose_template, gather_report
-from server.pages.session_context import read_context
-from server.pages.shell import record_opening, render_page
-from server.services import analyses, pdfs, report_links, signed_reports
-from server.services.errors import NotFound
-from server.services.report_links import LinkNotFound
-from server.services.reviewed import ReviewedAnalyses
-from server.services.signed_reports import DOCUMENT, PSEUDONYMISED
-from server.storage.db import Database
-from server.storage.tables import new_id
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.auth.sight import find_emergency
+from sagittal.server.context import Blobs, Config, Db, Failures, Id, OpenTrail, Reviewed, address_of
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.http.templates import language_of
+from sagittal.server.pages.identity import name_on_paper
+from sagittal.server.pages.paper import hide_person, print_pdf, show_document, show_pdf, write_document
+from sagittal.server.pages.session import PAPER, choose_template, gather_report
+from sagittal.server.pages.session_context import read_context
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.services import analyses, pdfs, report_links, signed_reports
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.report_links import LinkNotFound
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.signed_reports import DOCUMENT, PSEUDONYMISED
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import new_id
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse, route_class=StrictJsonRoute)
 

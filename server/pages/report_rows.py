@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
-from core.parameters.catalogue import require_entries
-from core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
-from core.plurals import plural
-from server.report import level
-from server.report.model import ReportModel
-from server.report.table import BEYOND_SD, ParameterRow
+from sagittal.core.parameters.catalogue import require_entries
+from sagittal.core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
+from sagittal.core.plurals import plural
+from sagittal.server.report import level
+from sagittal.server.report.model import ReportModel
+from sagittal.server.report.table import BEYOND_SD, ParameterRow
 
 SECONDARY: Final = (
     "Parts of stance and swing",
@@ -49,7 +49,7 @@ FIRST_ROWS: Final = 10
 NOT_ON_PAPER: Final = ("swing_pct", "swing_time_s", "turning_angle_deg")
 """What the rest of a stride leaves, and what a straight walk has none of."""
 
-require_entries((*MATTERING, *NOT_ON_PAPER), "server.pages.report_rows")
+require_entries((*MATTERING, *NOT_ON_PAPER), "sagittal.server.pages.report_rows")
 
 
 def select_first(model: ReportModel) -> tuple[ParameterRow, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from server.pages import (
+from sagittal.server.pages import (
     account,
     algorithms,
     audit_log,

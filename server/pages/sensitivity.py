@@ -10,16 +10,16 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Db, Id
-from server.jobs.queue import SENSITIVITY
-from server.pages.job_views import view_job
-from server.pages.session_context import read_context
-from server.pages.shell import record_opening, render_page
-from server.report.sensitivity import view_sensitivity
-from server.services import analyses, jobs, reference_files, sensitivities
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Db, Id
+from sagittal.server.jobs.queue import SENSITIVITY
+from sagittal.server.pages.job_views import view_job
+from sagittal.server.pages.session_context import read_context
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.report.sensitivity import view_sensitivity
+from sagittal.server.services import analyses, jobs, reference_files, sensitivities
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

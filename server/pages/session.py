@@ -12,14 +12,14 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
-from core.errors import FormatError
-from core.parameters.catalogue.entry import SQUAT
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Config, Db, Id, Reviewed
-from server.pages import daily
-from server.pages.charts import (
+from sagittal.core.errors import FormatError
+from sagittal.core.parameters.catalogue.entry import SQUAT
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Config, Db, Id, Reviewed
+from sagittal.server.pages import daily
+from sagittal.server.pages.charts import (
     COLUMNS,
     GLANCE_HEIGHT,
     KEY_HEIGHT,
@@ -27,11 +27,11 @@ from server.pages.charts import (
     PAPER_HEIGHTS,
     draw_chart,
 )
-from server.pages.figures import draw_beginning, draw_contact
-from server.pages.first_sheet import has_room_for_profile
-from server.pages.identity import name_on_paper
-from server.pages.profile import view_profile
-from server.pages.report_rows import (
+from sagittal.server.pages.figures import draw_beginning, draw_contact
+from sagittal.server.pages.first_sheet import has_room_for_profile
+from sagittal.server.pages.identity import name_on_paper
+from sagittal.server.pages.profile import view_profile
+from sagittal.server.pages.report_rows import (
     FIRST_ROWS,
     SECONDARY,
     fold_groups,
@@ -39,17 +39,17 @@ from server.pages.report_rows import (
     select_groups,
     select_others,
 )
-from server.pages.session_context import lead_to_days, read_measured_context
-from server.pages.shell import FRAGMENT, record_opening, render_page, render_sheets
-from server.pages.takes import view_takes
-from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
-from server.report.curves import GLANCE_STRIDES, strip_svg
-from server.report.model import ReportModel
-from server.report.profile import BAR_HEIGHT, PAPER_BAR_HEIGHT
-from server.report.trend_strip import LEAST_VISITS, TrendStrip, trend_strip
-from server.report.trends import AnalysedVisit, VisitKind
-from server.report.wording import speak_places
-from server.services import (
+from sagittal.server.pages.session_context import lead_to_days, read_measured_context
+from sagittal.server.pages.shell import FRAGMENT, record_opening, render_page, render_sheets
+from sagittal.server.pages.takes import view_takes
+from sagittal.server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
+from sagittal.server.report.curves import GLANCE_STRIDES, strip_svg
+from sagittal.server.report.model import ReportModel
+from sagittal.server.report.profile import BAR_HEIGHT, PAPER_BAR_HEIGHT
+from sagittal.server.report.trend_strip import LEAST_VISITS, TrendStrip, trend_strip
+from sagittal.server.report.trends import AnalysedVisit, VisitKind
+from sagittal.server.report.wording import speak_places
+from sagittal.server.services import (
     comparisons,
     feedback,
     histories,
@@ -58,14 +58,14 @@ from server.services import (
     signed_reports,
     videos,
 )
-from server.services.controls import ControlVisit
-from server.services.histories import AnalysedSession
-from server.services.patients import Patient
-from server.services.reviewed import ReviewedAnalyses
-from server.services.sessions import Session
-from server.storage.blobs import IntegrityError
-from server.storage.db import Database
-from web.words import day, seconds
+from sagittal.server.services.controls import ControlVisit
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.sessions import Session
+from sagittal.server.storage.blobs import IntegrityError
+from sagittal.server.storage.db import Database
+from sagittal.web.words import day, seconds
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

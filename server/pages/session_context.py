@@ -8,10 +8,10 @@ from typing import Any, Final
 from sqlalchemy import Connection
 from starlette.responses import RedirectResponse
 
-from server.pages.job_views import find_newest_job, view_job
-from server.pages.words import TEST_NAMES
-from server.services import analyses, controls, live, patients, sessions
-from server.services.sessions import Session
+from sagittal.server.pages.job_views import find_newest_job, view_job
+from sagittal.server.pages.words import TEST_NAMES
+from sagittal.server.services import analyses, controls, live, patients, sessions
+from sagittal.server.services.sessions import Session
 
 STAGE_NAMES: Final[Mapping[str, str]] = {
     "reading": "Read the files",
@@ -26,7 +26,10 @@ STAGE_NAMES: Final[Mapping[str, str]] = {
     "angles": "Compute joint angles",
     "parameters": "Compute parameters",
 }
-"""Stages of an analysis in order → what each does, in words; core.pipeline itself takes seconds to import."""
+"""Stages of an analysis in order → what each does, in words.
+
+sagittal.core.pipeline itself takes seconds to import.
+"""
 
 STAGES_OF_DAYS: Final[Mapping[str, str]] = {
     "reading": "Read the files",

@@ -5,13 +5,13 @@ from __future__ import annotations
 from fastapi import Request
 from starlette.responses import Response
 
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.http.templates import render
-from server.services import jobs
-from server.services.provenance import CODE_VERSION
-from server.storage.db import Database
-from server.trail import AuditTrail
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.http.templates import render
+from sagittal.server.services import jobs
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.storage.db import Database
+from sagittal.server.trail import AuditTrail
 
 NAVIGATION = (
     ("patients", "people", "Patients", "/patients", Action.READ_PATIENT),

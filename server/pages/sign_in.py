@@ -8,14 +8,14 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
-from server.auth import one_time
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.passwords import MIN_LENGTH
-from server.auth.roles import Action
-from server.context import Db
-from server.http.local_path import local_path
-from server.http.templates import render
+from sagittal.server.auth import one_time
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.passwords import MIN_LENGTH
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db
+from sagittal.server.http.local_path import local_path
+from sagittal.server.http.templates import render
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -9,14 +9,14 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, StudyVisits
-from server.pages.shell import record_listing, render_page
-from server.pages.words import PROTOCOL_NAMES
-from server.services import studies
-from web.user_text import UserText
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, StudyVisits
+from sagittal.server.pages.shell import record_listing, render_page
+from sagittal.server.pages.words import PROTOCOL_NAMES
+from sagittal.server.services import studies
+from sagittal.web.user_text import UserText
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -10,18 +10,18 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Config, Db
-from server.nodes.registry import Nodes, WebNode
-from server.pages.shell import render_page
-from server.services import backup_schedule, patients
-from server.services.backup_schedule import BackupState, Outcome
-from server.services.calendar_days import move_years
-from server.services.patients import Patient
-from server.storage.high_water import read_newest
-from server.storage.tables import now
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Config, Db
+from sagittal.server.nodes.registry import Nodes, WebNode
+from sagittal.server.pages.shell import render_page
+from sagittal.server.services import backup_schedule, patients
+from sagittal.server.services.backup_schedule import BackupState, Outcome
+from sagittal.server.services.calendar_days import move_years
+from sagittal.server.services.patients import Patient
+from sagittal.server.storage.high_water import read_newest
+from sagittal.server.storage.tables import now
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from core.frames import SIDES
-from core.parameters.result import Parameter
-from server.report import level
-from server.report.change_words import find_term
-from server.report.table import ParameterRow
-from server.report.wording import format_number
-from server.services import visits
-from server.services.histories import AnalysedSession
-from server.services.reviewed import ReviewedAnalyses
+from sagittal.core.frames import SIDES
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report import level
+from sagittal.server.report.change_words import find_term
+from sagittal.server.report.table import ParameterRow
+from sagittal.server.report.wording import format_number
+from sagittal.server.services import visits
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.services.reviewed import ReviewedAnalyses
 
 
 def view_takes(

@@ -7,11 +7,11 @@ from typing import Annotated
 from fastapi import APIRouter, Path
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.roles import Action
-from server.http.headers import KEPT
-from server.http.problems import SENTENCES, Problem
-from web.language import LANGUAGES, SOURCE, script_texts
+from sagittal.server.auth.access import require
+from sagittal.server.auth.roles import Action
+from sagittal.server.http.headers import KEPT
+from sagittal.server.http.problems import SENTENCES, Problem
+from sagittal.web.language import LANGUAGES, SOURCE, script_texts
 
 router = APIRouter(include_in_schema=False)
 

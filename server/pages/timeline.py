@@ -9,19 +9,19 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id, OpenTrail, Reviewed
-from server.http.templates import render
-from server.pages.charts import KEY_HEIGHT, draw_chart
-from server.pages.report_rows import select_first
-from server.pages.session import explain_emptiness
-from server.pages.session_context import lead_to_days, read_measured_context
-from server.pages.shell import FRAGMENT, record_opening, render_page
-from server.report.model import ReportModel
-from server.services import analyses, edit_log, reports, signals
-from server.services.reviewed import ReviewedAnalyses
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id, OpenTrail, Reviewed
+from sagittal.server.http.templates import render
+from sagittal.server.pages.charts import KEY_HEIGHT, draw_chart
+from sagittal.server.pages.report_rows import select_first
+from sagittal.server.pages.session import explain_emptiness
+from sagittal.server.pages.session_context import lead_to_days, read_measured_context
+from sagittal.server.pages.shell import FRAGMENT, record_opening, render_page
+from sagittal.server.report.model import ReportModel
+from sagittal.server.services import analyses, edit_log, reports, signals
+from sagittal.server.services.reviewed import ReviewedAnalyses
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -9,23 +9,23 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from core.activity.parameters import WORN_H
-from core.frames import Protocol, Side
-from core.parameters.catalogue import require_entries
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import HEX_ID, Db, Id, Reviewed
-from server.pages.shell import record_opening, render_page
-from server.report.change_words import SCORE_TERMS, change_words, find_term
-from server.report.daily_life import format_hours
-from server.report.daily_trend import PerformanceDay, draw_daily_trend
-from server.report.trend_chart import PlannedAssessment, trend_svg
-from server.report.trends import PRIMARY, AnalysedVisit, Trend, TrendSeries, follow_figures, names_in
-from server.report.wording import GROUPS, format_number
-from server.services import histories, patients
-from server.services.histories import PatientHistory
-from web.words import day
+from sagittal.core.activity.parameters import WORN_H
+from sagittal.core.frames import Protocol, Side
+from sagittal.core.parameters.catalogue import require_entries
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import HEX_ID, Db, Id, Reviewed
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.report.change_words import SCORE_TERMS, change_words, find_term
+from sagittal.server.report.daily_life import format_hours
+from sagittal.server.report.daily_trend import PerformanceDay, draw_daily_trend
+from sagittal.server.report.trend_chart import PlannedAssessment, trend_svg
+from sagittal.server.report.trends import PRIMARY, AnalysedVisit, Trend, TrendSeries, follow_figures, names_in
+from sagittal.server.report.wording import GROUPS, format_number
+from sagittal.server.services import histories, patients
+from sagittal.server.services.histories import PatientHistory
+from sagittal.web.words import day
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -47,7 +47,7 @@ FIGURES: Final = (
 )
 """On the patient's page: what is trained, then the first of these that were measured."""
 
-require_entries((name for name in FIGURES if name not in SCORE_TERMS), "server.pages.trends")
+require_entries((name for name in FIGURES if name not in SCORE_TERMS), "sagittal.server.pages.trends")
 FIGURES_SHOWN: Final = 5
 FIGURE_HEIGHT: Final = 128
 

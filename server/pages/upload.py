@@ -11,25 +11,25 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
-from core.anthropometry import LIMITS
-from core.frames import SEGMENTS
-from core.plurals import plural
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Blobs, Db, Id
-from server.pages.job_views import view_job
-from server.pages.shell import record_opening, render_page
-from server.pages.words import PROTOCOLS, SEGMENT_NAMES, TEST_PROTOCOLS
-from server.report.bundle import ABOUT_FILES
-from server.services import histories, patients, recordings, sessions, uploads
-from server.services.devices import NO_PLACES, LastPlaces, recall_places
-from server.services.patients import Patient
-from server.services.recordings import StoredRecording
-from server.services.sessions import Session
-from web.user_text import UserText
-from web.user_text import quote as quote_text
-from web.words import number, seconds
+from sagittal.core.anthropometry import LIMITS
+from sagittal.core.frames import SEGMENTS
+from sagittal.core.plurals import plural
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Db, Id
+from sagittal.server.pages.job_views import view_job
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.pages.words import PROTOCOLS, SEGMENT_NAMES, TEST_PROTOCOLS
+from sagittal.server.report.bundle import ABOUT_FILES
+from sagittal.server.services import histories, patients, recordings, sessions, uploads
+from sagittal.server.services.devices import NO_PLACES, LastPlaces, recall_places
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.recordings import StoredRecording
+from sagittal.server.services.sessions import Session
+from sagittal.web.user_text import UserText
+from sagittal.web.user_text import quote as quote_text
+from sagittal.web.words import number, seconds
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

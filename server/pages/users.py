@@ -8,15 +8,15 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from server.auth import accounts, second_factor
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.passwords import MIN_LENGTH
-from server.auth.roles import Action, Role
-from server.context import Db
-from server.pages.shell import render_page
-from server.pages.words import ROLE_WORDS
-from server.services import care_teams
+from sagittal.server.auth import accounts, second_factor
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.passwords import MIN_LENGTH
+from sagittal.server.auth.roles import Action, Role
+from sagittal.server.context import Db
+from sagittal.server.pages.shell import render_page
+from sagittal.server.pages.words import ROLE_WORDS
+from sagittal.server.services import care_teams
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

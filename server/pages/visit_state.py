@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from server.services import analyses, edit_log, live, sessions
-from server.services.reviewed import UNREADABLE, ReviewedAnalyses
+from sagittal.server.services import analyses, edit_log, live, sessions
+from sagittal.server.services.reviewed import UNREADABLE, ReviewedAnalyses
 
 STATES: Final[Mapping[str, tuple[str, str]]] = {
     "empty": ("none", "No recording yet"),

@@ -6,7 +6,7 @@ import datetime as dt
 from collections.abc import Mapping
 from typing import Final
 
-from server.auth.roles import Role
+from sagittal.server.auth.roles import Role
 
 PROTOCOLS: Final = (
     ("walk", "Walk", "Over ground, there and back, with a few seconds of quiet standing before or after."),

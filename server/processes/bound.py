@@ -1,6 +1,6 @@
 """Run a module so that it ends with its starter from its first import on.
 
-    python -m server.processes.bound MODULE …
+    python -m sagittal.server.processes.bound MODULE …
 
 Importing a module takes seconds, during which it cannot watch for the end of its starter itself.
 """
@@ -11,7 +11,7 @@ import os
 import runpy
 import sys
 
-from server.processes.lifeline import call_when_parent_ends
+from sagittal.server.processes.lifeline import call_when_parent_ends
 
 if __name__ == "__main__":
     call_when_parent_ends(lambda: os._exit(1))

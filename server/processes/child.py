@@ -1,6 +1,6 @@
 """A process of ours with a line to it: how it is started, and how it begins.
 
-    process, line = start_child("server.worker.child", settings)       # in the parent
+    process, line = start_child("sagittal.server.worker.child", settings)       # in the parent
     line, settings = enter_child()                                      # in the child, first of all
 
 The child ends with its parent (lifeline.py), leaves Ctrl-C to it and keeps to the memory that the settings
@@ -18,16 +18,16 @@ import subprocess
 import sys
 from typing import Final
 
-from server.log import start_log
-from server.processes.channel import Channel
-from server.processes.environment import make_environment
-from server.processes.lifeline import call_when_parent_ends, die_with
-from server.settings import Settings, load_settings
+from sagittal.server.log import start_log
+from sagittal.server.processes.channel import Channel
+from sagittal.server.processes.environment import make_environment
+from sagittal.server.processes.lifeline import call_when_parent_ends, die_with
+from sagittal.server.settings import Settings, load_settings
 
 BEHIND: Final = 5
 """Added to the niceness of a worker, and again to that of who computes for it: pages and live takes have the
 processor first, then leases. Not more: on a machine that is busy with other things jobs must get on."""
-BOUND: Final = "server.processes.bound"
+BOUND: Final = "sagittal.server.processes.bound"
 FAR_BEHIND: Final = 2 * BEHIND
 """Of a process beside the web server that computes for long."""
 

@@ -10,32 +10,32 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-import core
-from server.storage.compile_cache import VARIABLE, has_compiled_filters
+import sagittal
+from sagittal.server.storage.compile_cache import VARIABLE, has_compiled_filters
 
 Order = tuple[tuple[str, str], ...]
 """Modules and their functions that compile something, in order."""
 
 OFFLINE: Final[tuple[Order, Order]] = (
-    (("core.body.estimate", "compile_erkf_kernels"),),
+    (("sagittal.core.body.estimate", "compile_erkf_kernels"),),
     (
-        ("core.fusion.attitude", "compile_attitude_kernel"),
-        ("core.quality.stuck", "compile_stuck_kernel"),
-        ("core.agreement.slips", "compile_agreement_kernels"),
-        ("core.angles.kernel", "compile_angle_kernel"),
-        ("core.peaks", "compile_peak_kernel"),
-        ("core.rest", "compile_rest_kernels"),
-        ("core.body.l7s.inputs", "compile_gravity_kernel"),
-        ("core.events", "compile_foot_contact_kernel"),
+        ("sagittal.core.fusion.attitude", "compile_attitude_kernel"),
+        ("sagittal.core.quality.stuck", "compile_stuck_kernel"),
+        ("sagittal.core.agreement.slips", "compile_agreement_kernels"),
+        ("sagittal.core.angles.kernel", "compile_angle_kernel"),
+        ("sagittal.core.peaks", "compile_peak_kernel"),
+        ("sagittal.core.rest", "compile_rest_kernels"),
+        ("sagittal.core.body.l7s.inputs", "compile_gravity_kernel"),
+        ("sagittal.core.events", "compile_foot_contact_kernel"),
     ),
 )
 """What each of two processes compiles for the analysis of a walk: the ErKF takes as long as all others."""
 
 ALL: Final[tuple[Order, Order]] = (
-    (*OFFLINE[0], ("core.online.session", "compile_live_kernels")),
+    (*OFFLINE[0], ("sagittal.core.online.session", "compile_live_kernels")),
     (
-        ("core.body.l7s.poses", "compile_l7s_kernel"),
-        ("core.timeline.live", "compile_axis_kernels"),
+        ("sagittal.core.body.l7s.poses", "compile_l7s_kernel"),
+        ("sagittal.core.timeline.live", "compile_axis_kernels"),
         *OFFLINE[1],
     ),
 )
@@ -44,7 +44,7 @@ what live takes ask for first comes first."""
 
 
 def compile_filters(orders: tuple[Order, Order] = ALL) -> None:
-    """Fill the folder of compiled filters that `server.storage.compile_cache` names.
+    """Fill the folder of compiled filters that `sagittal.server.storage.compile_cache` names.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def compile_filters(orders: tuple[Order, Order] = ALL) -> None:
         a filter does not compile.
     """
     # where the package lies, whether it is installed or not
-    root = str(Path(core.__file__ or "").parent.parent)
+    root = str(Path(sagittal.__file__).parent.parent)
     searched = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
     running = [
         subprocess.Popen(  # noqa: S603 - our own modules, named above
@@ -76,7 +76,7 @@ def _write_script(order: Order) -> str:
     # such a process has 470 MB instead of 350 in the end
     lines = [
         "import gc, os; gc.disable()",
-        "from server.processes.lifeline import call_when_parent_ends",
+        "from sagittal.server.processes.lifeline import call_when_parent_ends",
         "call_when_parent_ends(lambda: os._exit(1))",
     ]
     lines += [f"from {room} import {name}; {name}()" for room, name in order]

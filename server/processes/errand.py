@@ -7,9 +7,9 @@ import threading
 from collections.abc import Iterator
 from typing import Final
 
-from server.processes.channel import Channel
-from server.processes.child import end_process, start_child
-from server.settings import Settings
+from sagittal.server.processes.channel import Channel
+from sagittal.server.processes.child import end_process, start_child
+from sagittal.server.settings import Settings
 
 MOST_WAITING: Final = 3
 """Errands of a kind that may wait for their turn: each holds one of the few threads that answer requests."""

@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Final
 
-from server.processes.channel import frame, read_message
-from server.processes.child import end_process, start_child
-from server.settings import Settings
+from sagittal.server.processes.channel import frame, read_message
+from sagittal.server.processes.child import end_process, start_child
+from sagittal.server.settings import Settings
 
 log = logging.getLogger(__name__)
 

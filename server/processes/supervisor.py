@@ -11,8 +11,8 @@ import subprocess
 import threading
 import time
 
-from server.processes.child import BEHIND, end_process, start_module
-from server.settings import Settings
+from sagittal.server.processes.child import BEHIND, end_process, start_module
+from sagittal.server.settings import Settings
 
 log = logging.getLogger(__name__)
 
@@ -62,7 +62,7 @@ class Workers:
         return len(self.pids) == self._settings.workers
 
     def _spawn(self) -> subprocess.Popen[bytes]:
-        return start_module("server.worker.worker", self._settings, BEHIND)
+        return start_module("sagittal.server.worker.worker", self._settings, BEHIND)
 
     def _watch(self) -> None:
         began = time.monotonic()

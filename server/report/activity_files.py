@@ -23,7 +23,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from core.activity.result import (
+from sagittal.core.activity.result import (
     KINDS,
     ActivityBout,
     ActivityDay,
@@ -34,9 +34,9 @@ from core.activity.result import (
     TransitionCandidate,
     WearPeriod,
 )
-from core.errors import FormatError, Notice
-from core.events.turns import Turn
-from server.report.columns import (
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.events.turns import Turn
+from sagittal.server.report.columns import (
     SCHEMA,
     floats_of,
     list_turns,

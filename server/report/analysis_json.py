@@ -8,25 +8,25 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from core.angles import JointAngles
-from core.body.health import find_worst_verdict
-from core.body.model import LENGTHS
-from core.frames import SEGMENTS, Floats, Side
-from core.norms.controls import mean_curves
-from core.norms.profile import ScoreSpread
-from core.parameters.kinematic import read_cycles
-from core.parameters.result import CycleCurves, Parameter
-from core.quality import concern_paths_alone, find_shown_level
-from core.quality.devices import check_device, is_serial
-from core.scores import CurveMeans, Scores, score_curves
-from server.report.columns import SCHEMA, list_turns, reduce_to_plain
-from server.report.estimator import list_estimated_variables
-from server.report.wording import JUDGED, PATH_JUDGED
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.health import find_worst_verdict
+from sagittal.core.body.model import LENGTHS
+from sagittal.core.frames import SEGMENTS, Floats, Side
+from sagittal.core.norms.controls import mean_curves
+from sagittal.core.norms.profile import ScoreSpread
+from sagittal.core.parameters.kinematic import read_cycles
+from sagittal.core.parameters.result import CycleCurves, Parameter
+from sagittal.core.quality import concern_paths_alone, find_shown_level
+from sagittal.core.quality.devices import check_device, is_serial
+from sagittal.core.scores import CurveMeans, Scores, score_curves
+from sagittal.server.report.columns import SCHEMA, list_turns, reduce_to_plain
+from sagittal.server.report.estimator import list_estimated_variables
+from sagittal.server.report.wording import JUDGED, PATH_JUDGED
 
 if TYPE_CHECKING:
     # these packages bring numba, which the web process does without
-    from core.calibration.result import Calibration
-    from core.pipeline import TakeAnalysis
+    from sagittal.core.calibration.result import Calibration
+    from sagittal.core.pipeline import TakeAnalysis
 
 
 def summarise_analysis(analysis: TakeAnalysis) -> dict[str, object]:
@@ -196,7 +196,7 @@ def _sensor_places(analysis: TakeAnalysis) -> object:
     """Where sensors sit and joints lie, in cm along the segment's axes, beside the nominal places, and the
     knees' hinges; None where motion was not asked."""
     # readers of results, which have nothing of this to write, do without numba
-    from core.agreement.joints import LEG_JOINTS
+    from sagittal.core.agreement.joints import LEG_JOINTS
 
     arms = None if analysis.mounted is None else analysis.mounted.arms
     if arms is None:

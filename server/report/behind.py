@@ -7,16 +7,16 @@ from dataclasses import asdict, dataclass
 from html import escape
 from typing import Final
 
-from core.events.result import Strides
-from core.frames import SIDES, Side
-from core.parameters.catalogue import CATALOGUE
-from core.parameters.rows import Column
-from server.report.columns import reduce_to_plain
-from server.report.level import define_parameter
-from server.report.svg import KEY, find_round_ticks, make_label, make_time_labels
-from server.report.table import ParameterRow
-from server.report.wording import explain_exclusion, format_number
-from web.user_text import quote
+from sagittal.core.events.result import Strides
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.rows import Column
+from sagittal.server.report.columns import reduce_to_plain
+from sagittal.server.report.level import define_parameter
+from sagittal.server.report.svg import KEY, find_round_ticks, make_label, make_time_labels
+from sagittal.server.report.table import ParameterRow
+from sagittal.server.report.wording import explain_exclusion, format_number
+from sagittal.web.user_text import quote
 
 HEIGHT: Final = 220
 TOP, BOTTOM = 12, 24

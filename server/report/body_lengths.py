@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from core.body.model import NOMINAL_HEIGHT_M
-from server.report.wording import format_number
+from sagittal.core.body.model import NOMINAL_HEIGHT_M
+from sagittal.server.report.wording import format_number
 
 TITLES: Final[Mapping[str, tuple[str, str]]] = {
     "thigh": ("Thigh, hip to knee centre", "Winter 2009, from {}"),

@@ -13,23 +13,23 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from core.activity.result import ActivityResult
-from core.angles import JointAngles
-from core.body.model import BodyModel
-from core.body.poses import Poses
-from core.errors import FormatError, Notice
-from core.events.edits import Edit, EditKind
-from core.events.result import EventKind, GaitEvent, GaitEvents, Stride, StrideFlag, Strides
-from core.events.strides import NOTICES
-from core.frames import SEGMENTS, Segment, Side
-from core.measure import MeasuredGait
-from core.parameters.catalogue import CATALOGUE
-from core.parameters.catalogue.entry import FUNCTIONAL
-from core.parameters.result import Parameter
-from core.parameters.rows import Column
-from server.report import activity_files
-from server.report.columns import SCHEMA, bools_of, floats_of, read_table
-from server.report.exports import STRIDE_COLUMNS
+from sagittal.core.activity.result import ActivityResult
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.poses import Poses
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.events.edits import Edit, EditKind
+from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents, Stride, StrideFlag, Strides
+from sagittal.core.events.strides import NOTICES
+from sagittal.core.frames import SEGMENTS, Segment, Side
+from sagittal.core.measure import MeasuredGait
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.catalogue.entry import FUNCTIONAL
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.rows import Column
+from sagittal.server.report import activity_files
+from sagittal.server.report.columns import SCHEMA, bools_of, floats_of, read_table
+from sagittal.server.report.exports import STRIDE_COLUMNS
 
 EDIT_WORDS: Final[Mapping[EditKind, tuple[str, str]]] = {
     "move_event": ("event moved", "events moved"),

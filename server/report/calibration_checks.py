@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from core.errors import Notice
-from core.frames import SEGMENTS
-from core.plurals import plural
-from server.report.quality_box import CALIBRATION_METHODS
-from server.report.wording import format_number, place_words, speak_places
+from sagittal.core.errors import Notice
+from sagittal.core.frames import SEGMENTS
+from sagittal.core.plurals import plural
+from sagittal.server.report.quality_box import CALIBRATION_METHODS
+from sagittal.server.report.wording import format_number, place_words, speak_places
 
 VERDICT_WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "pass": ("ok", "pass"),

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from core.change import NOT_MEASURED_ALIKE, UNLIKE, Change
-from core.parameters.catalogue import CATALOGUE
-from core.parameters.variability import TOO_FEW
-from server.report.wording import Term, format_number, parameter_term, title_of
+from sagittal.core.change import NOT_MEASURED_ALIKE, UNLIKE, Change
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.variability import TOO_FEW
+from sagittal.server.report.wording import Term, format_number, parameter_term, title_of
 
 VERDICTS: Final[Mapping[str, str]] = {
     "within_measurement_error": "within measurement error",

@@ -15,11 +15,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from core.frames import Bools, Floats
-from core.memory import give_memory_back
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.memory import give_memory_back
 
 if TYPE_CHECKING:
-    from core.events.turns import Turn  # brings numba, which the web process does without
+    from sagittal.core.events.turns import Turn  # brings numba, which the web process does without
 
 SCHEMA = 1
 """Version of analysis.json and of the columns beside it; readers refuse a newer one."""

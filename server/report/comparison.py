@@ -6,17 +6,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from core.change import NOT_MEASURED_ALIKE, Change, parameter_changes, withdraw_verdicts
-from core.frames import Side
-from core.norms import Norms
-from core.parameters.catalogue import CATALOGUE
-from server.report.change_words import SCORE_TERMS, ChangeWords, change_words, find_term
-from server.report.columns import write_csv
-from server.report.level import from_standing
-from server.report.numbers import Numbers
-from server.report.table import ParameterRow
-from server.report.trends import collect_figures
-from server.report.wording import format_number, reason_words
+from sagittal.core.change import NOT_MEASURED_ALIKE, Change, parameter_changes, withdraw_verdicts
+from sagittal.core.frames import Side
+from sagittal.core.norms import Norms
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.report.change_words import SCORE_TERMS, ChangeWords, change_words, find_term
+from sagittal.server.report.columns import write_csv
+from sagittal.server.report.level import from_standing
+from sagittal.server.report.numbers import Numbers
+from sagittal.server.report.table import ParameterRow
+from sagittal.server.report.trends import collect_figures
+from sagittal.server.report.wording import format_number, reason_words
 
 STANDING: Final = "from standing"
 """Of what a change is whose row stands for another zero."""

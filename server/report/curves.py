@@ -10,12 +10,12 @@ from typing import Final
 
 import numpy as np
 
-from core.events.result import Stride, Strides
-from core.frames import SIDES, Floats, Side
-from core.plurals import plural
-from core.rest import find_runs
-from server.report.panels import CurvePanel, SideCurve
-from server.report.svg import (
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.plurals import plural
+from sagittal.core.rest import find_runs
+from sagittal.server.report.panels import CurvePanel, SideCurve
+from sagittal.server.report.svg import (
     KEY,
     PlotArea,
     draw_bar,
@@ -24,8 +24,8 @@ from server.report.svg import (
     make_time_labels,
     stretch,
 )
-from server.report.wording import explain_exclusion, format_number
-from web.user_text import quote
+from sagittal.server.report.wording import explain_exclusion, format_number
+from sagittal.web.user_text import quote
 
 X_TICKS: Final = (0, 20, 40, 60, 80, 100)
 

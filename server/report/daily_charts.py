@@ -13,9 +13,9 @@ from typing import Final
 
 import numpy as np
 
-from core.activity.result import KINDS, ActivityKind, ActivityResult
-from core.frames import Floats
-from server.report.daily_life import (
+from sagittal.core.activity.result import KINDS, ActivityKind, ActivityResult
+from sagittal.core.frames import Floats
+from sagittal.server.report.daily_life import (
     COURSE_S,
     DASH,
     DAY_S,
@@ -26,8 +26,8 @@ from server.report.daily_life import (
     format_hours,
     inclination_course,
 )
-from server.report.svg import PlotArea, find_round_ticks, format_coordinate, make_label
-from server.report.wording import format_number
+from sagittal.server.report.svg import PlotArea, find_round_ticks, format_coordinate, make_label
+from sagittal.server.report.wording import format_number
 
 RIBBON_PX: Final = 52
 """Height of a day's ribbon."""

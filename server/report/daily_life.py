@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from core.activity.parameters import WORN_H
-from core.activity.result import (
+from sagittal.core.activity.parameters import WORN_H
+from sagittal.core.activity.result import (
     KINDS,
     TRANSITIONS,
     ActivityBout,
@@ -26,9 +26,9 @@ from core.activity.result import (
     TransitionKind,
     TransitionRefusal,
 )
-from core.frames import Floats
-from core.plurals import plural
-from server.report.wording import format_number
+from sagittal.core.frames import Floats
+from sagittal.core.plurals import plural
+from sagittal.server.report.wording import format_number
 
 DAY_S: Final = 86400.0
 HOUR_S: Final = 3600.0

@@ -14,12 +14,12 @@ from typing import Final
 
 import numpy as np
 
-from core.activity.parameters import WORN_H
-from core.activity.result import ActivityResult
-from core.parameters.result import Parameter
-from server.report.svg import PlotArea, find_round_ticks, format_coordinate
-from server.report.wording import format_number
-from web.language import MONTHS
+from sagittal.core.activity.parameters import WORN_H
+from sagittal.core.activity.result import ActivityResult
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.svg import PlotArea, find_round_ticks, format_coordinate
+from sagittal.server.report.wording import format_number
+from sagittal.web.language import MONTHS
 
 LONG_BOUT_S: Final = 60.0
 """Walks at home whose cadence is compared last at least so long: short ones turn and stop."""

@@ -6,10 +6,10 @@ import datetime as dt
 from collections.abc import Sequence
 from typing import Final
 
-from server.report.svg import PlotArea, find_round_ticks, format_coordinate
-from server.report.trend_chart import BOTTOM, LABEL_PX, ROOM, TOP, WIDTH_PX
-from server.report.wording import format_number
-from web.language import MONTHS
+from sagittal.server.report.svg import PlotArea, find_round_ticks, format_coordinate
+from sagittal.server.report.trend_chart import BOTTOM, LABEL_PX, ROOM, TOP, WIDTH_PX
+from sagittal.server.report.wording import format_number
+from sagittal.web.language import MONTHS
 
 HEIGHT: Final = 168
 """px with margins."""

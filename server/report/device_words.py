@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from math import degrees
 from typing import Final
 
-from core.quality.device_course import DeviceCourse, DeviceFinding
-from core.quality.devices import DeviceCheck
-from server.report.wording import format_number
-from web.words import day
+from sagittal.core.quality.device_course import DeviceCourse, DeviceFinding
+from sagittal.core.quality.devices import DeviceCheck
+from sagittal.server.report.wording import format_number
+from sagittal.web.words import day
 
 NOT_MEASURED: Final = {
     "no_rest": "It was never at rest for a second. Let the person stand still at the start.",

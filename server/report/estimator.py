@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from core.estimators import (
+from sagittal.core.estimators import (
     AUTO,
     BY_METHOD,
     BY_NAME,
@@ -15,7 +15,7 @@ from core.estimators import (
     NO_FIGURE_NOTE,
     PaperReference,
 )
-from server.report.wording import format_number, place_words
+from sagittal.server.report.wording import format_number, place_words
 
 KINDS: Final[Mapping[str, str]] = {"good": "ok", "warn": "warn", "bad": "bad"}
 VERDICTS: Final[Mapping[str, str]] = {"good": "consistent", "warn": "doubtful in part", "bad": "inconsistent"}

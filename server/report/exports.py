@@ -13,7 +13,7 @@ repetitions.csv squats of each leg with their measures and why one was left out,
 strides.csv     one row per stride with its temporal parameters and why it was left out
 repaired.json   the manifest that is proposed where the set-up is wrong (server/services/analysing.py)
 
-Undefined is an empty cell or null, never NaN. `server.report.bundle` reads them back.
+Undefined is an empty cell or null, never NaN. `sagittal.server.report.bundle` reads them back.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from core.angles import JointAngles
-from core.body.poses import Poses
-from core.events.result import GaitEvents, Strides
-from core.events.steps import Steps
-from core.frames import Floats
-from core.held_samples import give_pages_back
-from core.parameters.catalogue import list_names
-from core.parameters.catalogue.entry import SQUAT
-from core.parameters.rows import Column
-from server.report import signals, tracks
-from server.report.activity_files import write_activity
-from server.report.analysis_json import summarise_analysis
-from server.report.columns import (
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.poses import Poses
+from sagittal.core.events.result import GaitEvents, Strides
+from sagittal.core.events.steps import Steps
+from sagittal.core.frames import Floats
+from sagittal.core.held_samples import give_pages_back
+from sagittal.core.parameters.catalogue import list_names
+from sagittal.core.parameters.catalogue.entry import SQUAT
+from sagittal.core.parameters.rows import Column
+from sagittal.server.report import signals, tracks
+from sagittal.server.report.activity_files import write_activity
+from sagittal.server.report.analysis_json import summarise_analysis
+from sagittal.server.report.columns import (
     SCHEMA,
     ParquetColumn,
     parquet_file,
@@ -50,8 +50,8 @@ from server.report.columns import (
 
 if TYPE_CHECKING:
     # these packages bring numba, which the web process does without
-    from core.pipeline import TakeAnalysis
-    from core.squat.measures import SquatSide
+    from sagittal.core.pipeline import TakeAnalysis
+    from sagittal.core.squat.measures import SquatSide
 
 MEASURES: Final = list_names(SQUAT, "take")
 """Columns of a squat in repetitions.csv."""

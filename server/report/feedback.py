@@ -5,32 +5,32 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Final
 
-from core.change.limits import Limb
-from core.events.result import Strides
-from core.feedback import AnalysedStride, FeedbackSplit, GuardState, Prescription
-from core.feedback.cue import Summary
-from core.feedback.guard import FIRST, LAST
-from core.feedback.summary import Kind
-from core.parameters.rows import Column
-from core.plurals import plural
-from server.report.columns import reduce_to_plain
-from server.report.feedback_beside import (
+from sagittal.core.change.limits import Limb
+from sagittal.core.events.result import Strides
+from sagittal.core.feedback import AnalysedStride, FeedbackSplit, GuardState, Prescription
+from sagittal.core.feedback.cue import Summary
+from sagittal.core.feedback.guard import FIRST, LAST
+from sagittal.core.feedback.summary import Kind
+from sagittal.core.parameters.rows import Column
+from sagittal.core.plurals import plural
+from sagittal.server.report.columns import reduce_to_plain
+from sagittal.server.report.feedback_beside import (
     PreviousTraining,
     Retention,
     SideEffectRow,
     compare_retention,
     describe_effects,
 )
-from server.report.feedback_chart import feedback_svg
-from server.report.feedback_rows import FeedbackRow, describe_summary, format_signed
-from server.report.feedback_words import (
+from sagittal.server.report.feedback_chart import feedback_svg
+from sagittal.server.report.feedback_rows import FeedbackRow, describe_summary, format_signed
+from sagittal.server.report.feedback_words import (
     digits_of,
     format_quantity,
     name_target,
     prescription_words,
     target_words,
 )
-from server.report.wording import Term, format_number, parameter_term
+from sagittal.server.report.wording import Term, format_number, parameter_term
 
 KINDS: Final[tuple[tuple[Kind, str, bool], ...]] = (
     ("baseline", "Before feedback, first strides", False),

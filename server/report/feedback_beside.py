@@ -9,14 +9,21 @@ from typing import Final
 
 import numpy as np
 
-from core.change import find_detectable_change
-from core.change.limits import Limb
-from core.feedback import AnalysedStride, Baseline, FeedbackSplit, GuardState, Prescription, SideEffect
-from core.feedback.guard import FIRST, GuardWatch
-from core.parameters.result import CycleCurves
-from server.report.feedback_rows import NO_STRIDES, FeedbackRow, describe_summary, format_signed
-from server.report.feedback_words import digits_of, format_quantity
-from server.report.wording import Term
+from sagittal.core.change import find_detectable_change
+from sagittal.core.change.limits import Limb
+from sagittal.core.feedback import (
+    AnalysedStride,
+    Baseline,
+    FeedbackSplit,
+    GuardState,
+    Prescription,
+    SideEffect,
+)
+from sagittal.core.feedback.guard import FIRST, GuardWatch
+from sagittal.core.parameters.result import CycleCurves
+from sagittal.server.report.feedback_rows import NO_STRIDES, FeedbackRow, describe_summary, format_signed
+from sagittal.server.report.feedback_words import digits_of, format_quantity
+from sagittal.server.report.wording import Term
 
 EFFECT_REASONS: Final = {
     "too_few_strides": f"needs {FIRST} strides at the start and {FIRST} after them, on this side",

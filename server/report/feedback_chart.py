@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from typing import Final
 
-from core.feedback import FeedbackSplit, Prescription
-from core.feedback.summary import MatchedStride
-from server.report.svg import KEY, PlotArea, find_round_ticks, format_coordinate
-from server.report.wording import Term, format_number
+from sagittal.core.feedback import FeedbackSplit, Prescription
+from sagittal.core.feedback.summary import MatchedStride
+from sagittal.server.report.svg import KEY, PlotArea, find_round_ticks, format_coordinate
+from sagittal.server.report.wording import Term, format_number
 
 HEIGHT: Final = 190
 TOP, BOTTOM = 12, 34

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from core.feedback.cue import Summary
-from server.report.feedback_words import NBSP, format_quantity
-from server.report.wording import Term, format_number
+from sagittal.core.feedback.cue import Summary
+from sagittal.server.report.feedback_words import NBSP, format_quantity
+from sagittal.server.report.wording import Term, format_number
 
 NO_STRIDES: Final = "–"
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
-from core.feedback import Prescription
-from core.frames import Side
-from core.parameters.catalogue import CATALOGUE
-from core.plurals import plural
-from server.report.wording import Term, format_number, parameter_term
+from sagittal.core.feedback import Prescription
+from sagittal.core.frames import Side
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.plurals import plural
+from sagittal.server.report.wording import Term, format_number, parameter_term
 
 SOURCE_WORDS: Final = {
     "norm": "healthy people at this person's speed",

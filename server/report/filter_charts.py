@@ -7,11 +7,11 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.frames import Floats, Side
-from core.rest import find_runs
-from server.report.curves import X_TICKS
-from server.report.svg import KEY, PlotArea, find_round_ticks, format_coordinate, make_time_labels
-from server.report.wording import format_number
+from sagittal.core.frames import Floats, Side
+from sagittal.core.rest import find_runs
+from sagittal.server.report.curves import X_TICKS
+from sagittal.server.report.svg import KEY, PlotArea, find_round_ticks, format_coordinate, make_time_labels
+from sagittal.server.report.wording import format_number
 
 Over = Literal["cycle", "time"]
 

@@ -19,11 +19,16 @@ from typing import Any, Final
 import numpy as np
 import pyarrow as pa
 
-from core.filter_comparison.result import FilterAgreement, FilterComparison, FilterSpread, ReferenceScores
-from core.frames import Floats
-from core.fusion.algorithms.benchmark import OrientationScore
-from core.fusion.algorithms.listed import BY_NAME
-from server.report.columns import SCHEMA, parquet_file, reduce_to_plain, repeat_words, write_csv
+from sagittal.core.filter_comparison.result import (
+    FilterAgreement,
+    FilterComparison,
+    FilterSpread,
+    ReferenceScores,
+)
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.benchmark import OrientationScore
+from sagittal.core.fusion.algorithms.listed import BY_NAME
+from sagittal.server.report.columns import SCHEMA, parquet_file, reduce_to_plain, repeat_words, write_csv
 
 BINS: Final = 400
 """Points of a curve over time at most."""

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from core.estimators import PaperReference
-from core.fusion.algorithms.choice import OWN
-from core.fusion.algorithms.listed import ALGORITHMS, ENGINES, GRADES
+from sagittal.core.estimators import PaperReference
+from sagittal.core.fusion.algorithms.choice import OWN
+from sagittal.core.fusion.algorithms.listed import ALGORITHMS, ENGINES, GRADES
 
 OWN_ENGINE: Final = "Sagittal"
 """The group of the project's own filters, beside the six engines."""

@@ -10,12 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from core.frames import SEGMENTS, SIDES, SUFFIX, Floats, Side
-from core.fusion.algorithms.listed import ENGINES
-from core.plurals import plural
-from server.report.filter_charts import Over, draw_agreement, draw_spread
-from server.report.filter_list import GRADES_IN_WORDS
-from server.report.wording import VARIABLES, format_number, place_words
+from sagittal.core.frames import SEGMENTS, SIDES, SUFFIX, Floats, Side
+from sagittal.core.fusion.algorithms.listed import ENGINES
+from sagittal.core.plurals import plural
+from sagittal.server.report.filter_charts import Over, draw_agreement, draw_spread
+from sagittal.server.report.filter_list import GRADES_IN_WORDS
+from sagittal.server.report.wording import VARIABLES, format_number, place_words
 
 NAME: Final = "filters.json"
 

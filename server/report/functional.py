@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from core.norms.functional import (
+from sagittal.core.norms.functional import (
     COMFORTABLE_SPEED_SOURCE,
     SIX_MINUTE_SOURCE,
     TEST_NORMS,
@@ -14,11 +14,17 @@ from core.norms.functional import (
     find_six_minute_norm,
     find_test_norm,
 )
-from core.parameters.catalogue import CATALOGUE, require_entries
-from core.parameters.result import Parameter
-from server.report.bundle import Bundle
-from server.report.svg import format_coordinate, stretch
-from server.report.wording import format_number, format_uncertainty, parameter_term, place_words, reason_words
+from sagittal.core.parameters.catalogue import CATALOGUE, require_entries
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.svg import format_coordinate, stretch
+from sagittal.server.report.wording import (
+    format_number,
+    format_uncertainty,
+    parameter_term,
+    place_words,
+    reason_words,
+)
 
 TOTALS: Final = (
     "tug_duration_s",
@@ -29,7 +35,7 @@ TOTALS: Final = (
 )
 """The figure that stands for a test, by what was measured."""
 
-require_entries(TOTALS, "server.report.functional")
+require_entries(TOTALS, "sagittal.server.report.functional")
 
 SEGMENTS: Final[Mapping[str, str]] = {
     "sit_to_stand": "Rising",

@@ -12,17 +12,17 @@ from dataclasses import dataclass, field, replace
 from math import hypot
 from typing import Final, Literal
 
-from core.change import Change, ChangedFact, SortedChanges, name_fact
-from core.events.result import COMPARED, Strides
-from core.flags import Flag
-from core.frames import SIDES, Side
-from core.norms.lookup import Norms
-from core.parameters.catalogue import find_entry
-from core.parameters.flats import OTHER
-from core.parameters.variability import NORMAL_95
-from core.plurals import plural
-from server.report.change_words import change_words, find_term
-from server.report.headline_phrases import (
+from sagittal.core.change import Change, ChangedFact, SortedChanges, name_fact
+from sagittal.core.events.result import COMPARED, Strides
+from sagittal.core.flags import Flag
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.norms.lookup import Norms
+from sagittal.core.parameters.catalogue import find_entry
+from sagittal.core.parameters.flats import OTHER
+from sagittal.core.parameters.variability import NORMAL_95
+from sagittal.core.plurals import plural
+from sagittal.server.report.change_words import change_words, find_term
+from sagittal.server.report.headline_phrases import (
     BOTH_STEPS,
     PELVIS_RISES,
     PHRASES,
@@ -30,9 +30,9 @@ from server.report.headline_phrases import (
     Family,
     Phrases,
 )
-from server.report.level import from_standing
-from server.report.table import BEYOND_SD, ParameterRow, TableCell
-from server.report.wording import format_number, parameter_term, round_difference
+from sagittal.server.report.level import from_standing
+from sagittal.server.report.table import BEYOND_SD, ParameterRow, TableCell
+from sagittal.server.report.wording import format_number, parameter_term, round_difference
 
 Kind = Literal["norm", "limit", "sides", "change"]
 

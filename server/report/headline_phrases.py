@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from core.parameters.catalogue import require_entries
+from sagittal.core.parameters.catalogue import require_entries
 
 Family = Literal[
     "speed", "step", "support", "foot_contact", "foot_swing", "push_off", "knee_stance", "knee_swing", "hip",
@@ -247,7 +247,7 @@ PHRASES: Final[Mapping[str, Phrases]] = {
 }
 """In the order in which equals are told."""
 
-require_entries(PHRASES, "server.report.headline_phrases")
+require_entries(PHRASES, "sagittal.server.report.headline_phrases")
 
 SHORT_AND_QUICK: Final = (
     "Steps are *short and quick*: {l} m at {c} a minute, usual at this speed {a} to {b} m"

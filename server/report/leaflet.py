@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from core.change import NOT_MEASURED_ALIKE, Change
-from core.frames import Side
-from core.parameters.catalogue import require_entries
-from core.parameters.result import Parameter
-from server.report.wording import format_number
+from sagittal.core.change import NOT_MEASURED_ALIKE, Change
+from sagittal.core.frames import Side
+from sagittal.core.parameters.catalogue import require_entries
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.wording import format_number
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ FIGURES: Final = (
 )
 """Speed, step and knee: what people who train their walk ask about."""
 
-require_entries((f.name for f in FIGURES), "server.report.leaflet")
+require_entries((f.name for f in FIGURES), "sagittal.server.report.leaflet")
 
 REAL: Final = ("real_change", "clinically_relevant")
 

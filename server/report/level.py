@@ -6,16 +6,16 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from core.events.result import Strides
-from core.frames import SIDES
-from core.norms import Norms
-from core.parameters.anatomical_zero import anatomical_parameters, standing_name, standing_offset_deg
-from core.parameters.catalogue import find_entry
-from core.parameters.result import CycleCurves, Parameter
-from core.parameters.rows import Column
-from core.standing_angles import JOINTS, PELVIS
-from server.report.table import ParameterRow, parameter_rows
-from server.report.wording import title_of
+from sagittal.core.events.result import Strides
+from sagittal.core.frames import SIDES
+from sagittal.core.norms import Norms
+from sagittal.core.parameters.anatomical_zero import anatomical_parameters, standing_name, standing_offset_deg
+from sagittal.core.parameters.catalogue import find_entry
+from sagittal.core.parameters.result import CycleCurves, Parameter
+from sagittal.core.parameters.rows import Column
+from sagittal.core.standing_angles import JOINTS, PELVIS
+from sagittal.server.report.table import ParameterRow, parameter_rows
+from sagittal.server.report.wording import title_of
 
 GROUP = "Angles from the anatomical zero"
 

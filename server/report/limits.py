@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from core.flags import RULES, Flag
-from server.report.wording import format_number, reason_words
+from sagittal.core.flags import RULES, Flag
+from sagittal.server.report.wording import format_number, reason_words
 
 NAMES: Final[Mapping[str, str]] = {
     "stiff_knee": "Swing peak of the knee below the other side's",

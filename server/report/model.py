@@ -12,40 +12,40 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.errors import Notice
-from core.flags import Flag, judge_flags
-from core.frames import SIDES, Floats, Side
-from core.norms.adults import adult_reference_at_speed
-from core.norms.controls import ControlGroup
-from core.norms.kinematics import NormBand
-from core.norms.lookup import Norms, look_up_norms
-from core.norms.profile import CurveReference
-from core.parameters import cycle_curves
-from core.parameters.anatomical_zero import anatomical_variables
-from core.parameters.catalogue import require_entries
-from core.parameters.result import CycleCurves
-from core.parameters.uncertainty import mark_estimated
-from core.scores import Scores, score_curves
-from server.report.bundle import Bundle
-from server.report.columns import reduce_to_plain
-from server.report.daily_life import DailyLifeView, daily_life_view
-from server.report.estimator import (
+from sagittal.core.errors import Notice
+from sagittal.core.flags import Flag, judge_flags
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.norms.adults import adult_reference_at_speed
+from sagittal.core.norms.controls import ControlGroup
+from sagittal.core.norms.kinematics import NormBand
+from sagittal.core.norms.lookup import Norms, look_up_norms
+from sagittal.core.norms.profile import CurveReference
+from sagittal.core.parameters import cycle_curves
+from sagittal.core.parameters.anatomical_zero import anatomical_variables
+from sagittal.core.parameters.catalogue import require_entries
+from sagittal.core.parameters.result import CycleCurves
+from sagittal.core.parameters.uncertainty import mark_estimated
+from sagittal.core.scores import Scores, score_curves
+from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.columns import reduce_to_plain
+from sagittal.server.report.daily_life import DailyLifeView, daily_life_view
+from sagittal.server.report.estimator import (
     EstimatorView,
     estimator_view,
     list_estimated_angles,
     list_estimated_variables,
 )
-from server.report.functional import TEST_NORM_NOTE, FunctionalView, functional_view
-from server.report.headline import Headline, find_standouts, say_badge
-from server.report.level import choose_zero, level_rows
-from server.report.limits import LimitsView, limits_view
-from server.report.notes import curve_notes, norm_note
-from server.report.panels import CurvePanel, SideCurve, curve_panels
-from server.report.profile import ProfileView, profile_view
-from server.report.quality_box import QualityBox, quality_box
-from server.report.squat import NORM_NOTE, UNSURE_FIGURES, SquatView, squat_view
-from server.report.table import ParameterRow, group_rows, parameter_rows
-from server.report.wording import explain_exclusion, place_words, speak_places
+from sagittal.server.report.functional import TEST_NORM_NOTE, FunctionalView, functional_view
+from sagittal.server.report.headline import Headline, find_standouts, say_badge
+from sagittal.server.report.level import choose_zero, level_rows
+from sagittal.server.report.limits import LimitsView, limits_view
+from sagittal.server.report.notes import curve_notes, norm_note
+from sagittal.server.report.panels import CurvePanel, SideCurve, curve_panels
+from sagittal.server.report.profile import ProfileView, profile_view
+from sagittal.server.report.quality_box import QualityBox, quality_box
+from sagittal.server.report.squat import NORM_NOTE, UNSURE_FIGURES, SquatView, squat_view
+from sagittal.server.report.table import ParameterRow, group_rows, parameter_rows
+from sagittal.server.report.wording import explain_exclusion, place_words, speak_places
 
 Sex = Literal["female", "male"]
 
@@ -67,7 +67,7 @@ KEY_NUMBERS: Final = (
 )
 """Parameters for the overview, in this order of preference."""
 
-require_entries(KEY_NUMBERS, "server.report.model")
+require_entries(KEY_NUMBERS, "sagittal.server.report.model")
 
 SHOWN_LARGE: Final = 4
 """So many of them are shown, those that were measured."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from server.report.bundle import Bundle
-from server.report.wording import speak_places
+from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.wording import speak_places
 
 FEW_SENSORS: Final = "it needs sensors on the pelvis and a leg, on pelvis and feet or on both feet."
 OF_A_TEST: Final = "of a test only its times and values are measured."

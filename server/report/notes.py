@@ -7,15 +7,15 @@ from typing import Final
 
 import numpy as np
 
-from core.norms.at_speed import ASKED, SOURCE
-from core.norms.controls import ControlGroup
-from core.norms.lookup import Norms
-from core.norms.values import is_angle
-from server.report.bundle import Bundle
-from server.report.estimator import estimator_view
-from server.report.panels import DRAWN_STRIDES, CurvePanel
-from server.report.table import FEW_NOTE, ParameterRow
-from server.report.wording import GROUPS, NO_NORM, VARIABLES, format_number
+from sagittal.core.norms.at_speed import ASKED, SOURCE
+from sagittal.core.norms.controls import ControlGroup
+from sagittal.core.norms.lookup import Norms
+from sagittal.core.norms.values import is_angle
+from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.estimator import estimator_view
+from sagittal.server.report.panels import DRAWN_STRIDES, CurvePanel
+from sagittal.server.report.table import FEW_NOTE, ParameterRow
+from sagittal.server.report.wording import GROUPS, NO_NORM, VARIABLES, format_number
 
 SPEED: Final = "gait_speed_mps"
 

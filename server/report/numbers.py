@@ -9,17 +9,17 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from core.errors import Notice
-from core.frames import Side
-from core.norms.controls import mean_curves
-from core.norms.profile import MeanCurves, ScoreSpread
-from core.parameters import cycle_curves
-from core.parameters.result import Parameter
-from core.parameters.uncertainty import mark_estimated
-from core.scores import Score, score_curves
-from server.report.bundle import Bundle, keep_told
-from server.report.estimator import list_estimated_angles, list_estimated_variables
-from server.report.quality_box import data_verdict
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Side
+from sagittal.core.norms.controls import mean_curves
+from sagittal.core.norms.profile import MeanCurves, ScoreSpread
+from sagittal.core.parameters import cycle_curves
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.uncertainty import mark_estimated
+from sagittal.core.scores import Score, score_curves
+from sagittal.server.report.bundle import Bundle, keep_told
+from sagittal.server.report.estimator import list_estimated_angles, list_estimated_variables
+from sagittal.server.report.quality_box import data_verdict
 
 
 @dataclass(frozen=True)

@@ -8,19 +8,19 @@ from typing import Final
 
 import numpy as np
 
-from core.events.result import COMPARED
-from core.frames import SIDES, Floats, Side
-from core.norms import NormBand
-from core.norms.kinematics import Zero
-from core.norms.lookup import Norms
-from core.parameters import mean_curve
-from core.parameters.anatomical_zero import anatomical_variables, standing_offset_deg
-from core.parameters.kinematic import MEAN_ZERO, rest_at_bound
-from core.parameters.result import CycleCurves
-from core.parameters.variability import mean_and_sd
-from server.report.bundle import Bundle
-from server.report.estimator import list_estimated_variables
-from server.report.wording import VARIABLES, ZERO_WORDS, Variable, reason_words
+from sagittal.core.events.result import COMPARED
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.norms import NormBand
+from sagittal.core.norms.kinematics import Zero
+from sagittal.core.norms.lookup import Norms
+from sagittal.core.parameters import mean_curve
+from sagittal.core.parameters.anatomical_zero import anatomical_variables, standing_offset_deg
+from sagittal.core.parameters.kinematic import MEAN_ZERO, rest_at_bound
+from sagittal.core.parameters.result import CycleCurves
+from sagittal.core.parameters.variability import mean_and_sd
+from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.estimator import list_estimated_variables
+from sagittal.server.report.wording import VARIABLES, ZERO_WORDS, Variable, reason_words
 
 NO_BAND: Final[Mapping[Zero, str]] = {
     "standing": "No norm band: these curves start from this person's standing, the norm from the anatomical "

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
-from server.report.paper_words import SVG, place_words
+from sagittal.server.report.paper_words import SVG, place_words
 
 SHEET_PX: Final = 703
 """Width of a sheet between its margins (web/static/css/pdf.css): 210 mm without 2 × 12 mm."""

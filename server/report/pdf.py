@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
-from core.errors import SagittalError
-from server.report.paper_charts import prepare_figures, read_chart_styles
+from sagittal.core.errors import SagittalError
+from sagittal.server.report.paper_charts import prepare_figures, read_chart_styles
 
 STYLES: Final = Path(__file__).parents[2] / "web" / "static" / "css" / "pdf.css"
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final, cast
 
-from core.frames import SIDES, Side
-from core.norms.profile import Mode
-from core.scores import Score, Scores
-from server.report.change_words import SCORE_TERMS
-from server.report.svg import draw_bar, format_coordinate
-from server.report.wording import VARIABLES, format_number, reason_words
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.norms.profile import Mode
+from sagittal.core.scores import Score, Scores
+from sagittal.server.report.change_words import SCORE_TERMS
+from sagittal.server.report.svg import draw_bar, format_coordinate
+from sagittal.server.report.wording import VARIABLES, format_number, reason_words
 
 SCALE_DEG: Final = 24.0
 """Right end of the bars; a GVS of 24° is beyond any pathology in the tables."""

@@ -6,15 +6,15 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, cast
 
-from core.activity.parameters import WORN_H
-from core.parameters.result import Parameter
-from core.plurals import plural
-from core.quality import concern_paths_alone, find_shown_level
-from core.quality.assessment import Verdict
-from core.squat.repetitions import FOOT_LIFTED
-from server.report.bundle import Bundle, is_functional
-from server.report.estimator import estimator_view
-from server.report.wording import format_number, place_words, speak_places
+from sagittal.core.activity.parameters import WORN_H
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.plurals import plural
+from sagittal.core.quality import concern_paths_alone, find_shown_level
+from sagittal.core.quality.assessment import Verdict
+from sagittal.core.squat.repetitions import FOOT_LIFTED
+from sagittal.server.report.bundle import Bundle, is_functional
+from sagittal.server.report.estimator import estimator_view
+from sagittal.server.report.wording import format_number, place_words, speak_places
 
 CALIBRATION_METHODS: Final[Mapping[str, str]] = {
     "walking_direction": "from standing and walking",

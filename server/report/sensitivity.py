@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from core.squat.joints import JOINTS
-from server.report.columns import SCHEMA, reduce_to_plain, write_csv
-from server.report.wording import format_number
+from sagittal.core.squat.joints import JOINTS
+from sagittal.server.report.columns import SCHEMA, reduce_to_plain, write_csv
+from sagittal.server.report.wording import format_number
 
 if TYPE_CHECKING:
     # brings numba, which the web process does without
-    from core.frames import Floats, Side
-    from core.squat.sensitivity import SensitivityRow, SensitivityTable
+    from sagittal.core.frames import Floats, Side
+    from sagittal.core.squat.sensitivity import SensitivityRow, SensitivityTable
 
 COLUMNS: Final = (
     "Ankle IR/ER", "Ankle Abd/Add", "Ankle Flex/Ext", "Knee Flex/Ext", "Hip Flex/Ext", "Hip Abd/Add",
@@ -119,7 +119,7 @@ def summarise_sensitivity(
 
 
 def _average(rows: Sequence[SensitivityRow]) -> Floats:
-    from core.squat.sensitivity import average_sensitivity
+    from sagittal.core.squat.sensitivity import average_sensitivity
 
     return average_sensitivity([row.sensitivity_pct for row in rows])
 

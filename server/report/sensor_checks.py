@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from server.report.wording import format_number, place_words
+from sagittal.server.report.wording import format_number, place_words
 
 NOT_JUDGED: Final = "cannot be judged"
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from server.report.wording import format_number, place_words
+from sagittal.server.report.wording import format_number, place_words
 
 OFF_SD: Final = 2.0
 """A place further from the nominal one than so many standard deviations is told."""

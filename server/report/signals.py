@@ -9,8 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from core.recording import SensorSignals, UniformRecording
-from server.report.columns import SCHEMA, ParquetColumn, parquet_file
+from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.server.report.columns import SCHEMA, ParquetColumn, parquet_file
 
 NAME = "signals.parquet"
 

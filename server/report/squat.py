@@ -9,13 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import SIDES, Floats, Side
-from core.squat.curves import VALGUS, cut_curves
-from core.squat.repetitions import FOOT_LIFTED
-from server.report.bundle import Bundle, StoredRepetition
-from server.report.curves import SQUAT, cycle_svg
-from server.report.panels import CurvePanel, SideCurve
-from server.report.wording import Variable, explain_repetition, format_number
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.squat.curves import VALGUS, cut_curves
+from sagittal.core.squat.repetitions import FOOT_LIFTED
+from sagittal.server.report.bundle import Bundle, StoredRepetition
+from sagittal.server.report.curves import SQUAT, cycle_svg
+from sagittal.server.report.panels import CurvePanel, SideCurve
+from sagittal.server.report.wording import Variable, explain_repetition, format_number
 
 HEIGHT: Final = 158
 """Of a chart, px."""

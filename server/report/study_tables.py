@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, Final
 
-from core.errors import SagittalError
-from core.events.result import MANUAL
-from server.report.columns import write_csv
-from server.report.estimator import list_estimated_angles
+from sagittal.core.errors import SagittalError
+from sagittal.core.events.result import MANUAL
+from sagittal.server.report.columns import write_csv
+from sagittal.server.report.estimator import list_estimated_angles
 
 PROVENANCE: Final = "provenance.json"
 FAILURES: Final = "failures.csv"

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Final
 
-from core.frames import Side
+from sagittal.core.frames import Side
 
 KEY: Final[dict[Side, str]] = {"left": "l", "right": "r"}
 """Letter of a side in CSS classes."""

@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 from math import hypot, sqrt
 from typing import Final
 
-from core.events.result import COMPARED
-from core.frames import Side
-from core.norms.kinematics import Zero
-from core.norms.lookup import Norms
-from core.norms.values import NormValue
-from core.parameters.catalogue import CATALOGUE, name_counted
-from core.parameters.result import Parameter
-from core.parameters.symmetry import Symmetry, compare_sides
-from core.parameters.variability import NORMAL_95, has_enough_values
-from core.plurals import plural
-from server.report.change_words import ChangeWords
-from server.report.curves import range_svg
-from server.report.wording import (
+from sagittal.core.events.result import COMPARED
+from sagittal.core.frames import Side
+from sagittal.core.norms.kinematics import Zero
+from sagittal.core.norms.lookup import Norms
+from sagittal.core.norms.values import NormValue
+from sagittal.core.parameters.catalogue import CATALOGUE, name_counted
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.symmetry import Symmetry, compare_sides
+from sagittal.core.parameters.variability import NORMAL_95, has_enough_values
+from sagittal.core.plurals import plural
+from sagittal.server.report.change_words import ChangeWords
+from sagittal.server.report.curves import range_svg
+from sagittal.server.report.wording import (
     GROUPS,
     NO_DIFFERENCE,
     Term,

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import isfinite
 
-from core.change import Change
-from core.events.result import COMPARED
-from core.feedback.summary import classify_stride
-from core.parameters.catalogue import unit_of
-from core.parameters.kinematic import AT_BOUND, POINTS
-from server.report.columns import write_csv
-from server.report.feedback import FeedbackView
-from server.report.model import ReportModel
-from server.report.trends import AnalysedVisit, Trend
+from sagittal.core.change import Change
+from sagittal.core.events.result import COMPARED
+from sagittal.core.feedback.summary import classify_stride
+from sagittal.core.parameters.catalogue import unit_of
+from sagittal.core.parameters.kinematic import AT_BOUND, POINTS
+from sagittal.server.report.columns import write_csv
+from sagittal.server.report.feedback import FeedbackView
+from sagittal.server.report.model import ReportModel
+from sagittal.server.report.trends import AnalysedVisit, Trend
 
 SYMMETRY = {
     "ratio": "ratio_left_right",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from core.parameters.result import Parameter
-from server.report.svg import format_coordinate
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.svg import format_coordinate
 
 WIDTH, HEIGHT, ROOM = 92, 24, 6
 """Size in px, and what is left free at both ends."""

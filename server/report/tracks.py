@@ -14,19 +14,19 @@ from typing import Any, TypeVar
 import numpy as np
 import pyarrow as pa
 
-from core.angles import JointAngles
-from core.body.feet import FootTracks
-from core.body.model import BodyModel
-from core.events.bouts import Bout, BoutParams
-from core.events.flags import StrideParams
-from core.events.result import GaitEvents
-from core.events.steps import Step, Steps
-from core.events.turns import Turn
-from core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
-from core.held_samples import cut_blocks, give_pages_back
-from core.measure import Tracks
-from core.parameters import Surface
-from server.report.columns import (
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.body.model import BodyModel
+from sagittal.core.events.bouts import Bout, BoutParams
+from sagittal.core.events.flags import StrideParams
+from sagittal.core.events.result import GaitEvents
+from sagittal.core.events.steps import Step, Steps
+from sagittal.core.events.turns import Turn
+from sagittal.core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
+from sagittal.core.held_samples import cut_blocks, give_pages_back
+from sagittal.core.measure import Tracks
+from sagittal.core.parameters import Surface
+from sagittal.server.report.columns import (
     SCHEMA,
     ParquetColumn,
     bools_of,
@@ -42,7 +42,7 @@ _Made = TypeVar("_Made")
 
 
 def tracks_parquet(tracks: Tracks) -> bytes:
-    """Write what `core.measure.measure_gait` needs beside angles.parquet and events.csv."""
+    """Write what `sagittal.core.measure.measure_gait` needs beside angles.parquet and events.csv."""
     columns: dict[str, ParquetColumn] = {}
     for segment, q in tracks.q.items():
         columns |= _spread(f"{segment}_q", q, "wxyz")

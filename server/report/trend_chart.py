@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from server.report.svg import KEY, PlotArea, find_round_ticks, format_coordinate
-from server.report.trends import AnalysedVisit, Trend, TrendSeries
-from server.report.wording import format_number
-from web.language import MONTHS
+from sagittal.server.report.svg import KEY, PlotArea, find_round_ticks, format_coordinate
+from sagittal.server.report.trends import AnalysedVisit, Trend, TrendSeries
+from sagittal.server.report.wording import format_number
+from sagittal.web.language import MONTHS
 
 TOP, BOTTOM, LEFT, RIGHT = 22, 22, 44, 12
 """Margins in px, the padding of `<div class="chart trend-plot">`."""

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from core.frames import Side
-from core.parameters.catalogue import require_entries
-from server.report.change_words import SCORE_TERMS, ChangeWords, change_words, format_limit
-from server.report.svg import KEY, format_coordinate
-from server.report.trends import AnalysedVisit, Trend, TrendSeries, collect_figures, follow_figures
-from server.report.wording import Term, format_number, reason_words
+from sagittal.core.frames import Side
+from sagittal.core.parameters.catalogue import require_entries
+from sagittal.server.report.change_words import SCORE_TERMS, ChangeWords, change_words, format_limit
+from sagittal.server.report.svg import KEY, format_coordinate
+from sagittal.server.report.trends import AnalysedVisit, Trend, TrendSeries, collect_figures, follow_figures
+from sagittal.server.report.wording import Term, format_number, reason_words
 
 FIGURES: Final = ("gait_speed_mps", "gps_sagittal_deg", "step_length_m")
 """In this order as long as their lines fit into `MOST_LINES`; step length where there is no score."""
 
-require_entries((name for name in FIGURES if name not in SCORE_TERMS), "server.report.trend_strip")
+require_entries((name for name in FIGURES if name not in SCORE_TERMS), "sagittal.server.report.trend_strip")
 
 MOST_LINES: Final = 3
 LEAST_VISITS: Final = 3

@@ -12,16 +12,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from core.change import Change, find_detectable_change, find_relevant_change, parameter_changes
-from core.change.limits import Limb
-from core.condition import WalkingCondition
-from core.frames import SIDES, Side
-from core.norms import Norms, NormValue
-from core.parameters.catalogue import CATALOGUE, require_entries
-from core.parameters.result import Parameter
-from server.report.change_words import SCORE_TERMS, find_term
-from server.report.numbers import Numbers
-from server.report.wording import Term
+from sagittal.core.change import Change, find_detectable_change, find_relevant_change, parameter_changes
+from sagittal.core.change.limits import Limb
+from sagittal.core.condition import WalkingCondition
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.norms import Norms, NormValue
+from sagittal.core.parameters.catalogue import CATALOGUE, require_entries
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.change_words import SCORE_TERMS, find_term
+from sagittal.server.report.numbers import Numbers
+from sagittal.server.report.wording import Term
 
 VisitKind = Literal["assessment", "training"]
 
@@ -35,7 +35,7 @@ PRIMARY: Final = (
 )
 """Figures shown when the reader has chosen none; without any of them the first that are there."""
 
-require_entries((name for name in PRIMARY if name not in SCORE_TERMS), "server.report.trends")
+require_entries((name for name in PRIMARY if name not in SCORE_TERMS), "sagittal.server.report.trends")
 
 SCORE_MODE: Final = "offset_removed"
 """Shape without level: angles start from the standing of that day."""

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from core.parameters.catalogue import Comparison, find_entry
-from core.parameters.kinematic import is_level
-from core.parameters.symmetry import Symmetry
-from web.user_text import UserText
+from sagittal.core.parameters.catalogue import Comparison, find_entry
+from sagittal.core.parameters.kinematic import is_level
+from sagittal.core.parameters.symmetry import Symmetry
+from sagittal.web.user_text import UserText
 
 Plane = Literal["sagittal", "frontal", "transverse"]
 

@@ -14,14 +14,23 @@ from typing import Any
 
 from sqlalchemy import Connection, Result, Select, bindparam, func, insert, select, update
 
-from server import audit
-from server.jobs.queue import Claim, JobQueue, JobView
-from server.services import recordings, sessions
-from server.services.errors import NotFound
-from server.services.provenance import CODE_VERSION
-from server.storage.blobs import Blob, BlobStore
-from server.storage.columns import make_all
-from server.storage.tables import analysis, analysis_file, job, new_id, now, patient, recording, session
+from sagittal.server import audit
+from sagittal.server.jobs.queue import Claim, JobQueue, JobView
+from sagittal.server.services import recordings, sessions
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.columns import make_all
+from sagittal.server.storage.tables import (
+    analysis,
+    analysis_file,
+    job,
+    new_id,
+    now,
+    patient,
+    recording,
+    session,
+)
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
-from core.memory import give_memory_back
-from server.services.provenance import CODE_VERSION
+from sagittal.core.memory import give_memory_back
+from sagittal.server.services.provenance import CODE_VERSION
 
 if TYPE_CHECKING:
-    from core.formats.source import SourceFile
-    from core.pipeline import Progress, TakeAnalysis
+    from sagittal.core.formats.source import SourceFile
+    from sagittal.core.pipeline import Progress, TakeAnalysis
 
 
 REPAIRED: Final = "repaired.json"
@@ -27,8 +27,8 @@ def run(
     progress: Progress,
 ) -> dict[str, bytes]:
     """Files of one take in, result files out (server/report/exports.py); as `analyse_files`."""
-    from core.formats.json_tree import read_json
-    from server.report.exports import analysis_files
+    from sagittal.core.formats.json_tree import read_json
+    from sagittal.server.report.exports import analysis_files
 
     results = [analyse_files(files, manifest, config, progress, resumable=False)]
     setup = results[0].setup
@@ -57,17 +57,17 @@ def analyse_files(
     manifest : JSON text, None = nothing declared.
     config : overrides of PipelineConfig by stage, {"fusion": {"k_acc": 1.0}}; without any those of an archive
         of a visit among the files, else the defaults.
-    resumable : as `core.pipeline.analyse`.
+    resumable : as `sagittal.core.pipeline.analyse`.
 
     Raises
     ------
     SagittalError
         nothing can be analysed; the code and the sentence say why.
     """
-    from core.formats import read_recording
-    from core.formats.manifest import parse_manifest
-    from core.pipeline import PipelineConfig, analyse
-    from core.pipeline.config import override_config
+    from sagittal.core.formats import read_recording
+    from sagittal.core.formats.manifest import parse_manifest
+    from sagittal.core.pipeline import PipelineConfig, analyse
+    from sagittal.core.pipeline.config import override_config
 
     def tell(stage: str, share: float) -> None:
         give_memory_back()
@@ -95,9 +95,9 @@ def choose_config(files: Sequence[SourceFile], config: Mapping[str, Any] | None)
     ArchiveError
         the archive is damaged, or its settings are no JSON.
     """
-    from core.errors import ArchiveError
-    from core.formats.archive import read_episode_config
-    from core.formats.json_tree import read_json
+    from sagittal.core.errors import ArchiveError
+    from sagittal.core.formats.archive import read_episode_config
+    from sagittal.core.formats.json_tree import read_json
 
     if config:
         return config
@@ -117,9 +117,9 @@ def inspect(files: Sequence[SourceFile], manifest: Mapping[str, Any] | None, pro
     SagittalError
         the files cannot be read; the code and the sentence say why.
     """
-    from core import quality
-    from core.formats import read_recording
-    from core.formats.manifest import manifest_of
+    from sagittal.core import quality
+    from sagittal.core.formats import read_recording
+    from sagittal.core.formats.manifest import manifest_of
 
     progress("reading", 0.0)
     sources = (manifest or {}).get("sources")

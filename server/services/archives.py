@@ -20,14 +20,14 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from typing import IO, Any, Final
 
-from core.errors import InputError
-from server.export.zipping import EARLIEST
-from server.services.analyses import AnalysisRecord
-from server.services.edit_log import EditHistory
-from server.services.provenance import CODE_VERSION
-from server.services.recordings import StoredRecording
-from server.services.signed_reports import SignedDocuments
-from server.storage.blobs import BlobStore
+from sagittal.core.errors import InputError
+from sagittal.server.export.zipping import EARLIEST
+from sagittal.server.services.analyses import AnalysisRecord
+from sagittal.server.services.edit_log import EditHistory
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.services.recordings import StoredRecording
+from sagittal.server.services.signed_reports import SignedDocuments
+from sagittal.server.storage.blobs import BlobStore
 
 SCHEMA: Final = 1
 _PACKED: Final = (".parquet", ".gz", ".h5", ".pdf")
@@ -55,7 +55,7 @@ def write_archive(
     IntegrityError, ArchiveError
         A stored file is damaged, or a zip that was uploaded.
     """
-    from core.formats.archive import EPISODE_CONFIG, EPISODE_MANIFEST, EPISODE_MARK  # slow import
+    from sagittal.core.formats.archive import EPISODE_CONFIG, EPISODE_MANIFEST, EPISODE_MARK  # slow import
 
     sha256: dict[str, str] = {}
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
@@ -92,8 +92,8 @@ def write_archive(
 
 def _settings(blobs: BlobStore, recording: StoredRecording, found: AnalysisRecord) -> Mapping[str, Any]:
     """What the analysis was computed with, also where it came in an archive among the recording's files."""
-    from server.services.analysing import choose_config  # slow imports
-    from server.storage.blob_source import open_source
+    from sagittal.server.services.analysing import choose_config  # slow imports
+    from sagittal.server.storage.blob_source import open_source
 
     files = [open_source(blobs, recording.patient_id, f.name, f.size, f.sha256) for f in recording.files]
     return choose_config(files, found.config)
@@ -101,8 +101,8 @@ def _settings(blobs: BlobStore, recording: StoredRecording, found: AnalysisRecor
 
 def _originals(blobs: BlobStore, recording: StoredRecording) -> Iterator[tuple[str, bytes]]:
     """The recording's files one after another, taken out of the zips and gz they came in."""
-    from core.formats.archive import EPISODE_RECORDING, expand  # slow import
-    from core.formats.source import SourceFile
+    from sagittal.core.formats.archive import EPISODE_RECORDING, expand  # slow import
+    from sagittal.core.formats.source import SourceFile
 
     for f in recording.files:
         content = blobs.read(recording.patient_id, f.sha256)

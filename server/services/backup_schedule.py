@@ -14,17 +14,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from core.formats.json_tree import read_json
-from server.services.backups import BackupError, list_backups, make_backup, prune
-from server.services.restore_room import RestoreError
-from server.services.restoring import try_restore
-from server.services.tombstones import TombstoneError
-from server.settings import Settings
-from server.storage import fs
-from server.storage.archive import BackupFileError, ClinicKey, read_key
-from server.storage.db import Database
-from server.storage.migrate import MigrationError, require_current
-from server.storage.tables import now
+from sagittal.core.formats.json_tree import read_json
+from sagittal.server.services.backups import BackupError, list_backups, make_backup, prune
+from sagittal.server.services.restore_room import RestoreError
+from sagittal.server.services.restoring import try_restore
+from sagittal.server.services.tombstones import TombstoneError
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.archive import BackupFileError, ClinicKey, read_key
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.migrate import MigrationError, require_current
+from sagittal.server.storage.tables import now
 
 log = logging.getLogger(__name__)
 

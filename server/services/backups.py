@@ -25,19 +25,19 @@ from typing import BinaryIO, Final
 
 from sqlalchemy import Connection, func, select, update
 
-from server import audit
-from server.services.provenance import CODE_VERSION
-from server.services.references import list_referenced
-from server.services.tombstones import find_tombstones, keep_tombstones
-from server.settings import Settings
-from server.storage import fs
-from server.storage.archive import ArchiveWriter, ClinicKey, write_archive
-from server.storage.blob_opening import open_blobs
-from server.storage.blobs import BlobStore, StoreAway
-from server.storage.db import Database
-from server.storage.high_water import HighWater, read_newest
-from server.storage.migrate import copy_database, read_revision
-from server.storage.tables import job, new_id, now, patient, session
+from sagittal.server import audit
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.services.references import list_referenced
+from sagittal.server.services.tombstones import find_tombstones, keep_tombstones
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.archive import ArchiveWriter, ClinicKey, write_archive
+from sagittal.server.storage.blob_opening import open_blobs
+from sagittal.server.storage.blobs import BlobStore, StoreAway
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import HighWater, read_newest
+from sagittal.server.storage.migrate import copy_database, read_revision
+from sagittal.server.storage.tables import job, new_id, now, patient, session
 
 log = logging.getLogger(__name__)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import datetime as dt
 from typing import Final
 
-from server.services.errors import ServiceError
-from server.storage.tables import now
+from sagittal.server.services.errors import ServiceError
+from sagittal.server.storage.tables import now
 
 FIRST: Final = dt.date(1900, 1, 1)
 AHEAD: Final = dt.timedelta(days=3653)

@@ -13,16 +13,16 @@ from unicodedata import normalize
 
 from sqlalchemy import Connection, Row, Select, case, delete, exists, insert, select, union, update
 
-from core.plurals import plural
-from server import audit
-from server.auth.identity import Identity
-from server.auth.roles import Role
-from server.auth.sight import CARE_TEAMS, TEAMS_ARE_ON, is_emergency_open, may_open
-from server.services import patients, report_links
-from server.services.errors import Conflict, NotAllowed, NotFound, ServiceError
-from server.storage.care_tables import care_team_member, clinic_option, emergency_access
-from server.storage.tables import audit as audit_table
-from server.storage.tables import new_id, now, patient, session, user
+from sagittal.core.plurals import plural
+from sagittal.server import audit
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Role
+from sagittal.server.auth.sight import CARE_TEAMS, TEAMS_ARE_ON, is_emergency_open, may_open
+from sagittal.server.services import patients, report_links
+from sagittal.server.services.errors import Conflict, NotAllowed, NotFound, ServiceError
+from sagittal.server.storage.care_tables import care_team_member, clinic_option, emergency_access
+from sagittal.server.storage.tables import audit as audit_table
+from sagittal.server.storage.tables import new_id, now, patient, session, user
 
 EMERGENCY: Final = dt.timedelta(hours=4)
 """How long a patient stays open to who opened him or her in an emergency (our choice)."""

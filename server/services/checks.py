@@ -8,16 +8,16 @@ from pathlib import Path
 
 from sqlalchemy.exc import DatabaseError
 
-from core.errors import SagittalError
-from server import audit
-from server.auth import second_factor
-from server.services import custody, identities, live_logs
-from server.services.references import list_referenced
-from server.settings import Settings
-from server.storage.blobs import BlobStore, StoreAway, digest_open
-from server.storage.db import Database
-from server.storage.high_water import explain_lost_rows
-from server.storage.trash import Trash, TrashedFile
+from sagittal.core.errors import SagittalError
+from sagittal.server import audit
+from sagittal.server.auth import second_factor
+from sagittal.server.services import custody, identities, live_logs
+from sagittal.server.services.references import list_referenced
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blobs import BlobStore, StoreAway, digest_open
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import explain_lost_rows
+from sagittal.server.storage.trash import Trash, TrashedFile
 
 
 @dataclass(frozen=True)

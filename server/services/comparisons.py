@@ -8,17 +8,17 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
-from core.condition import compare_conditions, is_comparable
-from core.norms import Norms, look_up_norms
-from server.report.comparison import ComparedRow, compare_rows
-from server.report.numbers import Numbers
-from server.report.trends import VisitKind
-from server.services import analyses, edit_log, patients, programmes, sessions
-from server.services.errors import Conflict
-from server.services.histories import AnalysedSession, classify_visit
-from server.services.patients import Patient
-from server.services.reviewed import ReviewedAnalyses
-from server.services.sessions import Session
+from sagittal.core.condition import compare_conditions, is_comparable
+from sagittal.core.norms import Norms, look_up_norms
+from sagittal.server.report.comparison import ComparedRow, compare_rows
+from sagittal.server.report.numbers import Numbers
+from sagittal.server.report.trends import VisitKind
+from sagittal.server.services import analyses, edit_log, patients, programmes, sessions
+from sagittal.server.services.errors import Conflict
+from sagittal.server.services.histories import AnalysedSession, classify_visit
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.sessions import Session
 
 
 @dataclass(frozen=True)

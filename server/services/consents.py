@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, insert, select, update
 
-from server import audit
-from server.services import patients
-from server.services.errors import Conflict, NotFound, ServiceError
-from server.storage.person_tables import CONSENT_PURPOSES, consent
-from server.storage.tables import new_id, now, user
+from sagittal.server import audit
+from sagittal.server.services import patients
+from sagittal.server.services.errors import Conflict, NotFound, ServiceError
+from sagittal.server.storage.person_tables import CONSENT_PURPOSES, consent
+from sagittal.server.storage.tables import new_id, now, user
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,14 @@ from typing import Final
 
 from sqlalchemy import Connection, bindparam, select
 
-from core.condition import WalkingCondition
-from core.norms.controls import ControlGroup, ControlSession, control_group
-from server.services import analyses, edit_log
-from server.services.patients import Patient
-from server.services.reviewed import ReviewedAnalyses
-from server.services.sessions import Session
-from server.storage.tables import patient
-from server.storage.tables import session as session_table
+from sagittal.core.condition import WalkingCondition
+from sagittal.core.norms.controls import ControlGroup, ControlSession, control_group
+from sagittal.server.services import analyses, edit_log
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.sessions import Session
+from sagittal.server.storage.tables import patient
+from sagittal.server.storage.tables import session as session_table
 
 NEAR_MPS: Final = 0.2
 """Controls who walk within this of a person are their reference: speed matters more than age

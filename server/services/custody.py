@@ -16,16 +16,16 @@ from contextlib import closing
 from sqlalchemy import Connection, func, select
 from sqlalchemy.exc import DatabaseError
 
-from server import audit
-from server.services import erasure
-from server.settings import Settings
-from server.storage.blob_opening import open_blobs
-from server.storage.blobs import INCOMING, StoreAway
-from server.storage.db import Database
-from server.storage.high_water import explain_lost_rows, read_newest, set_mark
-from server.storage.migrate import exists
-from server.storage.tables import audit as audit_table
-from server.storage.tables import patient
+from sagittal.server import audit
+from sagittal.server.services import erasure
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blob_opening import open_blobs
+from sagittal.server.storage.blobs import INCOMING, StoreAway
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import explain_lost_rows, read_newest, set_mark
+from sagittal.server.storage.migrate import exists
+from sagittal.server.storage.tables import audit as audit_table
+from sagittal.server.storage.tables import patient
 
 log = logging.getLogger(__name__)
 

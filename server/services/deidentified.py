@@ -23,23 +23,23 @@ from typing import Final
 
 from sqlalchemy import Connection
 
-from core.condition import CHOICES
-from core.errors import FormatError, InputError
-from server import audit
-from server.export import sheets
-from server.export.ages import OLDEST, coarsen_age
-from server.export.content import ExportContent, VisitFacts, open_content
-from server.export.sheets import Row, TableSheet
-from server.export.zipping import EARLIEST, ZipSink
-from server.report.columns import SCHEMA, floats_of, parquet_file, write_csv
-from server.services import analyses, consents, edit_log, patients, sessions
-from server.services.errors import NotFound
-from server.services.patients import Patient
-from server.services.provenance import CODE_VERSION
-from server.services.sessions import Session
-from server.storage import fs
-from server.storage.blobs import BlobStore, IntegrityError
-from server.storage.db import Database
+from sagittal.core.condition import CHOICES
+from sagittal.core.errors import FormatError, InputError
+from sagittal.server import audit
+from sagittal.server.export import sheets
+from sagittal.server.export.ages import OLDEST, coarsen_age
+from sagittal.server.export.content import ExportContent, VisitFacts, open_content
+from sagittal.server.export.sheets import Row, TableSheet
+from sagittal.server.export.zipping import EARLIEST, ZipSink
+from sagittal.server.report.columns import SCHEMA, floats_of, parquet_file, write_csv
+from sagittal.server.services import analyses, consents, edit_log, patients, sessions
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.services.sessions import Session
+from sagittal.server.storage import fs
+from sagittal.server.storage.blobs import BlobStore, IntegrityError
+from sagittal.server.storage.db import Database
 
 MOST_SHIFT_DAYS: Final = 1461
 """Four years: neither the season nor the year of a visit is told."""

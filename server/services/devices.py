@@ -13,10 +13,10 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, Select, delete, func, insert, select
 
-from core.quality.device_course import DeviceCourse, follow_device
-from core.quality.devices import DeviceCheck
-from server.services.errors import NotFound
-from server.storage.tables import device_check, now, recording, session
+from sagittal.core.quality.device_course import DeviceCourse, follow_device
+from sagittal.core.quality.devices import DeviceCheck
+from sagittal.server.services.errors import NotFound
+from sagittal.server.storage.tables import device_check, now, recording, session
 
 LISTED: Final = 200
 """Devices of a list, and of what a tablet is told."""

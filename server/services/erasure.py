@@ -19,21 +19,21 @@ from typing import Any
 from sqlalchemy import Connection, delete, select, update
 from sqlalchemy.exc import SQLAlchemyError
 
-from core.formats.json_tree import read_json
-from server import audit
-from server.services import patients, sessions
-from server.services.errors import Conflict
-from server.services.references import list_referenced
-from server.services.reviewed import ReviewedAnalyses
-from server.settings import Settings
-from server.storage import fs
-from server.storage.blobs import BlobStore, StoreAway
-from server.storage.care_tables import care_team_member, emergency_access
-from server.storage.db import Database
-from server.storage.live_tables import live_event, live_take
-from server.storage.person_tables import consent, patient_identity
-from server.storage.report_tables import assessment, report_file, report_link, signed_report
-from server.storage.tables import (
+from sagittal.core.formats.json_tree import read_json
+from sagittal.server import audit
+from sagittal.server.services import patients, sessions
+from sagittal.server.services.errors import Conflict
+from sagittal.server.services.references import list_referenced
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.blobs import BlobStore, StoreAway
+from sagittal.server.storage.care_tables import care_team_member, emergency_access
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.live_tables import live_event, live_take
+from sagittal.server.storage.person_tables import consent, patient_identity
+from sagittal.server.storage.report_tables import assessment, report_file, report_link, signed_report
+from sagittal.server.storage.tables import (
     analysis,
     analysis_file,
     device_check,
@@ -55,7 +55,7 @@ from server.storage.tables import (
     session_video,
     tuning,
 )
-from server.storage.tables import audit as audit_table
+from sagittal.server.storage.tables import audit as audit_table
 
 log = logging.getLogger(__name__)
 

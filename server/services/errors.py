@@ -7,7 +7,7 @@ too_many_files · 422 bad_value · 503 node_away, blob_damaged, blob_missing · 
 
 from __future__ import annotations
 
-from core.errors import SagittalError
+from sagittal.core.errors import SagittalError
 
 
 class ServiceError(SagittalError):

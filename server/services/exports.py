@@ -12,24 +12,24 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sqlalchemy import Connection, insert, select
 
-from core.events.edits import read_edit
-from server import audit
-from server.export import kinds
-from server.export.content import SignedForm, VisitFacts, open_content
-from server.export.kinds import EXPORTED, ExportKind, name_file
-from server.jobs.queue import EXPORT, VIEW_COLUMNS, Claim, JobQueue, JobView, job_view
-from server.services import analyses, edit_log, patients, sessions, signed_reports
-from server.services.errors import Conflict
-from server.services.histories import AnalysedSession
-from server.services.patients import Patient
-from server.services.provenance import CODE_VERSION
-from server.services.sessions import Session
-from server.services.shown_take import make_key, submit_for
-from server.storage.blobs import Blob
-from server.storage.tables import analysis_file, job
+from sagittal.core.events.edits import read_edit
+from sagittal.server import audit
+from sagittal.server.export import kinds
+from sagittal.server.export.content import SignedForm, VisitFacts, open_content
+from sagittal.server.export.kinds import EXPORTED, ExportKind, name_file
+from sagittal.server.jobs.queue import EXPORT, VIEW_COLUMNS, Claim, JobQueue, JobView, job_view
+from sagittal.server.services import analyses, edit_log, patients, sessions, signed_reports
+from sagittal.server.services.errors import Conflict
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.services.sessions import Session
+from sagittal.server.services.shown_take import make_key, submit_for
+from sagittal.server.storage.blobs import Blob
+from sagittal.server.storage.tables import analysis_file, job
 
 if TYPE_CHECKING:
-    from core.formats.source import SourceFile
+    from sagittal.core.formats.source import SourceFile
 
 SIGNED: Final = "signed-"
 """Begin of the names of the signed report's documents among the files of a job."""

@@ -9,21 +9,21 @@ from typing import Final
 
 from sqlalchemy import Connection
 
-from core.change.limits import Limb
-from core.condition import is_alike
-from core.feedback import AnalysedStride, Cue, split
-from core.frames import Side
-from core.parameters import cycle_curves
-from core.parameters.rows import Column
-from server.report import feedback as report
-from server.report.bundle import Bundle
-from server.report.feedback import FeedbackView
-from server.report.feedback_beside import PreviousTraining, side_effects
-from server.services import prescriptions
-from server.services.histories import AnalysedSession
-from server.services.patients import Patient
-from server.services.prescriptions import TrainedTake
-from server.services.reviewed import ReviewedAnalyses
+from sagittal.core.change.limits import Limb
+from sagittal.core.condition import is_alike
+from sagittal.core.feedback import AnalysedStride, Cue, split
+from sagittal.core.frames import Side
+from sagittal.core.parameters import cycle_curves
+from sagittal.core.parameters.rows import Column
+from sagittal.server.report import feedback as report
+from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.feedback import FeedbackView
+from sagittal.server.report.feedback_beside import PreviousTraining, side_effects
+from sagittal.server.services import prescriptions
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.prescriptions import TrainedTake
+from sagittal.server.services.reviewed import ReviewedAnalyses
 
 REASONS: Final = {
     "no_feedback": "No live take of this session gave feedback.",

@@ -19,17 +19,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from core.formats.json_tree import read_json
-from core.formats.live_log import LATEST_US, MOST_FRAME_BYTES, LogRecord, record
-from core.formats.live_reader import find_start_us
-from server import audit
-from server.services import erasure, live, live_recordings, recordings, videos
-from server.services.errors import Conflict, NotFound, ServiceError, TooLarge
-from server.settings import Settings
-from server.storage import fs, segments
-from server.storage.blobs import BlobStore
-from server.storage.db import Database
-from server.storage.tables import now
+from sagittal.core.formats.json_tree import read_json
+from sagittal.core.formats.live_log import LATEST_US, MOST_FRAME_BYTES, LogRecord, record
+from sagittal.core.formats.live_reader import find_start_us
+from sagittal.server import audit
+from sagittal.server.services import erasure, live, live_recordings, recordings, videos
+from sagittal.server.services.errors import Conflict, NotFound, ServiceError, TooLarge
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs, segments
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import now
 
 log = logging.getLogger(__name__)
 

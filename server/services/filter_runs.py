@@ -11,19 +11,27 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sqlalchemy import Connection, insert, select
 
-from core.fusion.algorithms.choice import require_filters
-from server import audit
-from server.jobs.queue import COMPARE_FILTERS, Claim, JobQueue, JobView
-from server.services import analyses, analysing, edit_log, reference_files
-from server.services.errors import NotFound
-from server.services.provenance import CODE_VERSION
-from server.services.shown_take import submit_on_shown
-from server.storage.blobs import Blob, BlobStore
-from server.storage.tables import analysis, filter_run, filter_run_file, new_id, now, recording, session
+from sagittal.core.fusion.algorithms.choice import require_filters
+from sagittal.server import audit
+from sagittal.server.jobs.queue import COMPARE_FILTERS, Claim, JobQueue, JobView
+from sagittal.server.services import analyses, analysing, edit_log, reference_files
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.services.shown_take import submit_on_shown
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.tables import (
+    analysis,
+    filter_run,
+    filter_run_file,
+    new_id,
+    now,
+    recording,
+    session,
+)
 
 if TYPE_CHECKING:
-    from core.formats.source import SourceFile
-    from core.pipeline import Progress
+    from sagittal.core.formats.source import SourceFile
+    from sagittal.core.pipeline import Progress
 
 
 ANALYSED: Final = 0.4
@@ -59,12 +67,12 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progre
     SagittalError
         the reference cannot be read, or no filter ran; the code and the sentence say why.
     """
-    from core.events.edits import read_edit
-    from core.events.result import Strides
-    from core.filter_comparison import FilterRequest, compare_filters
-    from core.formats.orientation_table import read_orientation_table
-    from core.measure import measure_gait
-    from server.report.filter_files import filter_run_files
+    from sagittal.core.events.edits import read_edit
+    from sagittal.core.events.result import Strides
+    from sagittal.core.filter_comparison import FilterRequest, compare_filters
+    from sagittal.core.formats.orientation_table import read_orientation_table
+    from sagittal.core.measure import measure_gait
+    from sagittal.server.report.filter_files import filter_run_files
 
     reference = None
     if params["reference"] is not None:

@@ -9,18 +9,18 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from core.condition import WalkingCondition, is_alike
-from core.norms import Norms, NormValue, look_up_norms, temporal_values
-from server.report import daily_trend
-from server.report.daily_trend import CapacityVisit, PerformanceDay
-from server.report.numbers import Numbers
-from server.report.trends import AnalysedVisit, VisitKind
-from server.services import analyses, edit_log, programmes, sessions
-from server.services.errors import NotFound
-from server.services.patients import Patient
-from server.services.programmes import Programme
-from server.services.reviewed import ReviewedAnalyses
-from server.services.sessions import Session
+from sagittal.core.condition import WalkingCondition, is_alike
+from sagittal.core.norms import Norms, NormValue, look_up_norms, temporal_values
+from sagittal.server.report import daily_trend
+from sagittal.server.report.daily_trend import CapacityVisit, PerformanceDay
+from sagittal.server.report.numbers import Numbers
+from sagittal.server.report.trends import AnalysedVisit, VisitKind
+from sagittal.server.services import analyses, edit_log, programmes, sessions
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.programmes import Programme
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.sessions import Session
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,12 +16,12 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, delete, insert, select, update
 
-from core.errors import SagittalError
-from server import audit
-from server.services import patients
-from server.services.errors import Conflict, ServiceError
-from server.storage.db import Database
-from server.storage.field_cipher import (
+from sagittal.core.errors import SagittalError
+from sagittal.server import audit
+from sagittal.server.services import patients
+from sagittal.server.services.errors import Conflict, ServiceError
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.field_cipher import (
     FieldKeys,
     KeyUnusable,
     add_key,
@@ -30,9 +30,9 @@ from server.storage.field_cipher import (
     read_keys,
     say_field,
 )
-from server.storage.person_tables import identity_key, patient_identity
-from server.storage.tables import now
-from web.user_text import UserText
+from sagittal.server.storage.person_tables import identity_key, patient_identity
+from sagittal.server.storage.tables import now
+from sagittal.web.user_text import UserText
 
 FIELDS: Final = ("name", "born_on", "record_number", "insurance_number", "contact")
 MOST: Final[Mapping[str, int]] = {

@@ -8,13 +8,13 @@ from typing import Any
 
 from sqlalchemy import Connection, Select, bindparam, func, join, select
 
-from server import audit
-from server.auth.identity import Identity
-from server.auth.sight import only_seen
-from server.jobs.queue import VIEW_COLUMNS, JobQueue, JobView
-from server.services.errors import NotFound
-from server.storage.db import Database
-from server.storage.tables import ACTIVE_STATES, job, patient, recording, session
+from sagittal.server import audit
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.sight import only_seen
+from sagittal.server.jobs.queue import VIEW_COLUMNS, JobQueue, JobView
+from sagittal.server.services.errors import NotFound
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import ACTIVE_STATES, job, patient, recording, session
 
 
 @dataclass(frozen=True)

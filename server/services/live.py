@@ -19,14 +19,14 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, bindparam, insert, select, update
 
-from core.errors import ParameterError
-from core.recording import GivenLimits
-from server import audit
-from server.auth.tokens import new_token, token_hash
-from server.services import devices, sessions
-from server.services.errors import Conflict, NodeAway, NotFound, ServiceError
-from server.storage.live_tables import OPEN_TAKE_STATES, live_event, live_take
-from server.storage.tables import new_id, now, patient, session, user
+from sagittal.core.errors import ParameterError
+from sagittal.core.recording import GivenLimits
+from sagittal.server import audit
+from sagittal.server.auth.tokens import new_token, token_hash
+from sagittal.server.services import devices, sessions
+from sagittal.server.services.errors import Conflict, NodeAway, NotFound, ServiceError
+from sagittal.server.storage.live_tables import OPEN_TAKE_STATES, live_event, live_take
+from sagittal.server.storage.tables import new_id, now, patient, session, user
 
 ALPHABET = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
 """Characters of a code: none that looks or sounds on a tablet like another (0 O, 1 I L)."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from sqlalchemy import Connection, update
 
-from server.services.errors import NodeAway
-from server.services.live import LiveTakeRecord, TakeOwner, get
-from server.storage.live_tables import live_take
+from sagittal.server.services.errors import NodeAway
+from sagittal.server.services.live import LiveTakeRecord, TakeOwner, get
+from sagittal.server.storage.live_tables import live_take
 
 
 def claim_take(c: Connection, take_id: str, owner: TakeOwner) -> LiveTakeRecord:

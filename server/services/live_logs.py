@@ -14,17 +14,17 @@ from pathlib import Path
 
 from sqlalchemy import Connection, insert, select
 
-from core.errors import InputError
-from core.formats.live_log import parse_hello, read_batch_header
-from server import audit
-from server.jobs.queue import JobQueue
-from server.services import live_recordings, sessions
-from server.services.errors import Conflict, NotFound
-from server.settings import Settings
-from server.storage import fs, segments
-from server.storage.blobs import BlobStore
-from server.storage.db import Database
-from server.storage.live_tables import live_take
+from sagittal.core.errors import InputError
+from sagittal.core.formats.live_log import parse_hello, read_batch_header
+from sagittal.server import audit
+from sagittal.server.jobs.queue import JobQueue
+from sagittal.server.services import live_recordings, sessions
+from sagittal.server.services.errors import Conflict, NotFound
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs, segments
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.live_tables import live_take
 
 _ID = re.compile(r"[0-9a-f]{32}")
 

@@ -13,16 +13,16 @@ from typing import Any
 
 from sqlalchemy import Connection, insert, select, update
 
-from server import audit
-from server.jobs.queue import JobQueue
-from server.services import analyses, erasure, live, live_training, recordings
-from server.services.errors import NotFound
-from server.settings import Settings
-from server.storage import fs, segments
-from server.storage.blobs import Blob, BlobStore
-from server.storage.db import Database
-from server.storage.live_tables import OPEN_TAKE_STATES, live_take
-from server.storage.tables import new_id, now, recording, recording_file, user
+from sagittal.server import audit
+from sagittal.server.jobs.queue import JobQueue
+from sagittal.server.services import analyses, erasure, live, live_training, recordings
+from sagittal.server.services.errors import NotFound
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs, segments
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.live_tables import OPEN_TAKE_STATES, live_take
+from sagittal.server.storage.tables import new_id, now, recording, recording_file, user
 
 log = logging.getLogger(__name__)
 
@@ -230,7 +230,7 @@ def _publish(
 
 def _sensors(hello: bytes) -> dict[str, Any]:
     """Device → segment, as the tablet declared them."""
-    from core.formats.live_log import parse_hello
+    from sagittal.core.formats.live_log import parse_hello
 
     return {sensor.id: sensor.segment for stream in parse_hello(hello).streams for sensor in stream.sensors}
 

@@ -12,13 +12,13 @@ from typing import Any
 
 from sqlalchemy import Connection, select, update
 
-from core.errors import SagittalError
-from server import audit
-from server.services import analyses, live, prescriptions, sessions
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.db import Database
-from server.storage.live_tables import live_event, live_take
-from server.storage.tables import session
+from sagittal.core.errors import SagittalError
+from sagittal.server import audit
+from sagittal.server.services import analyses, live, prescriptions, sessions
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.live_tables import live_event, live_take
+from sagittal.server.storage.tables import session
 
 log = logging.getLogger(__name__)
 
@@ -32,7 +32,7 @@ class LiveTraining:
     Parameters
     ----------
     height_m, protocol : of the session or the patient.
-    prescription_id, prescription, baseline : JSON of core.feedback, None = no feedback.
+    prescription_id, prescription, baseline : JSON of sagittal.core.feedback, None = no feedback.
     """
 
     height_m: float | None

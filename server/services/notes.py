@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, delete, insert, select
 
-from server import audit
-from server.services import patients
-from server.services.calendar_days import require_day
-from server.services.errors import NotAllowed, NotFound, ServiceError
-from server.storage.tables import new_id, now, patient_note, user
+from sagittal.server import audit
+from sagittal.server.services import patients
+from sagittal.server.services.calendar_days import require_day
+from sagittal.server.services.errors import NotAllowed, NotFound, ServiceError
+from sagittal.server.storage.tables import new_id, now, patient_note, user
 
 MOST_CHARACTERS = 10_000
 

@@ -1,6 +1,6 @@
 """The process that makes one PDF and ends: its libraries and its memory never meet the web process.
 
-Started by server/services/pdfs.py as `python -m server.services.paper_child <socket> <parent pid>`.
+Started by server/services/pdfs.py as `python -m sagittal.server.services.paper_child <socket> <parent pid>`.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ import logging
 
 import msgspec
 
-from core.errors import SagittalError
-from server.processes.child import enter_child
-from server.report.pdf import render_pdf
-from web.user_text import encode_user_text
+from sagittal.core.errors import SagittalError
+from sagittal.server.processes.child import enter_child
+from sagittal.server.report.pdf import render_pdf
+from sagittal.web.user_text import encode_user_text
 
 
 class PaperReply(msgspec.Struct, frozen=True):

@@ -20,15 +20,15 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, Table, or_, select
 
-from server.export.zipping import ZipSink
-from server.services import identities, patients
-from server.services.provenance import CODE_VERSION
-from server.storage.archive import PIECE
-from server.storage.blobs import BlobStore, IntegrityError
-from server.storage.db import Database
-from server.storage.field_cipher import KeyUnusable, ValueUnreadable
-from server.storage.person_tables import patient_identity
-from server.storage.tables import audit, metadata, now, patient, user
+from sagittal.server.export.zipping import ZipSink
+from sagittal.server.services import identities, patients
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.storage.archive import PIECE
+from sagittal.server.storage.blobs import BlobStore, IntegrityError
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.field_cipher import KeyUnusable, ValueUnreadable
+from sagittal.server.storage.person_tables import patient_identity
+from sagittal.server.storage.tables import audit, metadata, now, patient, user
 
 _INTO: Final = "w"
 """How a zip's own file is opened; on the disk nothing is."""

@@ -12,18 +12,18 @@ from unicodedata import normalize
 from sqlalchemy import Connection, Select, bindparam, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
-from core.frames import Side
-from server import audit
-from server.auth.identity import Identity
-from server.auth.sight import TEAMS_ARE_ON, only_seen
-from server.jobs.queue import BESIDE
-from server.services import jobs
-from server.services.errors import Conflict, NotFound, ServiceError
-from server.storage.columns import make_all
-from server.storage.tables import ACTIVE_STATES, job, new_id, now, patient, recording, session
+from sagittal.core.frames import Side
+from sagittal.server import audit
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.sight import TEAMS_ARE_ON, only_seen
+from sagittal.server.jobs.queue import BESIDE
+from sagittal.server.services import jobs
+from sagittal.server.services.errors import Conflict, NotFound, ServiceError
+from sagittal.server.storage.columns import make_all
+from sagittal.server.storage.tables import ACTIVE_STATES, job, new_id, now, patient, recording, session
 
 if TYPE_CHECKING:
-    from server.services.sessions import Session
+    from sagittal.server.services.sessions import Session
 
 CHANGEABLE = frozenset({"code", "sex", "birth_year", "height_m", "affected_side", "is_control", "note"})
 

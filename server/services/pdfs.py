@@ -6,14 +6,14 @@ from typing import Final
 
 import msgspec
 
-from server.processes.errand import ErrandTurn, TooManyErrands, run_errand
-from server.report.pdf import PdfMissing
-from server.services import signed_reports
-from server.services.errors import ServiceError
-from server.services.paper_child import PaperReply
-from server.settings import Settings
-from server.storage.blobs import BlobStore
-from server.storage.db import Database
+from sagittal.server.processes.errand import ErrandTurn, TooManyErrands, run_errand
+from sagittal.server.report.pdf import PdfMissing
+from sagittal.server.services import signed_reports
+from sagittal.server.services.errors import ServiceError
+from sagittal.server.services.paper_child import PaperReply
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.db import Database
 
 LONGEST_S: Final = 60.0
 """Longest one may take; a report takes some seconds."""
@@ -37,7 +37,7 @@ def make_pdf(settings: Settings, document: bytes) -> bytes:
     """
     try:
         with _turn.take():
-            answer = run_errand("server.services.paper_child", settings, document, LONGEST_S)
+            answer = run_errand("sagittal.server.services.paper_child", settings, document, LONGEST_S)
     except TooManyErrands as error:
         raise PdfFailed("busy", "Other PDFs are being made. Try again in some seconds.") from error
     except TimeoutError as error:

@@ -14,19 +14,19 @@ from typing import Any
 
 from sqlalchemy import Connection, Select, bindparam, insert, select, update
 
-from core.change import ChangeLimit, find_detectable_change
-from core.change.limits import Limb
-from core.feedback import Baseline, Cue, Prescription
-from core.frames import Side
-from core.parameters.catalogue import CATALOGUE
-from server import audit
-from server.services import patients, sessions, targets
-from server.services.errors import Conflict, NotFound, ServiceError
-from server.services.patients import Patient
-from server.services.reviewed import ReviewedAnalyses
-from server.services.targets import AnalysedWalk
-from server.storage.live_tables import live_event, live_take
-from server.storage.tables import new_id, now, prescription, session, user
+from sagittal.core.change import ChangeLimit, find_detectable_change
+from sagittal.core.change.limits import Limb
+from sagittal.core.feedback import Baseline, Cue, Prescription
+from sagittal.core.frames import Side
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server import audit
+from sagittal.server.services import patients, sessions, targets
+from sagittal.server.services.errors import Conflict, NotFound, ServiceError
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.targets import AnalysedWalk
+from sagittal.server.storage.live_tables import live_event, live_take
+from sagittal.server.storage.tables import new_id, now, prescription, session, user
 
 
 @dataclass(frozen=True)

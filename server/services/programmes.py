@@ -10,12 +10,12 @@ from typing import Any, Literal
 
 from sqlalchemy import ColumnElement, Connection, delete, insert, select, update
 
-from server import audit
-from server.services import patients, sessions
-from server.services.calendar_days import require_day
-from server.services.course import COURSES, SIX_WEEKS, VisitKind
-from server.services.errors import Conflict, NotFound, ServiceError
-from server.storage.tables import new_id, now, planned_visit, programme, session
+from sagittal.server import audit
+from sagittal.server.services import patients, sessions
+from sagittal.server.services.calendar_days import require_day
+from sagittal.server.services.course import COURSES, SIX_WEEKS, VisitKind
+from sagittal.server.services.errors import Conflict, NotFound, ServiceError
+from sagittal.server.storage.tables import new_id, now, planned_visit, programme, session
 
 VisitState = Literal["done", "missing", "next", "planned"]
 

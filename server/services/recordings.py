@@ -19,17 +19,17 @@ from typing import Any, Final, Literal, Self
 
 from sqlalchemy import Connection, delete, func, insert, literal, select, update
 
-from core.errors import InputError
-from server import audit
-from server.jobs.queue import TUNE, VIEW_COLUMNS, JobQueue, JobView, Priority, job_view
-from server.services.errors import Conflict, NotFound, ServiceError, TooLarge
-from server.services.provenance import CODE_VERSION
-from server.settings import Settings
-from server.storage.blobs import Blob, BlobStore
-from server.storage.db import Database
-from server.storage.fs import SizeLimitError
-from server.storage.refusal import Refusal
-from server.storage.tables import job, new_id, now, patient, recording, recording_file, session
+from sagittal.core.errors import InputError
+from sagittal.server import audit
+from sagittal.server.jobs.queue import TUNE, VIEW_COLUMNS, JobQueue, JobView, Priority, job_view
+from sagittal.server.services.errors import Conflict, NotFound, ServiceError, TooLarge
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.fs import SizeLimitError
+from sagittal.server.storage.refusal import Refusal
+from sagittal.server.storage.tables import job, new_id, now, patient, recording, recording_file, session
 
 INSPECT = "inspect"
 ANALYSE = "analyse"
@@ -55,7 +55,7 @@ class StoredRecording:
     ----------
     state : draft (not inspected since the last change), ready (inspected), failed (could not be read).
     manifest : the mapping as last set, None = nobody said anything.
-    inspection : what was found (core.quality.describe as JSON), None until inspected.
+    inspection : what was found (sagittal.core.quality.describe as JSON), None until inspected.
     job : the newest inspection, for its progress or its error.
     """
 
@@ -101,7 +101,7 @@ def set_manifest(
     c: Connection, actor: audit.Actor | None, session_id: str, manifest: Mapping[str, Any] | None
 ) -> StoredRecording:
     """Keep a mapping for the current recording; raises ManifestError, Conflict no_files."""
-    from core.formats.manifest import manifest_of  # slow import
+    from sagittal.core.formats.manifest import manifest_of  # slow import
 
     if manifest is not None:
         manifest_of(manifest)

@@ -9,12 +9,12 @@ from typing import Final
 
 from sqlalchemy import Connection, delete, func, insert, select
 
-from server import audit
-from server.services import sessions
-from server.services.errors import NotFound, TooLarge
-from server.services.recordings import RecordedFile, receive
-from server.storage.blobs import Blob, BlobStore
-from server.storage.tables import now, reference_file
+from sagittal.server import audit
+from sagittal.server.services import sessions
+from sagittal.server.services.errors import NotFound, TooLarge
+from sagittal.server.services.recordings import RecordedFile, receive
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.tables import now, reference_file
 
 MOST_FILES: Final = 20
 """References of a session (our choice)."""

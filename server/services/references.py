@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from sqlalchemy import Connection, select, union
 
-from server.storage.report_tables import report_file, signed_report
-from server.storage.tables import (
+from sagittal.server.storage.report_tables import report_file, signed_report
+from sagittal.server.storage.tables import (
     analysis,
     analysis_file,
     filter_run,

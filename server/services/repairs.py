@@ -9,11 +9,11 @@ from typing import Any, Final
 
 from sqlalchemy import Connection
 
-from core.formats.manifest import manifest_of
-from server.services import recordings
-from server.services.analyses import AnalysisRecord, file_bytes
-from server.services.analysing import REPAIRED
-from server.storage.blobs import BlobStore
+from sagittal.core.formats.manifest import manifest_of
+from sagittal.server.services import recordings
+from sagittal.server.services.analyses import AnalysisRecord, file_bytes
+from sagittal.server.services.analysing import REPAIRED
+from sagittal.server.storage.blobs import BlobStore
 
 SETUP_KEYS: Final = ("sensors", "corrections", "mounting")
 """What of a manifest says how sensors are worn and read."""

@@ -15,16 +15,16 @@ from typing import Final
 
 from sqlalchemy import ColumnElement, Connection, insert, select, update
 
-from server import audit
-from server.auth.identity import Identity
-from server.auth.roles import POLICY, Action
-from server.auth.sight import find_emergency, sees_patient
-from server.auth.tokens import new_token, token_hash
-from server.services import sessions, signed_reports
-from server.services.errors import Conflict, NotFound, ServiceError
-from server.storage.db import Database
-from server.storage.report_tables import report_link, signed_report
-from server.storage.tables import new_id, now, session, user
+from sagittal.server import audit
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import POLICY, Action
+from sagittal.server.auth.sight import find_emergency, sees_patient
+from sagittal.server.auth.tokens import new_token, token_hash
+from sagittal.server.services import sessions, signed_reports
+from sagittal.server.services.errors import Conflict, NotFound, ServiceError
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.report_tables import report_link, signed_report
+from sagittal.server.storage.tables import new_id, now, session, user
 
 MOST_DAYS: Final = 90
 USUAL_DAYS: Final = 14

@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from core.change import sort_changes
-from server.report.behind import ParameterStrides, open_row
-from server.report.bundle import Bundle
-from server.report.comparison import add_changes, compare_figures
-from server.report.headline import find_changes
-from server.report.level import level_column
-from server.report.model import PreviousVisit, ReportModel, report_model
-from server.services import analyses, controls, edit_log
-from server.services.comparisons import pair_norms
-from server.services.controls import ControlVisit
-from server.services.errors import NotFound
-from server.services.histories import AnalysedSession
-from server.services.patients import Patient
-from server.services.reviewed import ReviewedAnalyses
-from server.services.sessions import Session
+from sagittal.core.change import sort_changes
+from sagittal.server.report.behind import ParameterStrides, open_row
+from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.comparison import add_changes, compare_figures
+from sagittal.server.report.headline import find_changes
+from sagittal.server.report.level import level_column
+from sagittal.server.report.model import PreviousVisit, ReportModel, report_model
+from sagittal.server.services import analyses, controls, edit_log
+from sagittal.server.services.comparisons import pair_norms
+from sagittal.server.services.controls import ControlVisit
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.sessions import Session
 
 
 def read(

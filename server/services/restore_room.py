@@ -11,13 +11,13 @@ from contextlib import closing
 from pathlib import Path
 from typing import Final
 
-from server.services.backups import IDENTITY_KEY, count_patients_and_sessions
-from server.settings import Settings
-from server.storage import fs
-from server.storage.blob_bucket import BucketBlobs
-from server.storage.db import Database
-from server.storage.high_water import read_newest
-from server.storage.migrate import MigrationError, exists, require_current
+from sagittal.server.services.backups import IDENTITY_KEY, count_patients_and_sessions
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.blob_bucket import BucketBlobs
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import read_newest
+from sagittal.server.storage.migrate import MigrationError, exists, require_current
 
 _MAY_BE_THERE: Final = {"lost+found", "cache", "server.lock", "workers.lock", "part-locks"}
 """What an empty data folder may hold."""

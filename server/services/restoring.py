@@ -21,17 +21,17 @@ from typing import Any, Final
 
 from sqlalchemy import delete, select, update
 
-from core.formats.json_tree import read_json
-from server import audit
-from server.services import care_teams, checks, erasure, identities, patients
-from server.services.backups import (
+from sagittal.core.formats.json_tree import read_json
+from sagittal.server import audit
+from sagittal.server.services import care_teams, checks, erasure, identities, patients
+from sagittal.server.services.backups import (
     DATABASE,
     FORMAT,
     IDENTITY_KEY,
     MANIFEST,
     count_patients_and_sessions,
 )
-from server.services.restore_room import (
+from sagittal.server.services.restore_room import (
     RestoreError,
     clear_stage,
     make_empty,
@@ -39,23 +39,23 @@ from server.services.restore_room import (
     open_empty_bucket,
     require_room,
 )
-from server.services.reviewed import ReviewedAnalyses
-from server.services.tombstones import NAME as TOMBSTONES
-from server.services.tombstones import Tombstones, parse_tombstones, read_tombstones
-from server.settings import Settings
-from server.storage import fs
-from server.storage.archive import PIECE, ArchivedFile, ClinicKey, read_archive
-from server.storage.blob_folder import FolderBlobs
-from server.storage.blob_opening import write_note
-from server.storage.blobs import BlobStore, StoreAway
-from server.storage.db import Database
-from server.storage.high_water import HighWater, read_newest, set_mark
-from server.storage.live_tables import live_take
-from server.storage.migrate import MigrationError, copy_database, upgrade
-from server.storage.node_tables import failed_attempt, web_node
-from server.storage.person_tables import api_token
-from server.storage.report_tables import report_link
-from server.storage.tables import login_session, now, one_time_token, patient, session
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.tombstones import NAME as TOMBSTONES
+from sagittal.server.services.tombstones import Tombstones, parse_tombstones, read_tombstones
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.archive import PIECE, ArchivedFile, ClinicKey, read_archive
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.blob_opening import write_note
+from sagittal.server.storage.blobs import BlobStore, StoreAway
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import HighWater, read_newest, set_mark
+from sagittal.server.storage.live_tables import live_take
+from sagittal.server.storage.migrate import MigrationError, copy_database, upgrade
+from sagittal.server.storage.node_tables import failed_attempt, web_node
+from sagittal.server.storage.person_tables import api_token
+from sagittal.server.storage.report_tables import report_link
+from sagittal.server.storage.tables import login_session, now, one_time_token, patient, session
 
 RESTORED: Final = "backup.restored"
 _OURS: Final = re.compile(

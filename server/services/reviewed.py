@@ -12,21 +12,21 @@ from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar, cast
 
-from core.errors import FormatError
-from core.events.edits import Edit
-from core.measure import MeasuredGait, Tracks, measure_gait
-from core.norms.controls import ControlSession
-from core.parameters.result import Parameter
-from core.parameters.rows import Column
-from server.export.kinds import EXPORTED
-from server.report import signals, tracks
-from server.report.bundle import Bundle, apply_review, load_bundle, read_columns
-from server.report.numbers import Numbers, WalkMeans, means_of, numbers_of, read_means, read_numbers
-from server.report.wording import speak_places
-from server.services import analyses
-from server.services.edit_log import EditHistory
-from server.services.errors import Conflict
-from server.storage.blobs import BlobStore, IntegrityError, StoreAway
+from sagittal.core.errors import FormatError
+from sagittal.core.events.edits import Edit
+from sagittal.core.measure import MeasuredGait, Tracks, measure_gait
+from sagittal.core.norms.controls import ControlSession
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.rows import Column
+from sagittal.server.export.kinds import EXPORTED
+from sagittal.server.report import signals, tracks
+from sagittal.server.report.bundle import Bundle, apply_review, load_bundle, read_columns
+from sagittal.server.report.numbers import Numbers, WalkMeans, means_of, numbers_of, read_means, read_numbers
+from sagittal.server.report.wording import speak_places
+from sagittal.server.services import analyses
+from sagittal.server.services.edit_log import EditHistory
+from sagittal.server.services.errors import Conflict
+from sagittal.server.storage.blobs import BlobStore, IntegrityError, StoreAway
 
 _Value = TypeVar("_Value")
 
@@ -110,7 +110,7 @@ class ReviewedAnalyses:
 
         Raises
         ------
-        Conflict no_tracks, IntegrityError, ParameterError of core.events.edits.
+        Conflict no_tracks, IntegrityError, ParameterError of sagittal.core.events.edits.
         """
         known = self.open(found)
         if known.tracks is None:

@@ -10,15 +10,15 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, insert
 
-from core.events.edits import Edit
-from server import audit
-from server.services import analyses
-from server.services.edit_log import UNDO, EditHistory, edits_of
-from server.services.errors import Conflict
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.db import Database
-from server.storage.tables import edit as rows
-from server.storage.tables import now
+from sagittal.core.events.edits import Edit
+from sagittal.server import audit
+from sagittal.server.services import analyses
+from sagittal.server.services.edit_log import UNDO, EditHistory, edits_of
+from sagittal.server.services.errors import Conflict
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import edit as rows
+from sagittal.server.storage.tables import now
 
 ACTIONS: Final = {
     "move_event": "event.moved",
@@ -50,7 +50,8 @@ def make(
 
     Raises
     ------
-    NotFound: no analysis. Conflict: edited_meanwhile, no_tracks. ParameterError of core.events.edits.
+    NotFound: no analysis. Conflict: edited_meanwhile, no_tracks.
+    ParameterError of sagittal.core.events.edits.
     """
     found, before = _state(db, session_id, seen)
     return found, _make(db, reviewed, actor, session_id, found, before, edit, ACTIONS[edit.kind])

@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sqlalchemy import Connection, insert, select
 
-from core.errors import EstimationError, InputError
-from server import audit
-from server.jobs.queue import SENSITIVITY, Claim, JobQueue, JobView
-from server.report.bundle import read_angles
-from server.report.sensitivity import sensitivity_files, summarise_sensitivity
-from server.services import analyses, analysing, reference_files, sessions
-from server.services.errors import Conflict, NotFound
-from server.services.shown_take import submit_on_shown
-from server.storage.blobs import Blob
-from server.storage.tables import analysis_file, job, recording
+from sagittal.core.errors import EstimationError, InputError
+from sagittal.server import audit
+from sagittal.server.jobs.queue import SENSITIVITY, Claim, JobQueue, JobView
+from sagittal.server.report.bundle import read_angles
+from sagittal.server.report.sensitivity import sensitivity_files, summarise_sensitivity
+from sagittal.server.services import analyses, analysing, reference_files, sessions
+from sagittal.server.services.errors import Conflict, NotFound
+from sagittal.server.services.shown_take import submit_on_shown
+from sagittal.server.storage.blobs import Blob
+from sagittal.server.storage.tables import analysis_file, job, recording
 
 if TYPE_CHECKING:
-    from core.formats.source import SourceFile
-    from core.pipeline import Progress
-    from core.squat.sensitivity import ReferenceAngles
+    from sagittal.core.formats.source import SourceFile
+    from sagittal.core.pipeline import Progress
+    from sagittal.core.squat.sensitivity import ReferenceAngles
 
 ANALYSED: Final = 0.3
 """Share of a run after which the take is analysed again and the 24 parameters begin."""
@@ -63,7 +63,7 @@ def read_reference(content: bytes, name: str, *, from_standing: bool) -> Referen
     ------
     InputError `reference_unreadable`.
     """
-    from core.squat.sensitivity import ReferenceAngles
+    from sagittal.core.squat.sensitivity import ReferenceAngles
 
     try:
         angles = read_angles(content)
@@ -88,8 +88,8 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progre
     SagittalError
         the take has no squats that were followed, the reference cannot be read or does not fit.
     """
-    from core.body.chain.geometry import LegGeometry
-    from core.squat.sensitivity import analyse_legs
+    from sagittal.core.body.chain.geometry import LegGeometry
+    from sagittal.core.squat.sensitivity import analyse_legs
 
     settings, reference = params["settings"], None
     if settings["reference"] is not None:

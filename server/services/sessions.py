@@ -9,15 +9,15 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, bindparam, case, exists, func, insert, select, update
 
-from core.condition import CHOICES, Footwear, Orthosis, WalkingAid, WalkingCondition, WalkingPace
-from core.frames import PROTOCOLS, Protocol
-from server import audit
-from server.auth.identity import Identity
-from server.auth.sight import only_seen
-from server.jobs.queue import BESIDE
-from server.services.errors import NotFound, ServiceError
-from server.storage.columns import make_all
-from server.storage.tables import (
+from sagittal.core.condition import CHOICES, Footwear, Orthosis, WalkingAid, WalkingCondition, WalkingPace
+from sagittal.core.frames import PROTOCOLS, Protocol
+from sagittal.server import audit
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.sight import only_seen
+from sagittal.server.jobs.queue import BESIDE
+from sagittal.server.services.errors import NotFound, ServiceError
+from sagittal.server.storage.columns import make_all
+from sagittal.server.storage.tables import (
     ACTIVE_STATES,
     analysis,
     job,

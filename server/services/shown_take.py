@@ -7,10 +7,10 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from server import audit
-from server.jobs.queue import JobQueue, JobView
-from server.services import analyses, recordings
-from server.services.provenance import CODE_VERSION
+from sagittal.server import audit
+from sagittal.server.jobs.queue import JobQueue, JobView
+from sagittal.server.services import analyses, recordings
+from sagittal.server.services.provenance import CODE_VERSION
 
 
 def submit_on_shown(

@@ -16,14 +16,14 @@ import numpy as np
 import pyarrow.parquet as pq
 from pyarrow import BufferReader
 
-from core.events.foot_pitch import pitch_signal
-from core.frames import FOOT, SEGMENTS, SIDES, SUFFIX, Floats, Segment
-from server.report import signals as file
-from server.report.columns import floats_of
-from server.report.wording import VARIABLES, place_words
-from server.services import analyses
-from server.services.errors import NotFound
-from server.services.reviewed import ReviewedAnalyses, StoredAnalysis
+from sagittal.core.events.foot_pitch import pitch_signal
+from sagittal.core.frames import FOOT, SEGMENTS, SIDES, SUFFIX, Floats, Segment
+from sagittal.server.report import signals as file
+from sagittal.server.report.columns import floats_of
+from sagittal.server.report.wording import VARIABLES, place_words
+from sagittal.server.services import analyses
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.reviewed import ReviewedAnalyses, StoredAnalysis
 
 MOST_POINTS: Final = 4000
 """Parts of a window at most: as many pixels as the widest screens have across."""

@@ -13,14 +13,14 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, delete, func, insert, select, update
 
-from server import audit
-from server.services import sessions
-from server.services.analyses import AnalysisRecord
-from server.services.edit_log import EditHistory
-from server.services.errors import Conflict, NotFound, ServiceError
-from server.storage.blobs import Blob, BlobStore
-from server.storage.report_tables import assessment, report_file, signed_report
-from server.storage.tables import now, session
+from sagittal.server import audit
+from sagittal.server.services import sessions
+from sagittal.server.services.analyses import AnalysisRecord
+from sagittal.server.services.edit_log import EditHistory
+from sagittal.server.services.errors import Conflict, NotFound, ServiceError
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.report_tables import assessment, report_file, signed_report
+from sagittal.server.storage.tables import now, session
 
 MOST_CHARACTERS: Final = 10_000
 """Of the reason to reopen a report."""

@@ -15,24 +15,24 @@ from typing import Any, Final
 
 from sqlalchemy import Connection
 
-from core.errors import SagittalError
-from core.frames import Protocol
-from server.auth.identity import Identity
-from server.export.ages import coarsen_age
-from server.report.analysis_json import parameter_row
-from server.report.exports import strides_csv
-from server.report.study_tables import StudyTables, StudyTake, write_study
-from server.services import analyses, edit_log, patients, recordings, sessions
-from server.services.errors import Conflict
-from server.services.exports import make_pseudonym
-from server.services.histories import AnalysedSession
-from server.services.patients import Patient
-from server.services.provenance import CODE_VERSION
-from server.services.reviewed import ReviewedAnalyses
-from server.services.sessions import Session
-from server.storage.blobs import StoreAway
-from server.storage.db import Database
-from server.storage.tables import now
+from sagittal.core.errors import SagittalError
+from sagittal.core.frames import Protocol
+from sagittal.server.auth.identity import Identity
+from sagittal.server.export.ages import coarsen_age
+from sagittal.server.report.analysis_json import parameter_row
+from sagittal.server.report.exports import strides_csv
+from sagittal.server.report.study_tables import StudyTables, StudyTake, write_study
+from sagittal.server.services import analyses, edit_log, patients, recordings, sessions
+from sagittal.server.services.errors import Conflict
+from sagittal.server.services.exports import make_pseudonym
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.sessions import Session
+from sagittal.server.storage.blobs import StoreAway
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import now
 
 MOST_VISITS: Final = 300
 """Of one study; more are asked for in parts."""

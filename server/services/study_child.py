@@ -1,7 +1,8 @@
 """The process that makes the tables of one study and ends: reading hundreds of results stops nobody.
 
-Started by server/services/study_maker.py as `python -m server.services.study_child <socket> <parent pid>`. It
-reads the database and writes nothing.
+Started by server/services/study_maker.py as
+`python -m sagittal.server.services.study_child <socket> <parent pid>`. It reads the database and
+writes nothing.
 """
 
 from __future__ import annotations
@@ -11,16 +12,16 @@ from contextlib import closing
 
 import msgspec
 
-from core.errors import SagittalError
-from server.auth.identity import Identity
-from server.export.zipping import zip_files
-from server.processes.child import enter_child
-from server.services.reviewed import ReviewedAnalyses
-from server.services.studies import StudyChoice, make_study
-from server.settings import Settings
-from server.storage.blob_opening import open_blobs
-from server.storage.db import Database
-from web.user_text import encode_user_text
+from sagittal.core.errors import SagittalError
+from sagittal.server.auth.identity import Identity
+from sagittal.server.export.zipping import zip_files
+from sagittal.server.processes.child import enter_child
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.studies import StudyChoice, make_study
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blob_opening import open_blobs
+from sagittal.server.storage.db import Database
+from sagittal.web.user_text import encode_user_text
 
 
 class StudyReply(msgspec.Struct, frozen=True):

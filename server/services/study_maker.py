@@ -6,16 +6,17 @@ from typing import Final
 
 import msgspec
 
-from server.auth.identity import Identity
-from server.processes.child import FAR_BEHIND
-from server.processes.errand import ErrandTurn, TooManyErrands, run_errand
-from server.services.errors import Conflict, ServiceError
-from server.services.studies import StudyChoice, check_size, list_visits
-from server.services.study_child import StudyReply
-from server.settings import Settings
-from server.storage.db import Database
-from web.user_text import encode_user_text
+from sagittal.server.auth.identity import Identity
+from sagittal.server.processes.child import FAR_BEHIND
+from sagittal.server.processes.errand import ErrandTurn, TooManyErrands, run_errand
+from sagittal.server.services.errors import Conflict, ServiceError
+from sagittal.server.services.studies import StudyChoice, check_size, list_visits
+from sagittal.server.services.study_child import StudyReply
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database
+from sagittal.web.user_text import encode_user_text
 
+CHILD: Final = "sagittal.server.services.study_child"
 LONGEST_S: Final = 300.0
 """Longest one may take; the most visits that are allowed take some ten seconds of computing."""
 
@@ -43,7 +44,7 @@ def fetch_study(
     order = msgspec.msgpack.encode((who, choice), enc_hook=encode_user_text)
     try:
         with _turn.take():
-            answer = run_errand("server.services.study_child", settings, order, LONGEST_S, FAR_BEHIND)
+            answer = run_errand(CHILD, settings, order, LONGEST_S, FAR_BEHIND)
     except TooManyErrands as error:
         raise StudyFailed("busy", "Other studies are being made. Try again in a minute.") from error
     except TimeoutError as error:

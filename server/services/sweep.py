@@ -15,13 +15,13 @@ import logging
 
 from sqlalchemy import Connection
 
-from server.services import custody, erasure, films, uploads
-from server.services.references import list_referenced
-from server.settings import Settings
-from server.storage import fs
-from server.storage.blobs import INCOMING, BlobStore
-from server.storage.db import Database
-from server.storage.tables import now
+from sagittal.server.services import custody, erasure, films, uploads
+from sagittal.server.services.references import list_referenced
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.blobs import INCOMING, BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import now
 
 log = logging.getLogger(__name__)
 

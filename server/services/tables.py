@@ -19,17 +19,17 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from sqlalchemy import Connection, select
 
-from core.errors import InputError
-from server import audit
-from server.services import recordings
-from server.services.errors import NotFound
-from server.services.recordings import StoredRecording
-from server.storage.blobs import BlobStore
-from server.storage.tables import recording
+from sagittal.core.errors import InputError
+from sagittal.server import audit
+from sagittal.server.services import recordings
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.recordings import StoredRecording
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.tables import recording
 
 if TYPE_CHECKING:
-    from core.formats.source import SourceFile
-    from core.formats.table_guess import TableLook
+    from sagittal.core.formats.source import SourceFile
+    from sagittal.core.formats.table_guess import TableLook
 
 MOST_EARLIER: Final = 200
 """Earlier recordings that are looked through for a table of the same shape, the newest first."""
@@ -107,7 +107,7 @@ def map_tables(
     source: Mapping[str, Any],
 ) -> StoredRecording:
     """Describe tables of one shape in the manifest; raises NotFound, ManifestError, Conflict no_files."""
-    from core.formats.table_guess import make_entry  # slow import
+    from sagittal.core.formats.table_guess import make_entry  # slow import
 
     this = recordings.require_current(c, session_id)
     missing = set(names) - {f.name for f in this.files}
@@ -137,11 +137,11 @@ def _fits(c: Connection, blobs: BlobStore, session_id: str, name: str, source: M
 
 
 def _check(file: SourceFile, source: Mapping[str, Any]) -> tuple[TableReading, ...]:
-    from core.formats.draft import finish  # slow imports
-    from core.formats.manifest import manifest_of
-    from core.formats.table_guess import make_entry, read_sample
-    from core.quality.signals import measure_signal
-    from core.quality.suspicion import list_suspicions
+    from sagittal.core.formats.draft import finish  # slow imports
+    from sagittal.core.formats.manifest import manifest_of
+    from sagittal.core.formats.table_guess import make_entry, read_sample
+    from sagittal.core.quality.signals import measure_signal
+    from sagittal.core.quality.suspicion import list_suspicions
 
     (spec,) = manifest_of({"sources": [make_entry(source, file.name)]}).sources
     checks = []
@@ -161,7 +161,7 @@ def _check(file: SourceFile, source: Mapping[str, Any]) -> tuple[TableReading, .
 
 
 def _files(this: StoredRecording, blobs: BlobStore) -> Iterator[SourceFile]:
-    from server.storage.blob_source import open_source  # slow import
+    from sagittal.server.storage.blob_source import open_source  # slow import
 
     for f in this.files:
         yield open_source(blobs, this.patient_id, f.name, f.size, f.sha256)
@@ -171,9 +171,9 @@ def _tables(
     this: StoredRecording, blobs: BlobStore
 ) -> Iterator[tuple[str, TableLook, Mapping[str, Any] | None]]:
     """Name of every table, its look, and the entry of the manifest that describes it."""
-    from core.formats import bids  # slow imports
-    from core.formats.manifest import manifest_of
-    from core.formats.table_guess import look_into_table
+    from sagittal.core.formats import bids  # slow imports
+    from sagittal.core.formats.manifest import manifest_of
+    from sagittal.core.formats.table_guess import look_into_table
 
     said = [s for m in (this.manifest or {}, *_uploaded(this, blobs)) for s in m.get("sources") or ()]
     said = [s for s in said if s.get("columns")]
@@ -191,8 +191,8 @@ def _tables(
 
 def _uploaded(this: StoredRecording, blobs: BlobStore) -> Iterator[dict[str, Any]]:
     """Manifests among the files that can be read."""
-    from core.formats.json_tree import read_json  # slow imports
-    from core.formats.manifest import MAX_BYTES, is_manifest, manifest_of
+    from sagittal.core.formats.json_tree import read_json  # slow imports
+    from sagittal.core.formats.manifest import MAX_BYTES, is_manifest, manifest_of
 
     for file in _files(this, blobs):
         if file.name.lower().endswith(".json") and file.size < MAX_BYTES:
@@ -230,7 +230,7 @@ def _recall(c: Connection, blobs: BlobStore, this: StoredRecording, look: TableL
 
 def _as_template(entry: Mapping[str, Any], look: TableLook) -> dict[str, Any]:
     """What an entry says of any table of this shape; a sensor that no column names is called as its file."""
-    from core.formats.table_guess import THE_FILE  # slow import
+    from sagittal.core.formats.table_guess import THE_FILE  # slow import
 
     said = {k: v for k, v in entry.items() if k != "file"}
     if set(look.source["columns"]) == {THE_FILE} and len(entry["columns"]) == 1:

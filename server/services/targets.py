@@ -9,23 +9,23 @@ from typing import Final
 
 from sqlalchemy import Connection
 
-from core.condition import is_alike
-from core.feedback import Target
-from core.feedback.prescription import TargetSource
-from core.frames import SIDES, Side
-from core.norms import Norms, NormValue
-from core.norms.values import is_angle
-from core.parameters.catalogue import CATALOGUE
-from core.parameters.result import Parameter
-from core.plurals import plural
-from server.report.numbers import Numbers
-from server.report.wording import GROUPS, NO_NORM
-from server.services import comparisons, controls, histories
-from server.services.histories import AnalysedSession
-from server.services.patients import Patient
-from server.services.reviewed import ReviewedAnalyses
-from server.services.sessions import WALKS, Session
-from web.words import day
+from sagittal.core.condition import is_alike
+from sagittal.core.feedback import Target
+from sagittal.core.feedback.prescription import TargetSource
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.norms import Norms, NormValue
+from sagittal.core.norms.values import is_angle
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.plurals import plural
+from sagittal.server.report.numbers import Numbers
+from sagittal.server.report.wording import GROUPS, NO_NORM
+from sagittal.server.services import comparisons, controls, histories
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.sessions import WALKS, Session
+from sagittal.web.words import day
 
 FEWEST: Final = 5
 """Strides below which a person's own mean and SD are no target (our choice)."""

@@ -13,10 +13,10 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, select
 
-from core.formats.json_tree import read_json
-from server.services.erasure import ERASED, SESSION_ERASED
-from server.storage import fs
-from server.storage.tables import audit
+from sagittal.core.formats.json_tree import read_json
+from sagittal.server.services.erasure import ERASED, SESSION_ERASED
+from sagittal.server.storage import fs
+from sagittal.server.storage.tables import audit
 
 NAME: Final = "erased.json"
 

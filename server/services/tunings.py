@@ -18,23 +18,23 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sqlalchemy import Connection, insert, select
 
-from core.errors import ParameterError
-from core.fusion.algorithms.choice import require_tunable
-from core.fusion.algorithms.schemes import Scheme as Scheme
-from core.fusion.algorithms.swarm import MOST_OF_SWARM as MOST_OF_SWARM
-from server import audit
-from server.jobs.queue import TUNE, Claim, JobQueue, JobView, Priority
-from server.services import recordings, sessions
-from server.services.analyses import digest_json
-from server.services.errors import Conflict, NotFound
-from server.services.provenance import CODE_VERSION
-from server.storage.tables import new_id, now, recording, tuning
+from sagittal.core.errors import ParameterError
+from sagittal.core.fusion.algorithms.choice import require_tunable
+from sagittal.core.fusion.algorithms.schemes import Scheme as Scheme
+from sagittal.core.fusion.algorithms.swarm import MOST_OF_SWARM as MOST_OF_SWARM
+from sagittal.server import audit
+from sagittal.server.jobs.queue import TUNE, Claim, JobQueue, JobView, Priority
+from sagittal.server.services import recordings, sessions
+from sagittal.server.services.analyses import digest_json
+from sagittal.server.services.errors import Conflict, NotFound
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.storage.tables import new_id, now, recording, tuning
 
 if TYPE_CHECKING:
-    from core.formats.source import SourceFile
-    from core.fusion.algorithms.swarm import Swarm
-    from core.fusion.algorithms.tuning import GainTuner, Keep, TuningResult
-    from server.jobs.attempt import Attempt
+    from sagittal.core.formats.source import SourceFile
+    from sagittal.core.fusion.algorithms.swarm import Swarm
+    from sagittal.core.fusion.algorithms.tuning import GainTuner, Keep, TuningResult
+    from sagittal.server.jobs.attempt import Attempt
 
 RESULT: Final = "tuning.json"
 TRIAL: Final = ".npz"
@@ -67,7 +67,10 @@ class TuningOrder:
 
 @dataclass(frozen=True)
 class StoredTuning:
-    """A finished tuning: what went in, by what version, and what came out (core.fusion.algorithms.tuning)."""
+    """A finished tuning: what went in, by what version, and what came out.
+
+    See sagittal.core.fusion.algorithms.tuning.
+    """
 
     id: str
     recording_id: str
@@ -86,9 +89,9 @@ def prepare(files: Sequence[SourceFile], order: TuningOrder) -> GainTuner:
     ------
     SagittalError : trials cannot be read or split, no such algorithm; the sentence says what to do.
     """
-    from core.fusion.algorithms.benchmark import read_trial
-    from core.fusion.algorithms.swarm import SwarmRules
-    from core.fusion.algorithms.tuning import GainTuner, TrialSplit
+    from sagittal.core.fusion.algorithms.benchmark import read_trial
+    from sagittal.core.fusion.algorithms.swarm import SwarmRules
+    from sagittal.core.fusion.algorithms.tuning import GainTuner, TrialSplit
 
     paths = [(PurePosixPath(f.name), f) for f in files]
     trials = [read_trial(path.stem, f.read()) for path, f in paths if path.suffix == TRIAL]

@@ -15,15 +15,15 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, delete, insert, select, update
 
-from server import audit
-from server.services import erasure, recordings
-from server.services.errors import Conflict, NotFound, ServiceError, TooLarge
-from server.services.recordings import RecordedFile
-from server.settings import Settings
-from server.storage import fs
-from server.storage.blobs import Blob, BlobStore
-from server.storage.db import Database
-from server.storage.tables import file_upload, new_id, now
+from sagittal.server import audit
+from sagittal.server.services import erasure, recordings
+from sagittal.server.services.errors import Conflict, NotFound, ServiceError, TooLarge
+from sagittal.server.services.recordings import RecordedFile
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import file_upload, new_id, now
 
 ABANDONED: Final = dt.timedelta(days=1)
 """An upload to which nothing was added for so long goes."""

@@ -13,12 +13,12 @@ from typing import Final
 
 from sqlalchemy import Connection, delete, insert, select, update
 
-from server import audit
-from server.services import sessions
-from server.services.errors import NotFound, ServiceError
-from server.services.recordings import RecordedFile, receive
-from server.storage.blobs import Blob, BlobStore
-from server.storage.tables import now, session_video
+from sagittal.server import audit
+from sagittal.server.services import sessions
+from sagittal.server.services.errors import NotFound, ServiceError
+from sagittal.server.services.recordings import RecordedFile, receive
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.tables import now, session_video
 
 BEGINS: Final = 12
 """Bytes that tell what a file is."""

@@ -9,15 +9,15 @@ from typing import Final
 
 from sqlalchemy import Connection
 
-from core.change import Change, parameter_changes
-from core.condition import WalkingCondition, is_alike, is_comparable
-from core.frames import Side
-from core.parameters.result import Parameter
-from core.parameters.takes import join_takes
-from server.report.trends import VisitKind
-from server.services import analyses, edit_log, sessions
-from server.services.histories import AnalysedSession, classify_visit
-from server.services.reviewed import UNREADABLE, ReviewedAnalyses
+from sagittal.core.change import Change, parameter_changes
+from sagittal.core.condition import WalkingCondition, is_alike, is_comparable
+from sagittal.core.frames import Side
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.takes import join_takes
+from sagittal.server.report.trends import VisitKind
+from sagittal.server.services import analyses, edit_log, sessions
+from sagittal.server.services.histories import AnalysedSession, classify_visit
+from sagittal.server.services.reviewed import UNREADABLE, ReviewedAnalyses
 
 SPEED: Final = "gait_speed_mps"
 

@@ -25,7 +25,7 @@ from typing import IO, BinaryIO, Final, Protocol
 
 import pyrage
 
-from server.storage import fs
+from sagittal.server.storage import fs
 
 PIECE: Final = 1 << 20
 _MAGIC: Final = b"age-encryption.org/"

@@ -13,8 +13,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO, ClassVar, Final
 
-from server.storage import fs
-from server.storage.blobs import (
+from sagittal.server.storage import fs
+from sagittal.server.storage.blobs import (
     Blob,
     BlobFile,
     BlobStore,
@@ -23,8 +23,8 @@ from server.storage.blobs import (
     make_damaged,
     make_missing,
 )
-from server.storage.s3_bucket import S3Bucket
-from server.storage.trash import Address, Trash, TrashedFile, name_stamp, parse_way
+from sagittal.server.storage.s3_bucket import S3Bucket
+from sagittal.server.storage.trash import Address, Trash, TrashedFile, name_stamp, parse_way
 
 SILENCE_S: Final = 15.0
 """Longest wait for the next word of the store, and for it to take a piece of a file."""

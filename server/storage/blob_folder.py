@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO, ClassVar
 
-from server.storage import fs
-from server.storage.blobs import (
+from sagittal.server.storage import fs
+from sagittal.server.storage.blobs import (
     INCOMING,
     Blob,
     BlobFile,
@@ -20,7 +20,7 @@ from server.storage.blobs import (
     make_damaged,
     make_missing,
 )
-from server.storage.trash import FolderTrash
+from sagittal.server.storage.trash import FolderTrash
 
 
 class FolderBlobs(BlobStore):

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from server.settings import Settings, SettingsError
-from server.storage import fs
-from server.storage.blob_bucket import BucketBlobs
-from server.storage.blob_folder import FolderBlobs
-from server.storage.blob_opening import explain_refusal, is_moving, read_note, write_note
-from server.storage.blobs import INCOMING, IntegrityError, StoreAway
+from sagittal.server.settings import Settings, SettingsError
+from sagittal.server.storage import fs
+from sagittal.server.storage.blob_bucket import BucketBlobs
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.blob_opening import explain_refusal, is_moving, read_note, write_note
+from sagittal.server.storage.blobs import INCOMING, IntegrityError, StoreAway
 
 
 @dataclass(frozen=True)

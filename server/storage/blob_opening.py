@@ -11,11 +11,11 @@ import logging
 from functools import partial
 from typing import Final
 
-from server.settings import Settings, SettingsError
-from server.storage import fs
-from server.storage.blob_bucket import BucketBlobs
-from server.storage.blob_folder import FolderBlobs
-from server.storage.blobs import INCOMING, BlobStore, StoreAway, is_space
+from sagittal.server.settings import Settings, SettingsError
+from sagittal.server.storage import fs
+from sagittal.server.storage.blob_bucket import BucketBlobs
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.blobs import INCOMING, BlobStore, StoreAway, is_space
 
 log = logging.getLogger(__name__)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from core.formats.source import SourceFile
-from server.storage.blobs import BlobStore
+from sagittal.core.formats.source import SourceFile
+from sagittal.server.storage.blobs import BlobStore
 
 
 def open_source(store: BlobStore, space: str, name: str, size: int, sha256: str) -> SourceFile:

@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, ClassVar, Final, Self
 
-from core.errors import SagittalError
-from server.storage import fs
-from server.storage.trash import Trash
+from sagittal.core.errors import SagittalError
+from sagittal.server.storage import fs
+from sagittal.server.storage.trash import Trash
 
 PIECE: Final = 1 << 20
 """Bytes of a file that are in memory at once."""

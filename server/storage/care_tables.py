@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import CheckConstraint, Column, String, Table
 
-from server.storage.columns import UserLines, Utc, id_column, metadata, owner, reference
+from sagittal.server.storage.columns import UserLines, Utc, id_column, metadata, owner, reference
 
 clinic_option = Table(
     "clinic_option",  # what the clinic has switched on; an option without a row is off

@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-import core
+from sagittal import core
 
 VARIABLE: Final = "NUMBA_CACHE_DIR"
 """Environment variable from which numba takes its folder, when it is imported."""
@@ -24,7 +24,8 @@ KEEP_S: Final = 60 * 24 * 3600.0
 """A folder of another version that nobody has used for so long is removed."""
 
 _IMPORTED = re.compile(
-    r"^\s*(?:from|import)\s+(core(?:\.\w+)*)(?:\s+import\s+(?:\(([\w,\s]+)\)|([\w, ]+)))?", re.MULTILINE
+    r"^\s*(?:from|import)\s+(sagittal\.core(?:\.\w+)*)(?:\s+import\s+(?:\(([\w,\s]+)\)|([\w, ]+)))?",
+    re.MULTILINE,
 )
 
 
@@ -87,9 +88,11 @@ def fingerprint_filters(package: Path) -> str:
 
     Parameters
     ----------
-    package : folder of the package `core`.
+    package : folder of the package `sagittal.core`.
     """
-    sources = {".".join(("core", *_parts(p, package))): p.read_bytes() for p in package.rglob("*.py")}
+    sources = {
+        ".".join(("sagittal", "core", *_parts(p, package))): p.read_bytes() for p in package.rglob("*.py")
+    }
     waiting = [name for name, text in sources.items() if b"njit" in text]
     reached: set[str] = set()
     while waiting:

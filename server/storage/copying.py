@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from sqlalchemy import JSON, Connection, MetaData, Table, func, insert, select
 
-from server.storage.columns import Json
-from server.storage.db import highest_number, raise_number
+from sagittal.server.storage.columns import Json
+from sagittal.server.storage.db import highest_number, raise_number
 
 _AT_ONCE = 500
 """Rows in memory."""

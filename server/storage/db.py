@@ -18,9 +18,9 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, Select
 
-from server.storage.postgres import PostgresServer
-from server.storage.single import without_transactions
-from server.storage.sqlite_file import SqliteFile
+from sagittal.server.storage.postgres import PostgresServer
+from sagittal.server.storage.single import without_transactions
+from sagittal.server.storage.sqlite_file import SqliteFile
 
 Source = Path | str
 """Where a database is: the path of an SQLite file, or a URL postgresql://user:password@host:port/database."""

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from server.storage.refusal import refusal_of
+from sagittal.server.storage.refusal import refusal_of
 
 QUIET_S: Final = 60.0
 """A disk that is full on and off is reported at most this often."""

@@ -21,8 +21,8 @@ from typing import Final
 from cryptography.exceptions import InvalidTag
 from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
-from core.errors import SagittalError
-from server.storage import fs
+from sagittal.core.errors import SagittalError
+from sagittal.server.storage import fs
 
 _LINE: Final = re.compile(r"SAGITTAL-FIELD-KEY-1 ([0-9a-f]{64})")
 _VERSION: Final = b"\x01"

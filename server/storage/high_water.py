@@ -24,10 +24,10 @@ from typing import Any, Final
 from sqlalchemy import Connection, select
 from sqlalchemy.exc import SQLAlchemyError
 
-from core.formats.json_tree import read_json
-from server.storage import fs
-from server.storage.db import Database
-from server.storage.tables import audit
+from sagittal.core.formats.json_tree import read_json
+from sagittal.server.storage import fs
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import audit
 
 log = logging.getLogger(__name__)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from sqlalchemy import CheckConstraint, Column, Float, Index, Integer, String, Table, text
 
-from server.storage.append_only import make_append_only
-from server.storage.columns import Json, Utc, id_column, metadata, one_of, reference
+from sagittal.server.storage.append_only import make_append_only
+from sagittal.server.storage.columns import Json, Utc, id_column, metadata, one_of, reference
 
 TAKE_STATES = ("pairing", "open", "streaming", "finished", "closed")
 OPEN_TAKE_STATES = ("pairing", "open", "streaming")

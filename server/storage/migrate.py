@@ -20,13 +20,13 @@ from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy.exc import DatabaseError, OperationalError
 
-import server
-from server.storage import fs
-from server.storage.copying import copy_rows
-from server.storage.db import Source, engine_of
-from server.storage.postgres import PostgresServer
-from server.storage.refusal import refusal_of
-from server.storage.sqlite_file import SqliteFile
+from sagittal import server
+from sagittal.server.storage import fs
+from sagittal.server.storage.copying import copy_rows
+from sagittal.server.storage.db import Source, engine_of
+from sagittal.server.storage.postgres import PostgresServer
+from sagittal.server.storage.refusal import refusal_of
+from sagittal.server.storage.sqlite_file import SqliteFile
 
 log = logging.getLogger(__name__)
 
@@ -34,7 +34,7 @@ WAIT_S = 1.0
 """Pause between two looks whether the schema is there."""
 
 INSTALLED = Path(server.__file__).parent / "migrations"
-SOURCE = Path(server.__file__).parent.parent / "migrations"
+SOURCE = Path(server.__file__).resolve().parents[1] / "migrations"
 
 
 NO_DRIVER = (

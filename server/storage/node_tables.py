@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import CheckConstraint, Column, Index, Integer, String, Table, Text
 
-from server.storage.columns import UserString, Utc, id_column, metadata
+from sagittal.server.storage.columns import UserString, Utc, id_column, metadata
 
 web_node = Table(
     "web_node",

@@ -18,7 +18,16 @@ from sqlalchemy import (
     false,
 )
 
-from server.storage.columns import Json, UserString, Utc, id_column, metadata, one_of, owner, reference
+from sagittal.server.storage.columns import (
+    Json,
+    UserString,
+    Utc,
+    id_column,
+    metadata,
+    one_of,
+    owner,
+    reference,
+)
 
 CONSENT_PURPOSES = ("recording", "research", "teaching", "sharing")
 

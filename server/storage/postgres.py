@@ -22,8 +22,8 @@ from sqlalchemy.engine import ExceptionContext
 from sqlalchemy.exc import DBAPIError, InvalidatePoolError, OperationalError
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from server.storage.columns import metadata
-from server.storage.single import begin_with
+from sagittal.server.storage.columns import metadata
+from sagittal.server.storage.single import begin_with
 
 MAX_READERS = 45
 """As on SQLite; PostgreSQL's own limit, 100 in all, is for all programs together."""

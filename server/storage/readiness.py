@@ -10,11 +10,11 @@ from typing import ClassVar
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from server.settings import Settings
-from server.storage.blobs import BlobStore, StoreAway
-from server.storage.db import Database
-from server.storage.migrate import MigrationError, require_current
-from server.storage.refusal import Refusal, refusal_of
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blobs import BlobStore, StoreAway
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.migrate import MigrationError, require_current
+from sagittal.server.storage.refusal import Refusal, refusal_of
 
 _WORDS = {
     None: "cannot be written.",

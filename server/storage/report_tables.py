@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from sqlalchemy import CheckConstraint, Column, Integer, String, Table, UniqueConstraint
 
-from server.storage.columns import (
+from sagittal.server.storage.columns import (
     UserLines,
     UserString,
     Utc,

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Final
 from urllib.parse import urlsplit
 
-from server.settings import LOOPBACK, SettingsError
-from server.storage import fs
-from server.storage.blobs import PIECE, StoreAway
+from sagittal.server.settings import LOOPBACK, SettingsError
+from sagittal.server.storage import fs
+from sagittal.server.storage.blobs import PIECE, StoreAway
 
 if TYPE_CHECKING:
     from obstore.store import S3Store

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from core.errors import InputError
-from core.formats.live_log import (
+from sagittal.core.errors import InputError
+from sagittal.core.formats.live_log import (
     FILE_MARK,
     MOST_FRAME_BYTES,
     RECORD_HEAD,
@@ -25,8 +25,8 @@ from core.formats.live_log import (
     record,
     scan_records,
 )
-from core.plurals import plural
-from server.storage import fs
+from sagittal.core.plurals import plural
+from sagittal.server.storage import fs
 
 log = logging.getLogger(__name__)
 

@@ -16,7 +16,7 @@ from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from server.storage.single import begin_with
+from sagittal.server.storage.single import begin_with
 
 MAX_READERS = 45
 """Connections beyond the five that are kept open: more than a web process has threads."""

@@ -39,23 +39,23 @@ from sqlalchemy import (
     text,
 )
 
-from server.storage import (  # noqa: F401 - `metadata` has all tables
+from sagittal.server.storage import (  # noqa: F401 - `metadata` has all tables
     care_tables,
     live_tables,
     node_tables,
     person_tables,
     report_tables,
 )
-from server.storage.append_only import make_append_only
-from server.storage.columns import Json, UserJson, UserLines, UserString, Utc
-from server.storage.columns import describe_file as _describe_file
-from server.storage.columns import id_column as _id
-from server.storage.columns import metadata as metadata
-from server.storage.columns import new_id as new_id
-from server.storage.columns import now as now
-from server.storage.columns import one_of as _one_of
-from server.storage.columns import owner as _owner
-from server.storage.columns import reference as _ref
+from sagittal.server.storage.append_only import make_append_only
+from sagittal.server.storage.columns import Json, UserJson, UserLines, UserString, Utc
+from sagittal.server.storage.columns import describe_file as _describe_file
+from sagittal.server.storage.columns import id_column as _id
+from sagittal.server.storage.columns import metadata as metadata
+from sagittal.server.storage.columns import new_id as new_id
+from sagittal.server.storage.columns import now as now
+from sagittal.server.storage.columns import one_of as _one_of
+from sagittal.server.storage.columns import owner as _owner
+from sagittal.server.storage.columns import reference as _ref
 
 SEXES = ("female", "male")
 SIDES = ("left", "right")
@@ -255,7 +255,7 @@ device_check = Table(
     Column("device_id", UserString(32), primary_key=True, index=True),  # a serial number, never a file's name
     Column("segment", String(16), nullable=False),  # where the analysis took it to be
     Column("exchanged", Boolean, nullable=False),  # its place was said wrongly: it is not offered again
-    Column("content", Json, nullable=False),  # core.quality.devices.DeviceCheck
+    Column("content", Json, nullable=False),  # sagittal.core.quality.devices.DeviceCheck
     Column("at", Utc, nullable=False),
 )
 
@@ -286,7 +286,7 @@ filter_run = Table(
     _id(),
     _ref("analysis_id", "analysis"),
     Column("job_id", ForeignKey("job.id", ondelete="RESTRICT"), nullable=False),
-    Column("settings", Json, nullable=False),  # core.filter_comparison.FilterRequest
+    Column("settings", Json, nullable=False),  # sagittal.core.filter_comparison.FilterRequest
     Column("reference_name", UserString(500)),  # None: compared with each other only
     Column("reference_sha256", String(64)),
     Column("code_version", String(64), nullable=False),
@@ -308,7 +308,7 @@ edit = Table(
     Column("seq", Integer, primary_key=True, autoincrement=True),
     _ref("analysis_id", "analysis"),
     Column("kind", String(16), nullable=False),
-    Column("content", Json, nullable=False),  # core.events.edits.Edit; of an undo {}
+    Column("content", Json, nullable=False),  # sagittal.core.events.edits.Edit; of an undo {}
     _ref("user_id", "user", nullable=True, index=False),
     Column("at", Utc, nullable=False),
     _one_of("kind", EDIT_KINDS),
@@ -323,7 +323,7 @@ tuning = Table(
     Column("job_id", ForeignKey("job.id", ondelete="RESTRICT"), nullable=False),
     Column("input_sha256", String(64), nullable=False),
     Column("code_version", String(64), nullable=False),
-    Column("result", Json, nullable=False),  # core.fusion.algorithms.tuning.TuningResult
+    Column("result", Json, nullable=False),  # sagittal.core.fusion.algorithms.tuning.TuningResult
     Column("created_at", Utc, nullable=False),
     UniqueConstraint("job_id"),  # one job, one visible result
 )
@@ -359,7 +359,7 @@ prescription = Table(
     metadata,
     _id(),
     _ref("patient_id", "patient"),
-    Column("content", Json, nullable=False),  # core.feedback.Prescription
+    Column("content", Json, nullable=False),  # sagittal.core.feedback.Prescription
     Column("created_at", Utc, nullable=False),
     _ref("created_by", "user", nullable=True, index=False),
     Column("ended_at", Utc),  # None: in force

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from server.storage import fs
+from sagittal.server.storage import fs
 
 KEPT: Final = dt.timedelta(days=30)
 """Time in which somebody notices that the wrong database was put back."""

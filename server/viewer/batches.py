@@ -9,12 +9,12 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from server.viewer.body_parts import PartName
-from server.viewer.colours import GHOST, TINTS, to_linear_rgb
-from server.viewer.layout import MeshBatch
-from server.viewer.room import ROOM
-from server.viewer.sending import move_copies
-from server.viewer.steps import Single
+from sagittal.server.viewer.body_parts import PartName
+from sagittal.server.viewer.colours import GHOST, TINTS, to_linear_rgb
+from sagittal.server.viewer.layout import MeshBatch
+from sagittal.server.viewer.room import ROOM
+from sagittal.server.viewer.sending import move_copies
+from sagittal.server.viewer.steps import Single
 
 PALE: Final = 0.5
 """Opacity of another walk laid over the figure."""

@@ -16,10 +16,10 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.model import HIP_FRACTION, THIGH_FRACTION, BodyModel
-from core.frames import Floats
-from server.viewer import profiles
-from server.viewer.shapes import Mesh, interpolate_rows, join_meshes, loft_sections
+from sagittal.core.body.model import HIP_FRACTION, THIGH_FRACTION, BodyModel
+from sagittal.core.frames import Floats
+from sagittal.server.viewer import profiles
+from sagittal.server.viewer.shapes import Mesh, interpolate_rows, join_meshes, loft_sections
 
 PartName = Literal[
     "thighs", "shanks", "foot_l", "foot_r", "toes_l", "toes_r", "pelvis", "trunk", "rings", "arms"

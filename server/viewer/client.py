@@ -20,8 +20,8 @@ from typing import Final
 import numpy as np
 import viser
 
-from server.storage import fs
-from server.storage.compile_cache import VARIABLE
+from sagittal.server.storage import fs
+from sagittal.server.storage.compile_cache import VARIABLE
 
 log = logging.getLogger(__name__)
 

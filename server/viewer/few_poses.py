@@ -1,4 +1,4 @@
-"""Rotations of the poses of one moment: core.rotation's arithmetic in as few numpy calls as it goes.
+"""Rotations of the poses of one moment: sagittal.core.rotation's arithmetic in as few numpy calls as it goes.
 
 Of a handful of quaternions the calls are what costs, not the numbers.
 """
@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from core import rotation
-from core.frames import Floats
+from sagittal.core import rotation
+from sagittal.core.frames import Floats
 
 _UNITS: Final = np.eye(4)
 

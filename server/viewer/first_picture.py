@@ -12,16 +12,16 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import Bools, Floats
-from server.viewer.batches import ARMS, FAINT
-from server.viewer.body_parts import PartName
-from server.viewer.colours import Tint
-from server.viewer.few_poses import find_matrices
-from server.viewer.motion import ReplayMotion
-from server.viewer.outlines import find_front, split_surfaces, trace_edges
-from server.viewer.replay_floor import CHUNK, RECENT_PRINTS
-from server.viewer.room import FOV_RAD, CameraShot, frame_person
-from server.viewer.shapes import Mesh, make_footprint
+from sagittal.core.frames import Bools, Floats
+from sagittal.server.viewer.batches import ARMS, FAINT
+from sagittal.server.viewer.body_parts import PartName
+from sagittal.server.viewer.colours import Tint
+from sagittal.server.viewer.few_poses import find_matrices
+from sagittal.server.viewer.motion import ReplayMotion
+from sagittal.server.viewer.outlines import find_front, split_surfaces, trace_edges
+from sagittal.server.viewer.replay_floor import CHUNK, RECENT_PRINTS
+from sagittal.server.viewer.room import FOV_RAD, CameraShot, frame_person
+from sagittal.server.viewer.shapes import Mesh, make_footprint
 
 HEIGHT: Final = 500
 """Units of the drawing from the top of the picture to its bottom; how wide the picture is does not matter."""

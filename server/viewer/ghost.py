@@ -14,14 +14,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core import rotation
-from core.events.result import Stride, Strides
-from core.frames import SIDES, Floats, Side
-from server.viewer.body_parts import PartName
-from server.viewer.layout import FigureLayout, MeshBatch
-from server.viewer.motion import GhostMotion, ReplayMotion
-from server.viewer.reference import SEGMENTS, ReferenceWalk
-from server.viewer.steps import Single
+from sagittal.core import rotation
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.server.viewer.body_parts import PartName
+from sagittal.server.viewer.layout import FigureLayout, MeshBatch
+from sagittal.server.viewer.motion import GhostMotion, ReplayMotion
+from sagittal.server.viewer.reference import SEGMENTS, ReferenceWalk
+from sagittal.server.viewer.steps import Single
 
 SPAN_S: Final = 1.0
 """The way of the person over this time says where the walk goes: about a stride, so that sway does not."""

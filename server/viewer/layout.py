@@ -12,15 +12,15 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core import rotation
-from core.body.model import BodyModel
-from core.estimators import BY_METHOD
-from core.frames import FOOT, R_NEUTRAL, SIDES, Floats, Segment, Side
-from server.viewer.body_parts import PartName, find_toe_bend, locate_ball, make_parts
-from server.viewer.colours import Tint
-from server.viewer.few_poses import find_matrices
-from server.viewer.shapes import Mesh
-from server.viewer.steps import Single
+from sagittal.core import rotation
+from sagittal.core.body.model import BodyModel
+from sagittal.core.estimators import BY_METHOD
+from sagittal.core.frames import FOOT, R_NEUTRAL, SIDES, Floats, Segment, Side
+from sagittal.server.viewer.body_parts import PartName, find_toe_bend, locate_ball, make_parts
+from sagittal.server.viewer.colours import Tint
+from sagittal.server.viewer.few_poses import find_matrices
+from sagittal.server.viewer.shapes import Mesh
+from sagittal.server.viewer.steps import Single
 
 _WORN: Mapping[str, tuple[Segment, ...]] = {
     method: e.sensors for method, e in BY_METHOD.items() if e.sensors is not None
@@ -178,7 +178,7 @@ def _column(k: int) -> slice:
 
 
 def _stand_up(q: Floats) -> Floats:
-    """Upright axes (..., 4) that face where x of q (..., 4) points: core.rotation's yaw, in fewer steps."""
+    """Upright axes (..., 4) that face where x of q (..., 4) points: `core.rotation.yaw` in fewer steps."""
     matrices = find_matrices(q)
     half = 0.5 * np.arctan2(matrices[..., 1, 0], matrices[..., 0, 0])[..., None]
     return np.cos(half) * _NEUTRAL + np.sin(half) * _NEUTRAL_TURNED

@@ -9,16 +9,16 @@ from typing import Final
 import numpy as np
 import viser
 
-from core.body.model import BodyModel
-from core.frames import FOOT, SIDES, Segment
-from server.viewer.batches import DrawnFigure, colour_copies, draw_figure, draw_ghost
-from server.viewer.layout import FigureLayout, PlacedFigure
-from server.viewer.live_floor import LiveFloor
-from server.viewer.live_path import GAP_S, LivePath
-from server.viewer.moment import FigureMoment
-from server.viewer.reference import SEGMENTS, ReferenceWalk, stand_upright
-from server.viewer.room import SceneRoom, frame_person
-from server.viewer.sending import show_at_once
+from sagittal.core.body.model import BodyModel
+from sagittal.core.frames import FOOT, SIDES, Segment
+from sagittal.server.viewer.batches import DrawnFigure, colour_copies, draw_figure, draw_ghost
+from sagittal.server.viewer.layout import FigureLayout, PlacedFigure
+from sagittal.server.viewer.live_floor import LiveFloor
+from sagittal.server.viewer.live_path import GAP_S, LivePath
+from sagittal.server.viewer.moment import FigureMoment
+from sagittal.server.viewer.reference import SEGMENTS, ReferenceWalk, stand_upright
+from sagittal.server.viewer.room import SceneRoom, frame_person
+from sagittal.server.viewer.sending import show_at_once
 
 _BURIED: Final = np.array([0.0, 0.0, -100.0])
 """Where a ghost is that has no phase."""
@@ -167,5 +167,5 @@ def _find_rows(segments: tuple[Segment, ...]) -> tuple[int, ...] | None:
 
 
 def _yaw(w: float, x: float, y: float, z: float) -> float:
-    """core.rotation.yaw of one orientation, without arrays."""
+    """sagittal.core.rotation.yaw of one orientation, without arrays."""
     return atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))

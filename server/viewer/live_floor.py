@@ -12,13 +12,13 @@ from typing import Final
 import numpy as np
 import viser
 
-from core import rotation
-from core.frames import SIDES, Floats, Side
-from server.viewer import shapes
-from server.viewer.colours import TINTS, to_linear_rgb
-from server.viewer.room import ROOM, Vector
-from server.viewer.sending import draw_lines, move_copies
-from server.viewer.steps import CLEAR_M, PIECE_M, REST_MPS, SAME_M, Single
+from sagittal.core import rotation
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.server.viewer import shapes
+from sagittal.server.viewer.colours import TINTS, to_linear_rgb
+from sagittal.server.viewer.room import ROOM, Vector
+from sagittal.server.viewer.sending import draw_lines, move_copies
+from sagittal.server.viewer.steps import CLEAR_M, PIECE_M, REST_MPS, SAME_M, Single
 
 TRAIL_S: Final = 6.0
 """Seconds of way that are shown."""

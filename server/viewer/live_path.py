@@ -6,7 +6,7 @@ from collections import deque
 from math import hypot, pi
 from typing import Final
 
-from server.viewer.motion import ROOT_WINDOW_S
+from sagittal.server.viewer.motion import ROOT_WINDOW_S
 
 GAP_S: Final = 1.0
 """After such a gap, or a step back in time, what was before says nothing about now."""

@@ -18,21 +18,21 @@ import viser
 from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse
 
-from core.body.kinematics import nominal_body
-from core.body.model import BodyModel
-from core.frames import Floats, Side
-from core.norms import look_up_norms
-from server.auth.access import require
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.context import Db, Id, OpenTrail
-from server.live.hub import Hub
-from server.services import live, patients, sessions
-from server.storage.db import Database
-from server.viewer.live_figure import LiveFigure
-from server.viewer.live_reference import LiveReference, NormAt
-from server.viewer.live_watch import LiveWatch
-from server.viewer.views import FigureView, FigureViews
+from sagittal.core.body.kinematics import nominal_body
+from sagittal.core.body.model import BodyModel
+from sagittal.core.frames import Floats, Side
+from sagittal.core.norms import look_up_norms
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db, Id, OpenTrail
+from sagittal.server.live.hub import Hub
+from sagittal.server.services import live, patients, sessions
+from sagittal.server.storage.db import Database
+from sagittal.server.viewer.live_figure import LiveFigure
+from sagittal.server.viewer.live_reference import LiveReference, NormAt
+from sagittal.server.viewer.live_watch import LiveWatch
+from sagittal.server.viewer.views import FigureView, FigureViews
 
 router = APIRouter(include_in_schema=False)
 

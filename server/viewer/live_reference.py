@@ -8,12 +8,12 @@ from typing import Final
 import msgspec
 import numpy as np
 
-from core.angles import SIGNS, cardan_zxy, list_leg_joints, pelvis_angles
-from core.body.model import BodyModel
-from core.frames import SIDES, SUFFIX, Floats, Side
-from core.rotation import conjugate, multiply
-from server.viewer.moment import FigureMoment
-from server.viewer.reference import SAGITTAL, ReferenceWalk, add_standing_angles, find_better_side
+from sagittal.core.angles import SIGNS, cardan_zxy, list_leg_joints, pelvis_angles
+from sagittal.core.body.model import BodyModel
+from sagittal.core.frames import SIDES, SUFFIX, Floats, Side
+from sagittal.core.rotation import conjugate, multiply
+from sagittal.server.viewer.moment import FigureMoment
+from sagittal.server.viewer.reference import SAGITTAL, ReferenceWalk, add_standing_angles, find_better_side
 
 MEAN_OF: Final = 5
 """Strides of a side whose mean is shown: enough to be the person's walk, few enough to be the present one."""

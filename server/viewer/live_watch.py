@@ -14,11 +14,11 @@ from typing import Final, cast
 import msgspec
 import numpy as np
 
-from core.frames import SIDES, SUFFIX, Segment, Side
-from server.live.messages import STALE_S, FigurePose, Picture
-from server.viewer.live_figure import LiveFigure
-from server.viewer.live_reference import LiveReference, find_standing_angles
-from server.viewer.moment import FigureMoment
+from sagittal.core.frames import SIDES, SUFFIX, Segment, Side
+from sagittal.server.live.messages import STALE_S, FigurePose, Picture
+from sagittal.server.viewer.live_figure import LiveFigure
+from sagittal.server.viewer.live_reference import LiveReference, find_standing_angles
+from sagittal.server.viewer.moment import FigureMoment
 
 log = logging.getLogger(__name__)
 

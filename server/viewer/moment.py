@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from core.frames import Floats, Segment, Side
+from sagittal.core.frames import Floats, Segment, Side
 
 
 @dataclass(frozen=True, eq=False)

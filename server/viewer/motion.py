@@ -13,15 +13,15 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from core import rotation
-from core.body.model import BodyModel
-from core.body.poses import Poses
-from core.errors import ParameterError
-from core.estimators import BY_METHOD
-from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
-from server.viewer.body_parts import PartName
-from server.viewer.layout import FigureLayout, MeshBatch
-from server.viewer.steps import FootPrints, FootTrail, Single, find_prints, lay_trail
+from sagittal.core import rotation
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.poses import Poses
+from sagittal.core.errors import ParameterError
+from sagittal.core.estimators import BY_METHOD
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from sagittal.server.viewer.body_parts import PartName
+from sagittal.server.viewer.layout import FigureLayout, MeshBatch
+from sagittal.server.viewer.steps import FootPrints, FootTrail, Single, find_prints, lay_trail
 
 FRAME_RATE = 50.0
 """Frames kept per second; the page asks for about 30."""

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from core.frames import Bools, Floats
-from server.viewer.shapes import Mesh
+from sagittal.core.frames import Bools, Floats
+from sagittal.server.viewer.shapes import Mesh
 
 
 def split_surfaces(mesh: Mesh) -> Iterator[Mesh]:

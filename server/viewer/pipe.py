@@ -12,7 +12,7 @@ import msgspec
 from starlette.websockets import WebSocket
 from websockets.asyncio.client import connect, unix_connect
 
-from server.auth.sessions import CHECK_EVERY_S
+from sagittal.server.auth.sessions import CHECK_EVERY_S
 
 ALLOWED: Final = frozenset({"ViewerCameraMessage"})
 """Types of messages a browser may send to viser; everything else, such as a request to share, is dropped."""

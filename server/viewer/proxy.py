@@ -36,35 +36,35 @@ from starlette.status import WS_1008_POLICY_VIOLATION
 from starlette.websockets import WebSocketDisconnect
 from websockets.exceptions import WebSocketException
 
-from core.errors import SagittalError
-from core.formats.json_tree import read_json
-from server.auth.access import find_end, opens, require, wait_for_end
-from server.auth.identity import Identity
-from server.auth.roles import Action
-from server.http.carrying import carry_messages
-from server.http.compression import accepts
-from server.http.headers import KEPT
-from server.http.problems import Problem, as_problem
-from server.nodes.registry import Nodes
-from server.report.bundle import read_poses
-from server.report.no_figure import explain_no_figure
-from server.services import analyses, comparisons, edit_log, patients, sessions
-from server.services.histories import AnalysedSession
-from server.services.patients import Patient
-from server.storage.blobs import BlobStore
-from server.viewer.client import client_page, client_version, find_packed_page
-from server.viewer.ghost import match_ghost
-from server.viewer.motion import GhostName, ReplayMotion, prepare_motion
-from server.viewer.pipe import (
+from sagittal.core.errors import SagittalError
+from sagittal.core.formats.json_tree import read_json
+from sagittal.server.auth.access import find_end, opens, require, wait_for_end
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.http.carrying import carry_messages
+from sagittal.server.http.compression import accepts
+from sagittal.server.http.headers import KEPT
+from sagittal.server.http.problems import Problem, as_problem
+from sagittal.server.nodes.registry import Nodes
+from sagittal.server.report.bundle import read_poses
+from sagittal.server.report.no_figure import explain_no_figure
+from sagittal.server.services import analyses, comparisons, edit_log, patients, sessions
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.services.patients import Patient
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.viewer.client import client_page, client_version, find_packed_page
+from sagittal.server.viewer.ghost import match_ghost
+from sagittal.server.viewer.motion import GhostName, ReplayMotion, prepare_motion
+from sagittal.server.viewer.pipe import (
     ViewActivity,
     connect_to_viser,
     find_subprotocols,
     is_allowed,
 )
-from server.viewer.replay_figure import ReplayFigure
-from server.viewer.replay_reference import find_references
-from server.viewer.room import VIEWS, ViewName
-from server.viewer.views import FigureView, FigureViews, new_id
+from sagittal.server.viewer.replay_figure import ReplayFigure
+from sagittal.server.viewer.replay_reference import find_references
+from sagittal.server.viewer.room import VIEWS, ViewName
+from sagittal.server.viewer.views import FigureView, FigureViews, new_id
 
 CONTENT_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; worker-src blob:; "

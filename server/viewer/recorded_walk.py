@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from server.export.content import ExportContent
-from server.export.kinds import DRAWN
+from sagittal.server.export.content import ExportContent
+from sagittal.server.export.kinds import DRAWN
 
 if TYPE_CHECKING:
-    from core.body.poses import Poses
+    from sagittal.core.body.poses import Poses
 
 RATE_HZ: Final = 25.0
 """Pictures a second, as films have."""
@@ -30,10 +30,10 @@ def write_walk(content: ExportContent) -> bytes:
 def record_walk(poses: Poses) -> bytes:
     """Draw a walk moment by moment, followed from the right, with footprints and trails."""
     # a worker that draws nothing does without viser
-    from server.viewer.client import silence
-    from server.viewer.motion import prepare_motion
-    from server.viewer.replay_figure import ReplayFigure
-    from server.viewer.scene_server import start_scene_server, stop_scene_server
+    from sagittal.server.viewer.client import silence
+    from sagittal.server.viewer.motion import prepare_motion
+    from sagittal.server.viewer.replay_figure import ReplayFigure
+    from sagittal.server.viewer.scene_server import start_scene_server, stop_scene_server
 
     motion = prepare_motion(poses)
     server = start_scene_server()

@@ -12,14 +12,14 @@ from typing import Final
 
 import numpy as np
 
-from core import rotation
-from core.angles import SIGNS
-from core.angles.inverse import leg_orientations, pelvis_orientation
-from core.body.kinematics import leg_points, sole_points
-from core.body.model import BodyModel
-from core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Floats, Segment, Side
-from server.viewer.few_poses import find_matrices, turn_about_z
-from server.viewer.motion import LOWER_BODY
+from sagittal.core import rotation
+from sagittal.core.angles import SIGNS
+from sagittal.core.angles.inverse import leg_orientations, pelvis_orientation
+from sagittal.core.body.kinematics import leg_points, sole_points
+from sagittal.core.body.model import BodyModel
+from sagittal.core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Floats, Segment, Side
+from sagittal.server.viewer.few_poses import find_matrices, turn_about_z
+from sagittal.server.viewer.motion import LOWER_BODY
 
 SAGITTAL: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 """Without these there is no walk to show."""
@@ -33,8 +33,8 @@ class ReferenceWalk:
 
     Parameters
     ----------
-    curves : variable → (n,) rad over the cycle, signs as in the curves of core.parameters; the sagittal ones
-        must be there, another that is missing is 0. A pelvis rotation is about the heading.
+    curves : variable → (n,) rad over the cycle, signs as in the curves of sagittal.core.parameters; the
+        sagittal ones must be there, another that is missing is 0. A pelvis rotation is about the heading.
     lead : the side whose cycle the pelvis follows.
     """
 

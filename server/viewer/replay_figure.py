@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from core.frames import Floats
-from server.viewer.batches import DrawnBatch, colour_copies, draw_figure, draw_ghost
-from server.viewer.body_parts import PartName
-from server.viewer.ghost import find_heading
-from server.viewer.motion import GhostMotion, GhostName, ReplayMotion
-from server.viewer.replay_floor import ReplayFloor
-from server.viewer.room import (
+from sagittal.core.frames import Floats
+from sagittal.server.viewer.batches import DrawnBatch, colour_copies, draw_figure, draw_ghost
+from sagittal.server.viewer.body_parts import PartName
+from sagittal.server.viewer.ghost import find_heading
+from sagittal.server.viewer.motion import GhostMotion, GhostName, ReplayMotion
+from sagittal.server.viewer.replay_floor import ReplayFloor
+from sagittal.server.viewer.room import (
     FLOOR_M,
     FOV_RAD,
     ROOM,
@@ -21,7 +21,7 @@ from server.viewer.room import (
     frame_person,
     turn_about_vertical,
 )
-from server.viewer.sending import show_at_once
+from sagittal.server.viewer.sending import show_at_once
 
 
 class ReplayFigure:
@@ -30,7 +30,7 @@ class ReplayFigure:
     Parameters
     ----------
     server : a viser server of its own.
-    motion : prepared by `server.viewer.motion.prepare_motion`. t_s : the moment shown first.
+    motion : prepared by `sagittal.server.viewer.motion.prepare_motion`. t_s : the moment shown first.
     """
 
     def __init__(

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from core.frames import Side
-from server.viewer import shapes
-from server.viewer.colours import TINTS, Rgb, to_linear_rgb
-from server.viewer.motion import ReplayMotion
-from server.viewer.steps import FootPrints, FootTrail, Single
+from sagittal.core.frames import Side
+from sagittal.server.viewer import shapes
+from sagittal.server.viewer.colours import TINTS, Rgb, to_linear_rgb
+from sagittal.server.viewer.motion import ReplayMotion
+from sagittal.server.viewer.steps import FootPrints, FootTrail, Single
 
 CHUNK = 256
 """Pieces of a trail per scene node, about eight strides."""

@@ -7,15 +7,15 @@ from functools import cache
 
 import numpy as np
 
-from core.frames import SIDES, Floats, Side
-from core.parameters.kinematic import cycle_curves, mean_curve
-from server.services.comparisons import find_norms
-from server.services.histories import AnalysedSession
-from server.services.patients import Patient
-from server.services.reviewed import ReviewedAnalyses
-from server.viewer.ghost import match_reference
-from server.viewer.motion import GhostMotion, GhostName, ReplayMotion
-from server.viewer.reference import SAGITTAL, ReferenceWalk, add_standing_angles
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.parameters.kinematic import cycle_curves, mean_curve
+from sagittal.server.services.comparisons import find_norms
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.viewer.ghost import match_reference
+from sagittal.server.viewer.motion import GhostMotion, GhostName, ReplayMotion
+from sagittal.server.viewer.reference import SAGITTAL, ReferenceWalk, add_standing_angles
 
 Curves = Mapping[str, Floats]
 

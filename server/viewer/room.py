@@ -14,9 +14,9 @@ import numpy as np
 import viser
 from viser._messages import SetPositionMessage
 
-from core.frames import Floats
-from server.viewer.colours import BACKGROUND, FLOOR
-from server.viewer.sending import gather_longer
+from sagittal.core.frames import Floats
+from sagittal.server.viewer.colours import BACKGROUND, FLOOR
+from sagittal.server.viewer.sending import gather_longer
 
 ROOM: Final = "/room"
 """Name of the node that everything hangs on."""

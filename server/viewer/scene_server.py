@@ -19,7 +19,7 @@ import websockets.asyncio.server
 from viser._messages import ShareUrlRequest
 from viser.infra import _infra
 
-from core.errors import EstimationError
+from sagittal.core.errors import EstimationError
 
 LONGEST_PATH_BYTES: Final = 100
 """A socket's path has at most 108 bytes on Linux, 104 elsewhere; viser waits for ever for a longer one."""

@@ -14,7 +14,7 @@ import numpy as np
 import viser
 from viser._messages import EntityLifecycle, SceneNodeUpdateMessage
 
-from server.viewer.steps import Single
+from sagittal.server.viewer.steps import Single
 
 WINDOW_S: Final = 0.1
 """How long viser gathers what nobody asked to be sent at once: longer than a picture is shown, so that its

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import Floats, Side
+from sagittal.core.frames import Floats, Side
 
 Mesh = tuple[NDArray[np.float32], NDArray[np.uint32]]
 

@@ -7,12 +7,12 @@ from typing import Final
 
 import numpy as np
 
-from core.body.poses import Poses
-from core.frames import Floats, Side
-from server.viewer.colours import Tint
-from server.viewer.few_poses import find_matrices
-from server.viewer.layout import FigureLayout
-from server.viewer.outlines import find_front, split_surfaces, trace_edges
+from sagittal.core.body.poses import Poses
+from sagittal.core.frames import Floats, Side
+from sagittal.server.viewer.colours import Tint
+from sagittal.server.viewer.few_poses import find_matrices
+from sagittal.server.viewer.layout import FigureLayout
+from sagittal.server.viewer.outlines import find_front, split_surfaces, trace_edges
 
 HEIGHT_PX: Final = 116
 WIDEST_PX: Final = 92

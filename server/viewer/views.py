@@ -19,12 +19,12 @@ from typing import Any, Generic, TypeVar
 
 import viser
 
-from core.errors import EstimationError
-from server.auth.roles import Action, Role, is_permitted
-from server.viewer.live_figure import LiveFigure
-from server.viewer.motion import ReplayMotion
-from server.viewer.replay_figure import ReplayFigure
-from server.viewer.scene_server import socket_of, start_scene_server, stop_scene_server
+from sagittal.core.errors import EstimationError
+from sagittal.server.auth.roles import Action, Role, is_permitted
+from sagittal.server.viewer.live_figure import LiveFigure
+from sagittal.server.viewer.motion import ReplayMotion
+from sagittal.server.viewer.replay_figure import ReplayFigure
+from sagittal.server.viewer.scene_server import socket_of, start_scene_server, stop_scene_server
 
 IDLE_S = 30.0
 """A view without a viewer is stopped after this; a page reload comes back well within it."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import uvicorn
 from starlette.types import ASGIApp
 
-from server.live.protocol import MOST_MESSAGE_BYTES
-from server.settings import Settings
-from server.web_server.connection import ConnectionLimits, make_connection_class
-from server.web_server.proxies import TrustedProxies
+from sagittal.server.live.protocol import MOST_MESSAGE_BYTES
+from sagittal.server.settings import Settings
+from sagittal.server.web_server.connection import ConnectionLimits, make_connection_class
+from sagittal.server.web_server.proxies import TrustedProxies
 
 GRACE_S = 4
 """Time open requests (event streams, views) have to end after SIGTERM; all in all it ends within 10 s."""

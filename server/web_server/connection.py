@@ -15,7 +15,7 @@ from typing import Any, Final, Literal
 import h11
 from uvicorn.protocols.http.h11_impl import STATUS_PHRASES, H11Protocol
 
-from server.web_server.listener import SeldomLog
+from sagittal.server.web_server.listener import SeldomLog
 
 _full: Final = SeldomLog()
 

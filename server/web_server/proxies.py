@@ -9,7 +9,7 @@ from typing import Final
 from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
-from server.web_server.listener import SeldomLog
+from sagittal.server.web_server.listener import SeldomLog
 
 FORWARDED_FOR: Final = b"x-forwarded-for"
 

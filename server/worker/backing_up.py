@@ -16,15 +16,16 @@ from typing import Final
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from server.log import start_log
-from server.processes.child import FAR_BEHIND, end_process, start_module
-from server.processes.lifeline import call_when_parent_ends
-from server.services import backup_schedule
-from server.services.tombstones import TombstoneError, find_tombstones, keep_tombstones
-from server.settings import Settings, load_settings
-from server.storage.db import Database
+from sagittal.server.log import start_log
+from sagittal.server.processes.child import FAR_BEHIND, end_process, start_module
+from sagittal.server.processes.lifeline import call_when_parent_ends
+from sagittal.server.services import backup_schedule
+from sagittal.server.services.tombstones import TombstoneError, find_tombstones, keep_tombstones
+from sagittal.server.settings import Settings, load_settings
+from sagittal.server.storage.db import Database
 
-log = logging.getLogger("server.worker.backing_up")
+MODULE: Final = "sagittal.server.worker.backing_up"
+log = logging.getLogger(MODULE)
 
 BACKUP: Final = "backup"
 """The duty of making one, which one web server has at a time."""
@@ -79,7 +80,7 @@ class BackupKeeper:
                 with db.do_alone(BACKUP) as is_mine:
                     is_free = is_mine
                 if is_free:
-                    self._process = start_module("server.worker.backing_up", self._settings, FAR_BEHIND)
+                    self._process = start_module(MODULE, self._settings, FAR_BEHIND)
         except SQLAlchemyError:
             log.exception("the database is away; trying again")
 

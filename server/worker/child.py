@@ -1,22 +1,22 @@
 """The computing process: warm, killable, limited in memory, without a connection to the database.
 
-Started by server/worker/runner.py as `python -m server.worker.child <socket> <parent pid>`.
+Started by server/worker/runner.py as `python -m sagittal.server.worker.child <socket> <parent pid>`.
 """
 
 from __future__ import annotations
 
 import logging
 
-from core.errors import SagittalError
-from core.formats.source import SourceFile
-from server.jobs.attempt import Attempt
-from server.processes.channel import Channel
-from server.processes.child import enter_child
-from server.storage.blob_opening import open_blobs
-from server.storage.blob_source import open_source
-from server.storage.blobs import BlobStore, StoreAway
-from server.storage.refusal import refusal_of
-from server.worker.messages import (
+from sagittal.core.errors import SagittalError
+from sagittal.core.formats.source import SourceFile
+from sagittal.server.jobs.attempt import Attempt
+from sagittal.server.processes.channel import Channel
+from sagittal.server.processes.child import enter_child
+from sagittal.server.storage.blob_opening import open_blobs
+from sagittal.server.storage.blob_source import open_source
+from sagittal.server.storage.blobs import BlobStore, StoreAway
+from sagittal.server.storage.refusal import refusal_of
+from sagittal.server.worker.messages import (
     Checkpoint,
     ChildReady,
     Failure,
@@ -27,9 +27,9 @@ from server.worker.messages import (
     decode_order,
     encode,
 )
-from server.worker.task import TASKS, load
+from sagittal.server.worker.task import TASKS, load
 
-log = logging.getLogger("server.worker.child")
+log = logging.getLogger("sagittal.server.worker.child")
 
 
 def main() -> None:

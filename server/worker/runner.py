@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from server.processes.channel import Channel
-from server.processes.child import BEHIND, end_process, start_child
-from server.settings import Settings
-from server.worker.messages import Order, Reply, decode_reply, encode
+from sagittal.server.processes.channel import Channel
+from sagittal.server.processes.child import BEHIND, end_process, start_child
+from sagittal.server.settings import Settings
+from sagittal.server.worker.messages import Order, Reply, decode_reply, encode
 
 
 class ChildDiedError(Exception):
@@ -16,7 +16,7 @@ class Child:
     """A running child process; it is warm once it has said Ready."""
 
     def __init__(self, settings: Settings) -> None:
-        self._process, line = start_child("server.worker.child", settings, BEHIND)
+        self._process, line = start_child("sagittal.server.worker.child", settings, BEHIND)
         self._line = Channel(line)
 
     @property

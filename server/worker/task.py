@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection
 
-from server.jobs.attempt import Attempt
-from server.jobs.queue import Claim
-from server.storage.blobs import Blob
+from sagittal.server.jobs.attempt import Attempt
+from sagittal.server.jobs.queue import Claim
+from sagittal.server.storage.blobs import Blob
 
 if TYPE_CHECKING:
-    from core.formats.source import SourceFile
+    from sagittal.core.formats.source import SourceFile
 
 
 def _nothing() -> None:

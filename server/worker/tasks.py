@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection
 
-from server.jobs.attempt import Attempt
-from server.jobs.queue import COMPARE_FILTERS, EXPORT, SENSITIVITY, TUNE, Claim
-from server.services import (
+from sagittal.server.jobs.attempt import Attempt
+from sagittal.server.jobs.queue import COMPARE_FILTERS, EXPORT, SENSITIVITY, TUNE, Claim
+from sagittal.server.services import (
     analyses,
     analysing,
     devices,
@@ -24,11 +24,11 @@ from server.services import (
     sensitivities,
     tunings,
 )
-from server.storage.blobs import Blob
-from server.worker.task import Task, register
+from sagittal.server.storage.blobs import Blob
+from sagittal.server.worker.task import Task, register
 
 if TYPE_CHECKING:
-    from core.formats.source import SourceFile
+    from sagittal.core.formats.source import SourceFile
 
 FOUND = "inspection.json"
 
@@ -103,12 +103,12 @@ def _publish_export(
 
 def _warm() -> None:
     """Import readers and pipeline, compile the kernels or load them from the cache."""
-    import server.report.exports  # noqa: F401
-    from core.agreement.slips import compile_agreement_kernels
-    from core.body import estimate
-    from core.events import foot_contact
-    from core.fusion import attitude
-    from server.processes.compiling import OFFLINE, compile_filters_once
+    import sagittal.server.report.exports  # noqa: F401
+    from sagittal.core.agreement.slips import compile_agreement_kernels
+    from sagittal.core.body import estimate
+    from sagittal.core.events import foot_contact
+    from sagittal.core.fusion import attitude
+    from sagittal.server.processes.compiling import OFFLINE, compile_filters_once
 
     # a first walk waits for no filter of few sensors or of live takes: the live estimator compiles those
     compile_filters_once(OFFLINE)

@@ -21,26 +21,26 @@ from typing import ParamSpec, TypeVar
 from sqlalchemy import Connection
 from sqlalchemy.exc import SQLAlchemyError
 
-from core.errors import SagittalError
-from server.jobs.opening import open_queue
-from server.jobs.queue import Claim, JobQueue, LeaseState, Wait
-from server.log import start_log
-from server.processes.lifeline import call_when_parent_ends
-from server.services import custody, erasure
-from server.services.sweep import sweep
-from server.settings import Settings, load_settings
-from server.storage import fs
-from server.storage.blob_opening import open_blobs, require_use
-from server.storage.blobs import Blob, BlobStore, StoreAway
-from server.storage.db import Database
-from server.storage.migrate import await_current, require_current
-from server.storage.refusal import is_busy
-from server.storage.tables import new_id
-from server.worker.messages import Checkpoint, ChildReady, Failure, Input, Order, Result, Stage
-from server.worker.runner import Child, ChildDiedError
-from server.worker.task import TASKS, Task, load
+from sagittal.core.errors import SagittalError
+from sagittal.server.jobs.opening import open_queue
+from sagittal.server.jobs.queue import Claim, JobQueue, LeaseState, Wait
+from sagittal.server.log import start_log
+from sagittal.server.processes.lifeline import call_when_parent_ends
+from sagittal.server.services import custody, erasure
+from sagittal.server.services.sweep import sweep
+from sagittal.server.settings import Settings, load_settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.blob_opening import open_blobs, require_use
+from sagittal.server.storage.blobs import Blob, BlobStore, StoreAway
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.migrate import await_current, require_current
+from sagittal.server.storage.refusal import is_busy
+from sagittal.server.storage.tables import new_id
+from sagittal.server.worker.messages import Checkpoint, ChildReady, Failure, Input, Order, Result, Stage
+from sagittal.server.worker.runner import Child, ChildDiedError
+from sagittal.server.worker.task import TASKS, Task, load
 
-log = logging.getLogger("server.worker.worker")
+log = logging.getLogger("sagittal.server.worker.worker")
 P = ParamSpec("P")
 T = TypeVar("T")
 

@@ -15,14 +15,14 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from core.events.detection import detect_contacts
-from core.events.result import EventKind
-from core.frames import SIDES, Floats
-from core.fusion.algorithms.benchmark import read_trial, run_own, score_orientation
-from core.pipeline import analyse
-from core.recording import Recording
-from core.simulate import RecordingSetup, SoftTissue, Squats, simulate_scenario, simulate_squats
-from core.simulate.squat_chain import place_as_agreed
+from sagittal.core.events.detection import detect_contacts
+from sagittal.core.events.result import EventKind
+from sagittal.core.frames import SIDES, Floats
+from sagittal.core.fusion.algorithms.benchmark import read_trial, run_own, score_orientation
+from sagittal.core.pipeline import analyse
+from sagittal.core.recording import Recording
+from sagittal.core.simulate import RecordingSetup, SoftTissue, Squats, simulate_scenario, simulate_squats
+from sagittal.core.simulate.squat_chain import place_as_agreed
 from tests.data import data_folder
 from tests.helpers import force_plate, mobgap
 from tests.helpers.event_scoring import match

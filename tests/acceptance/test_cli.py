@@ -40,7 +40,7 @@ NEURA = {
 
 def sagittal(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "server.main", *map(str, arguments)],
+        [sys.executable, "-m", "sagittal.server.main", *map(str, arguments)],
         capture_output=True,
         text=True,
         check=False,

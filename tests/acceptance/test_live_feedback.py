@@ -10,9 +10,9 @@ from typing import Any
 import httpx
 import pytest
 
-from core.online import compile_live_kernels
-from server.demo.clinic import PRESCRIBED
-from server.demo.live import plan_training, stream_walk
+from sagittal.core.online import compile_live_kernels
+from sagittal.server.demo.clinic import PRESCRIBED
+from sagittal.server.demo.live import plan_training, stream_walk
 from tests.helpers.service import served
 
 SPEED = 6.0

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.frames import SIDES, Side
+from sagittal.core.frames import SIDES, Side
 from tests.acceptance.test_cli import rows, sagittal
 from tests.data import ROOT
 

@@ -31,13 +31,13 @@ from playwright.sync_api import (
 )
 from sqlalchemy import delete, select
 
-from server.auth import accounts
-from server.auth.passwords import hash_password
-from server.auth.roles import Role
-from server.storage.db import Database
-from server.storage.field_cipher import make_keys
-from server.storage.migrate import upgrade
-from server.storage.tables import device_check, job
+from sagittal.server.auth import accounts
+from sagittal.server.auth.passwords import hash_password
+from sagittal.server.auth.roles import Role
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.field_cipher import make_keys
+from sagittal.server.storage.migrate import upgrade
+from sagittal.server.storage.tables import device_check, job
 from tests.browser import filling
 from tests.browser.console import Console
 from tests.data import ROOT
@@ -136,7 +136,7 @@ def serve(folder: Path, *, records_only: bool = False) -> Iterator[RunningServer
     log = (folder / "server.log").open("wb")
     # an own process group, so that a Ctrl-C in the terminal does not reach it twice
     process = subprocess.Popen(
-        [sys.executable, "-m", "server.main", "serve", "--data", str(folder), "--port", str(port)],
+        [sys.executable, "-m", "sagittal.server.main", "serve", "--data", str(folder), "--port", str(port)],
         cwd=ROOT, stdout=log, stderr=subprocess.STDOUT, start_new_session=True,
         env={**os.environ, **(RECORDS_ONLY if records_only else {})},
     )  # fmt: skip

@@ -11,12 +11,19 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import Page, WebSocketRoute
 
-from core.feedback.cue import Cue, FeedbackState, GuardState, SideEffect, Summary, Tone, WhyNot, Zone
-from core.frames import SUFFIX, Side
-from core.norms import look_up_norms
-from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SegmentCheck, SensorHealth, Stage
-from core.parameters.live_stride import LiveStride
-from server.live import wire
+from sagittal.core.feedback.cue import Cue, FeedbackState, GuardState, SideEffect, Summary, Tone, WhyNot, Zone
+from sagittal.core.frames import SUFFIX, Side
+from sagittal.core.norms import look_up_norms
+from sagittal.core.online.frame import (
+    AngleTrail,
+    CalibrationView,
+    LiveFrame,
+    SegmentCheck,
+    SensorHealth,
+    Stage,
+)
+from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.server.live import wire
 
 SEGMENTS = ("pelvis", "thigh_l", "shank_l", "foot_l", "thigh_r", "shank_r", "foot_r")
 ANGLES = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")

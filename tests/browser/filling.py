@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 import httpx
 
-from core.simulate import mt_files, simulate_scenario
+from sagittal.core.simulate import mt_files, simulate_scenario
 from tests.helpers.kept import keep
 
 

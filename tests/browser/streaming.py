@@ -11,9 +11,9 @@ from uuid import uuid4
 
 from playwright.sync_api import Page
 
-from core.simulate import Simulation
-from server.demo import live as demo_live
-from server.demo.clinic import STROKE
+from sagittal.core.simulate import Simulation
+from sagittal.server.demo import live as demo_live
+from sagittal.server.demo.clinic import STROKE
 from tests.browser import filling
 from tests.browser.conftest import RunningServer
 from tests.helpers.kept import keep

@@ -15,14 +15,14 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from core.formats import SourceFile, read_recording
-from core.formats.live_log import decode_batch, parse_finish, read_batch_header, scan
-from core.formats.live_log import view_samples as payload_of
-from server.auth import accounts
-from server.auth.passwords import hash_password
-from server.auth.roles import Role
-from server.storage.db import Database
-from server.storage.migrate import upgrade
+from sagittal.core.formats import SourceFile, read_recording
+from sagittal.core.formats.live_log import decode_batch, parse_finish, read_batch_header, scan
+from sagittal.core.formats.live_log import view_samples as payload_of
+from sagittal.server.auth import accounts
+from sagittal.server.auth.passwords import hash_password
+from sagittal.server.auth.roles import Role
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.migrate import upgrade
 from tests.browser import filling
 from tests.browser.capturing import (
     Clinic,

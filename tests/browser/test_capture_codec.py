@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
-from core.formats import SourceFile, read_recording
-from core.formats.live_log import SampleBatch, encode_batch, record, scan
+from sagittal.core.formats import SourceFile, read_recording
+from sagittal.core.formats.live_log import SampleBatch, encode_batch, record, scan
 from tests.browser.conftest import RunningServer
 from tests.data import data_folder
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Error, Page
 
-from core.formats.live_log import SampleBatch, encode_batch, read_batch_header
-from core.formats.live_log import view_samples as payload_of
+from sagittal.core.formats.live_log import SampleBatch, encode_batch, read_batch_header
+from sagittal.core.formats.live_log import view_samples as payload_of
 from tests.browser.conftest import RunningServer
 
 OPEN = """const { Outbox } = await import('/static/js/capture/outbox.js');

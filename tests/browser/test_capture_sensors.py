@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from core.formats.live_log import decode_batch, parse_hello, scan
+from sagittal.core.formats.live_log import decode_batch, parse_hello, scan
 from tests.browser.capturing import Clinic, clinic, pair, start, tablet, until
 from tests.browser.conftest import RunningServer
 from tests.browser.test_capture_codec import turned_device

@@ -9,9 +9,9 @@ import pytest
 from playwright.sync_api import Page, expect
 from sqlalchemy import delete
 
-from server.auth.tokens import token_hash
-from server.storage.db import Database
-from server.storage.tables import login_session
+from sagittal.server.auth.tokens import token_hash
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import login_session
 from tests.browser import filling
 from tests.browser.conftest import NAME, PASSWORD, Filled, Opener, RunningServer
 

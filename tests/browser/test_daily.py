@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from playwright.sync_api import expect
 
-from core.simulate import mt_files, simulate_day
-from core.simulate.chest import PostureHold
-from core.simulate.setup import RecordingSetup
+from sagittal.core.simulate import mt_files, simulate_day
+from sagittal.core.simulate.chest import PostureHold
+from sagittal.core.simulate.setup import RecordingSetup
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
 from tests.browser.design import all_faults

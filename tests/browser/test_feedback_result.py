@@ -7,11 +7,11 @@ from contextlib import closing
 import pytest
 from playwright.sync_api import expect
 
-from core.feedback import FeedbackEngine
-from server.services import analyses, edit_log, prescriptions
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.blob_folder import FolderBlobs
-from server.storage.db import Database
+from sagittal.core.feedback import FeedbackEngine
+from sagittal.server.services import analyses, edit_log, prescriptions
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.db import Database
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
 from tests.browser.design import all_faults

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from core.recording import ImuStream
-from core.simulate.scripts import ON_SKIN
-from core.simulate.tug import ChairSimulation, simulate_tug
-from server.demo import live as demo_live
+from sagittal.core.recording import ImuStream
+from sagittal.core.simulate.scripts import ON_SKIN
+from sagittal.core.simulate.tug import ChairSimulation, simulate_tug
+from sagittal.server.demo import live as demo_live
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
 from tests.helpers.kept import keep

@@ -10,7 +10,7 @@ from uuid import uuid4
 import pytest
 from playwright.sync_api import Browser, expect
 
-from core.online import compile_live_kernels
+from sagittal.core.online import compile_live_kernels
 from tests.browser import filling
 from tests.browser.capturing import choose, network, place, start, tablet, walk_files
 from tests.browser.conftest import Opener, RunningServer

@@ -12,7 +12,7 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, Locator, Page, Route, expect
 
-from core.online.frame import Stage
+from sagittal.core.online.frame import Stage
 from tests.browser import feed, filling
 from tests.browser.conftest import WITHOUT_FIGURE, KeptContexts, RunningServer
 from tests.browser.design import SIZES, layout_faults, text_faults

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from playwright.sync_api import Browser
 
-from server.viewer.recorded_walk import record_walk
+from sagittal.server.viewer.recorded_walk import record_walk
 from tests.browser.picture import COUNT, PATIENCE_S
 from tests.server import walk
 

@@ -14,9 +14,9 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Browser, Page, Route, expect
 
-from core.frames import SIDES
-from server.viewer.client import client_version
-from server.viewer.colours import TINTS
+from sagittal.core.frames import SIDES
+from sagittal.server.viewer.client import client_version
+from sagittal.server.viewer.colours import TINTS
 from tests.browser import filling
 from tests.browser.conftest import DESK, PACED, REST, Filled, Opener, RunningServer
 from tests.browser.picture import wait_for_picture, wait_until_still

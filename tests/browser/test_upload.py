@@ -150,7 +150,15 @@ def test_a_table_with_its_manifest_is_analysed_as_from_the_command_line(
     assert max(boxes) <= 1, boxes
 
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "server.main", "analyse", str(table), "--manifest", str(manifest)]
+    command = [
+        sys.executable,
+        "-m",
+        "sagittal.server.main",
+        "analyse",
+        str(table),
+        "--manifest",
+        str(manifest),
+    ]
     subprocess.run([*command, "--out", str(out)], cwd=ROOT, check=True, capture_output=True)
     with running.client() as client:
         for name in ("events.csv", "strides.csv"):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from core.anthropometry import BodyMeasures, locate_hips_across
-from core.body.chain.geometry import locate_hip
-from core.body.kinematics import nominal_body
-from core.body.model import BodyModel
-from core.errors import ManifestError
-from core.formats.manifest import manifest_of
+from sagittal.core.anthropometry import BodyMeasures, locate_hips_across
+from sagittal.core.body.chain.geometry import locate_hip
+from sagittal.core.body.kinematics import nominal_body
+from sagittal.core.body.model import BodyModel
+from sagittal.core.errors import ManifestError
+from sagittal.core.formats.manifest import manifest_of
 
 
 def test_nobody_measured_anything() -> None:

@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 import pytest
 
-from core.condition import (
+from sagittal.core.condition import (
     CHOICES,
     PROTOCOL_WORDS,
     USUAL,
@@ -20,7 +20,7 @@ from core.condition import (
     is_alike,
     is_comparable,
 )
-from core.frames import PROTOCOLS
+from sagittal.core.frames import PROTOCOLS
 
 TYPES: dict[str, Any] = {
     "pace": WalkingPace,

@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from core.correction import SensorCorrection, name_axes, to_axes_matrix
-from core.errors import ManifestError, ParameterError
-from core.formats import parse_manifest
+from sagittal.core.correction import SensorCorrection, name_axes, to_axes_matrix
+from sagittal.core.errors import ManifestError, ParameterError
+from sagittal.core.formats import parse_manifest
 from tests.helpers.setup_mistakes import SIGNED
 
 VALUES = np.array([[1.0, 2.0, 3.0]])

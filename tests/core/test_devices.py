@@ -8,12 +8,12 @@ from math import degrees, radians, sqrt
 import numpy as np
 import pytest
 
-from core.frames import GRAVITY, Floats
-from core.quality.device_course import follow_device
-from core.quality.devices import DeviceCheck, check_device, is_serial
-from core.recording import ImuStream
-from core.simulate.mems import SensorNoise, add_sensor_errors
-from core.simulate.sensors import SimulatedSignals
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.quality.device_course import follow_device
+from sagittal.core.quality.devices import DeviceCheck, check_device, is_serial
+from sagittal.core.recording import ImuStream
+from sagittal.core.simulate.mems import SensorNoise, add_sensor_errors
+from sagittal.core.simulate.sensors import SimulatedSignals
 from tests.core.formats.making import stream
 from tests.helpers.ipol import WALKS, ipol_recording
 

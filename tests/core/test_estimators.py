@@ -9,9 +9,9 @@ from typing import get_args
 
 import pytest
 
-from core.body.choice import list_possible_estimators
-from core.body.tree import PRESETS
-from core.estimators import (
+from sagittal.core.body.choice import list_possible_estimators
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.estimators import (
     AUTO,
     BY_METHOD,
     BY_NAME,

@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import butter, sosfiltfilt
 
-from core.filtering import LEAST_PIECE, low_pass, smooth_gaussian
+from sagittal.core.filtering import LEAST_PIECE, low_pass, smooth_gaussian
 
 RATE = 100.0
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core.frames import Floats
-from core.held_samples import SHORT, HeldSeries, cut_blocks, give_pages_back, make_room
-from core.recording import SensorSignals
+from sagittal.core.frames import Floats
+from sagittal.core.held_samples import SHORT, HeldSeries, cut_blocks, give_pages_back, make_room
+from sagittal.core.recording import SensorSignals
 
 
 def sensor(acc: Floats, mag: Floats | None = None) -> SensorSignals:

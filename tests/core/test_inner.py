@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import core
+from sagittal import core
 
 CALL_ALL = """
 import importlib, sys
@@ -22,8 +22,8 @@ for module in sys.argv[1:]:
 
 # one with arguments that fit: machine code without an entry point for Python is what a call would jump to
 fitting = {
-    "core.body.erkf.kernel.is_within_gate": (np.eye(6), 0, np.zeros(3), 1.0, 9.0),
-    "core.rotation.compiled.sine_quotients": (0.25,),
+    "sagittal.core.body.erkf.kernel.is_within_gate": (np.eye(6), 0, np.zeros(3), 1.0, 9.0),
+    "sagittal.core.rotation.compiled.sine_quotients": (0.25,),
 }
 for name, function in sorted(found.items(), key=lambda item: item[0] not in fitting):
     count = function.py_func.__code__.co_argcount
@@ -45,7 +45,7 @@ def test_calling_an_inner_function_from_python_raises_and_the_process_survives()
         p: len(re.findall(r"^@inner_njit\(|^@.*no_cpython_wrapper", t, re.MULTILINE))
         for p, t in texts.items()
     }
-    modules = [".".join(p.with_suffix("").parts) for p, count in marks.items() if count]
+    modules = [".".join(("sagittal", *p.with_suffix("").parts)) for p, count in marks.items() if count]
     command = [sys.executable, "-c", CALL_ALL, *modules]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr[-2000:]
@@ -54,7 +54,7 @@ def test_calling_an_inner_function_from_python_raises_and_the_process_survives()
 
 USE = """
 import numba, numpy as np
-from core.rotation.compiled import exp_so3, sine_quotients
+from sagittal.core.rotation.compiled import exp_so3, sine_quotients
 
 rotation, jacobian = np.empty((3, 3)), np.empty((3, 3))
 exp_so3(np.array([0.0, 0.0, np.pi / 2]), rotation, jacobian)

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.body.walking_frame import in_walking_frame
-from core.events.edits import Edit
-from core.frames import R_NEUTRAL
-from core.measure import MeasuredGait, measure_gait
-from core.parameters.result import Parameter
-from core.pipeline import TakeAnalysis
-from core.rotation import about, from_matrix, multiply, rotate
-from server.report.bundle import load_bundle
-from server.report.exports import analysis_files
-from server.report.tracks import NAME, read_tracks
+from sagittal.core.body.walking_frame import in_walking_frame
+from sagittal.core.events.edits import Edit
+from sagittal.core.frames import R_NEUTRAL
+from sagittal.core.measure import MeasuredGait, measure_gait
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.pipeline import TakeAnalysis
+from sagittal.core.rotation import about, from_matrix, multiply, rotate
+from sagittal.server.report.bundle import load_bundle
+from sagittal.server.report.exports import analysis_files
+from sagittal.server.report.tracks import NAME, read_tracks
 from tests.helpers.walks import analysed, assert_same_figures
 from tests.server import walk
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core.memory import make_pages
+from sagittal.core.memory import make_pages
 
 
 def held_mb() -> float:

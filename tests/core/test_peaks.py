@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from core.frames import Floats
-from core.peaks import find_peaks
+from sagittal.core.frames import Floats
+from sagittal.core.peaks import find_peaks
 
 
 def walk(seed: int, decimals: int) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from core.plurals import plural
+from sagittal.core.plurals import plural
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 
-from core.frames import Floats
-from core.recording import SensorSignals, Subject, UniformRecording
-from core.rest import (
+from sagittal.core.frames import Floats
+from sagittal.core.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.rest import (
     RestParams,
     count_runs,
     drop_false_rests,

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core import rotation
-from core.frames import Floats
-from core.rotation import compiled
+from sagittal.core import rotation
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import compiled
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 

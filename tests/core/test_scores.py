@@ -9,13 +9,13 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from core.frames import SIDES, Bools, Floats, Side
-from core.norms import adult_reference
-from core.norms.profile import NINE, SAGITTAL
-from core.parameters.kinematic import MEAN_ZERO
-from core.parameters.result import CycleCurves
-from core.scores import Scores, score_curves
-from core.standing_angles import NAMES
+from sagittal.core.frames import SIDES, Bools, Floats, Side
+from sagittal.core.norms import adult_reference
+from sagittal.core.norms.profile import NINE, SAGITTAL
+from sagittal.core.parameters.kinematic import MEAN_ZERO
+from sagittal.core.parameters.result import CycleCurves
+from sagittal.core.scores import Scores, score_curves
+from sagittal.core.standing_angles import NAMES
 from tests.helpers.wbds import people
 
 
@@ -178,6 +178,8 @@ def test_a_session_without_strides_says_so() -> None:
 
 def test_scores_flags_changes_and_norms_need_no_compiler() -> None:
     """The web process imports them: numba would cost it seconds and memory."""
-    code = "import sys, core.scores, core.flags, core.change, core.norms.controls as c\n"
+    code = "import sys; from sagittal.core import change, flags, scores\n"
+    code += "from sagittal.core.norms import controls\n"
+
     code += "sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0

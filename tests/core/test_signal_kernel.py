@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.frames import Bools, Floats
-from core.signal_kernel import find_lows, find_steadiest_rate, measure_norms, measure_windows
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.signal_kernel import find_lows, find_steadiest_rate, measure_norms, measure_windows
 
 
 def lock(x: Floats) -> Floats:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from core.angles import SIGNS
-from core.errors import ParameterError
-from core.standing_angles import JOINTS, NAMES, check_standing
+from sagittal.core.angles import SIGNS
+from sagittal.core.errors import ParameterError
+from sagittal.core.standing_angles import JOINTS, NAMES, check_standing
 
 
 def test_every_angle_of_the_exports_may_be_entered() -> None:

@@ -10,11 +10,11 @@ from functools import cache
 
 import pytest
 
-from core.errors import ParameterError
-from core.parameters.spatial import NAMES
-from core.pipeline import TakeAnalysis, analyse
-from core.recording import Recording
-from core.simulate import simulate_scenario
+from sagittal.core.errors import ParameterError
+from sagittal.core.parameters.spatial import NAMES
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.recording import Recording
+from sagittal.core.simulate import simulate_scenario
 
 BELT = 1.1
 

@@ -10,35 +10,35 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.agreement.params import AgreementParams, ExchangeParams
-from core.angles import JointAngles
-from core.body.erkf.health import REFUSED_PCT
-from core.body.estimate import PoseEstimate
-from core.body.health import HealthFinding, find_worst_verdict
-from core.estimators import HINGES
-from core.events.result import Stride, Strides
-from core.frames import Segment
-from core.measure import measure_gait
-from core.parameters.catalogue import list_curve_figures
-from core.parameters.kinematic import cycle_curves, summarise_angles
-from core.parameters.live_figures import StrideSpan, early_figures
-from core.parameters.spatial import GROUND, NAMES
-from core.parameters.temporal import per_stride, summarise_times
-from core.pipeline import PipelineConfig, TakeAnalysis, analyse
-from core.quality import find_shown_level
-from core.recording import Recording
-from core.simulate import simulate_scenario
-from core.withheld import withhold_distances
-from server.report.bundle import load_bundle
-from server.report.curves import cycle_svg
-from server.report.exports import analysis_files
-from server.report.model import report_model
-from server.report.panels import curve_panels
-from server.report.quality_box import quality_box
-from server.report.table import NOBODY
-from server.report.tables import curves_csv
-from server.report.tracks import read_tracks
-from server.report.wording import REASONS
+from sagittal.core.agreement.params import AgreementParams, ExchangeParams
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.erkf.health import REFUSED_PCT
+from sagittal.core.body.estimate import PoseEstimate
+from sagittal.core.body.health import HealthFinding, find_worst_verdict
+from sagittal.core.estimators import HINGES
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.frames import Segment
+from sagittal.core.measure import measure_gait
+from sagittal.core.parameters.catalogue import list_curve_figures
+from sagittal.core.parameters.kinematic import cycle_curves, summarise_angles
+from sagittal.core.parameters.live_figures import StrideSpan, early_figures
+from sagittal.core.parameters.spatial import GROUND, NAMES
+from sagittal.core.parameters.temporal import per_stride, summarise_times
+from sagittal.core.pipeline import PipelineConfig, TakeAnalysis, analyse
+from sagittal.core.quality import find_shown_level
+from sagittal.core.recording import Recording
+from sagittal.core.simulate import simulate_scenario
+from sagittal.core.withheld import withhold_distances
+from sagittal.server.report.bundle import load_bundle
+from sagittal.server.report.curves import cycle_svg
+from sagittal.server.report.exports import analysis_files
+from sagittal.server.report.model import report_model
+from sagittal.server.report.panels import curve_panels
+from sagittal.server.report.quality_box import quality_box
+from sagittal.server.report.table import NOBODY
+from sagittal.server.report.tables import curves_csv
+from sagittal.server.report.tracks import read_tracks
+from sagittal.server.report.wording import REASONS
 from tests.helpers.marks import sweep_after
 from tests.helpers.walks import neura_recording
 

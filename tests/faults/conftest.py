@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from server.processes.supervisor import Workers
+from sagittal.server.processes.supervisor import Workers
 from tests.faults.clinic import Clinic, alive
 from tests.faults.forking import Forker
 from tests.helpers.engines import engine, postgres, source  # noqa: F401 - fixtures

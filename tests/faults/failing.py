@@ -6,7 +6,7 @@ import errno
 import os
 from pathlib import Path
 
-from server.storage import fs
+from sagittal.server.storage import fs
 
 
 class FailingSystem(fs.System):

@@ -21,16 +21,16 @@ import uvicorn.protocols.http.auto
 import uvicorn.protocols.websockets.auto  # noqa: F401 - what a server loads when it starts
 from fastapi import FastAPI
 
-import server.app
-from server.commands.serve import run, say
-from server.processes.lifeline import die_with
-from server.settings import Settings, load_settings
-from server.storage.migrate import upgrade
+from sagittal.server import app
+from sagittal.server.commands.serve import run, say
+from sagittal.server.processes.lifeline import die_with
+from sagittal.server.settings import Settings, load_settings
+from sagittal.server.storage.migrate import upgrade
 
 
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
-        wired = server.app.create_app(Settings(data_dir=Path(folder)))
+        wired = app.create_app(Settings(data_dir=Path(folder)))
         upgrade(Path(folder) / "sagittal.db")  # loads what migrations need
     forker = os.getpid()
     for line in sys.stdin:
@@ -46,7 +46,7 @@ def serve(wired: FastAPI, environment: dict[str, str], forker: int) -> None:
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     os.environ.update(environment)
     wired.state.settings = settings = load_settings()
-    server.app.create_app = lambda settings: wired
+    app.create_app = lambda settings: wired
     try:
         if code := run(settings, lambda address: say(f"at {address}")):
             say(f"ended {code}")

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from server.processes.environment import make_environment
-from server.settings import Settings
+from sagittal.server.processes.environment import make_environment
+from sagittal.server.settings import Settings
 from tests.data import ROOT
 from tests.faults.clinic import state_of, until
 

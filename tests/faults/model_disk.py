@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from server.storage import fs
+from sagittal.server.storage import fs
 
 
 class ModelDisk(fs.System):

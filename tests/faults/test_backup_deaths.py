@@ -16,19 +16,19 @@ from pathlib import Path
 import pytest
 from sqlalchemy import insert
 
-from server.services import checks, recordings
-from server.services.backups import BackupError, list_backups, make_backup
-from server.services.custody import StrangersError, refuse_strangers
-from server.services.restore_room import RestoreError
-from server.services.restoring import restore, try_restore
-from server.settings import Settings
-from server.storage import fs
-from server.storage.archive import make_key, read_key
-from server.storage.blob_folder import FolderBlobs
-from server.storage.blobs import Blob
-from server.storage.db import Database
-from server.storage.migrate import exists
-from server.storage.tables import now, recording_file
+from sagittal.server.services import checks, recordings
+from sagittal.server.services.backups import BackupError, list_backups, make_backup
+from sagittal.server.services.custody import StrangersError, refuse_strangers
+from sagittal.server.services.restore_room import RestoreError
+from sagittal.server.services.restoring import restore, try_restore
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.archive import make_key, read_key
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.blobs import Blob
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.migrate import exists
+from sagittal.server.storage.tables import now, recording_file
 from tests.data import ROOT
 from tests.faults.clinic import Clinic, find_room
 from tests.faults.failing import Dying, FailingSystem, PowerError
@@ -147,7 +147,7 @@ def test_a_disk_that_refuses_is_told_and_nothing_is_left(
 
 def run(*words: str, url: str = "") -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [sys.executable, "-m", "server.main", *words], cwd=ROOT, stdout=subprocess.DEVNULL,
+        [sys.executable, "-m", "sagittal.server.main", *words], cwd=ROOT, stdout=subprocess.DEVNULL,
         env=os.environ | {"SAGITTAL_DATABASE_URL": url},
     )  # fmt: skip
 

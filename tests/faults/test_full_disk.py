@@ -13,14 +13,14 @@ from typing import Any
 
 import pytest
 
-from server import audit, trail
-from server.services import patients, sessions
-from server.settings import Settings
-from server.storage import fs
-from server.storage.db import Database
-from server.storage.migrate import MigrationError, upgrade
-from server.storage.readiness import Readiness
-from server.storage.tables import now
+from sagittal.server import audit, trail
+from sagittal.server.services import patients, sessions
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.migrate import MigrationError, upgrade
+from sagittal.server.storage.readiness import Readiness
+from sagittal.server.storage.tables import now
 from tests.faults.failing import FailingSystem
 from tests.faults.small_disk import full, mounted, on_small_disk, run
 from tests.helpers.engines import on_both_engines

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from server.live import client
-from server.live.client import StreamReport, stream
-from server.live.pairing import pair
-from server.services import live, recordings
-from server.services.live_recordings import log_path
+from sagittal.server.live import client
+from sagittal.server.live.client import StreamReport, stream
+from sagittal.server.live.pairing import pair
+from sagittal.server.services import live, recordings
+from sagittal.server.services.live_recordings import log_path
 from tests.faults.clinic import Clinic
 from tests.faults.forking import Forker
 from tests.helpers.engines import on_both_engines

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from core.formats.live_log import FILE_MARK, hello_json, record
-from server.storage import fs, segments
+from sagittal.core.formats.live_log import FILE_MARK, hello_json, record
+from sagittal.server.storage import fs, segments
 from tests.faults.model_disk import ModelDisk
 from tests.helpers.live_takes import HELLO, frame
 

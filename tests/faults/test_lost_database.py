@@ -14,19 +14,19 @@ from pathlib import Path
 
 import pytest
 
-from server import audit
-from server.main import main
-from server.services import checks, custody, erasure, recordings, sessions
-from server.services.reviewed import ReviewedAnalyses
-from server.services.sweep import sweep
-from server.settings import Settings
-from server.storage import fs
-from server.storage.db import Database
-from server.storage.high_water import raise_mark
-from server.storage.migrate import copy_database, exists, upgrade
-from server.storage.trash import KEPT, FolderTrash
-from server.worker.task import load
-from server.worker.worker import Worker
+from sagittal.server import audit
+from sagittal.server.main import main
+from sagittal.server.services import checks, custody, erasure, recordings, sessions
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.sweep import sweep
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import raise_mark
+from sagittal.server.storage.migrate import copy_database, exists, upgrade
+from sagittal.server.storage.trash import KEPT, FolderTrash
+from sagittal.server.worker.task import load
+from sagittal.server.worker.worker import Worker
 from tests.data import ROOT
 from tests.faults.clinic import Clinic
 from tests.faults.failing import Dying, PowerError
@@ -111,7 +111,10 @@ def full(clinic: Clinic) -> Clinic:
 
 def serve(settings: Settings) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "server.main", "serve", "--data", str(settings.data_dir), "--port", "0"],
+        [
+            sys.executable, "-m", "sagittal.server.main",
+            "serve", "--data", str(settings.data_dir), "--port", "0",
+        ],
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env={**os.environ, "SAGITTAL_SWEEP_GRACE_S": "0", "SAGITTAL_WORKERS": "0",
              "SAGITTAL_DATABASE_URL": settings.database_url},

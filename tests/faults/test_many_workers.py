@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 from sqlalchemy import func, select
 
-from server.processes.supervisor import Workers
-from server.storage.db import Source
-from server.storage.tables import analysis, job
+from sagittal.server.processes.supervisor import Workers
+from sagittal.server.storage.db import Source
+from sagittal.server.storage.tables import analysis, job
 from tests.faults.clinic import PATIENCE_S, Clinic
 
 WORKERS, JOBS, KILLS = 4, 60, 5

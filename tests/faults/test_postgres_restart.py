@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from server.processes.supervisor import Workers
+from sagittal.server.processes.supervisor import Workers
 from tests.faults.clinic import Clinic, until
 from tests.helpers.postgres import stopped_server
 from tests.server.clinic import open_clinic

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from server.storage import fs
+from sagittal.server.storage import fs
 from tests.faults.model_disk import ModelDisk
 
 CONTENT = b"0123456789"

@@ -9,12 +9,12 @@ from dataclasses import replace
 
 import pytest
 
-from core.errors import SagittalError
-from server.services import checks, recordings
-from server.services.sweep import sweep
-from server.storage import fs
-from server.worker.task import load
-from server.worker.worker import Worker
+from sagittal.core.errors import SagittalError
+from sagittal.server.services import checks, recordings
+from sagittal.server.services.sweep import sweep
+from sagittal.server.storage import fs
+from sagittal.server.worker.task import load
+from sagittal.server.worker.worker import Worker
 from tests.faults.clinic import Clinic
 from tests.faults.failing import FailingSystem
 from tests.helpers.engines import on_both_engines
@@ -68,7 +68,7 @@ def test_a_result_that_cannot_be_stored_fails_its_job_with_a_reason(
     clinic: Clinic, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # its first sweep writes the file of a lock, which is not the call that is to fail
-    monkeypatch.setattr("server.worker.worker.sweep", lambda *_: 0)
+    monkeypatch.setattr("sagittal.server.worker.worker.sweep", lambda *_: 0)
     load(clinic.settings.task_modules)
     stop = threading.Event()
     worker = Worker(clinic.settings, clinic.db, clinic.blobs, clinic.queue, stop)

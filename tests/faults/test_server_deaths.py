@@ -19,12 +19,12 @@ import httpx
 import numpy as np
 import pytest
 
-from server.auth import accounts
-from server.auth.passwords import hash_password
-from server.auth.roles import Role
-from server.auth.sessions import Logins
-from server.processes.environment import make_environment
-from server.services import recordings
+from sagittal.server.auth import accounts
+from sagittal.server.auth.passwords import hash_password
+from sagittal.server.auth.roles import Role
+from sagittal.server.auth.sessions import Logins
+from sagittal.server.processes.environment import make_environment
+from sagittal.server.services import recordings
 from tests.data import ROOT
 from tests.faults.clinic import Clinic, alive, until
 from tests.faults.forking import ForkedServer, Forker
@@ -35,7 +35,7 @@ pytestmark = on_both_engines
 COMMAND = [
     sys.executable,
     "-c",
-    "from server.main import main; raise SystemExit(main())",
+    "from sagittal.server.main import main; raise SystemExit(main())",
     "serve",
     "--port",
     "0",

@@ -13,13 +13,13 @@ from typing import Any
 import pytest
 from sqlalchemy import select
 
-from core.formats.source import SourceFile
-from server.jobs.queue import JobView
-from server.processes.supervisor import Workers
-from server.services import erasure, recordings, sessions, tunings
-from server.services.references import list_referenced
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.tables import job
+from sagittal.core.formats.source import SourceFile
+from sagittal.server.jobs.queue import JobView
+from sagittal.server.processes.supervisor import Workers
+from sagittal.server.services import erasure, recordings, sessions, tunings
+from sagittal.server.services.references import list_referenced
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.tables import job
 from tests.core.fusion.algorithms.motion import trial_bytes
 from tests.faults.clinic import Clinic, until
 from tests.helpers.engines import on_both_engines
@@ -35,7 +35,9 @@ TRIALS = {"fit": 60.0, "judge": 30.0}
 def tuning_clinic(tmp_path: Path) -> Iterator[Clinic]:
     made = Clinic(tmp_path, lease_s=1.5)
     made.settings = dataclasses.replace(
-        made.settings, task_modules=("server.worker.tasks", "tests.faults.tiny_tasks"), job_timeout_s=60.0
+        made.settings,
+        task_modules=("sagittal.server.worker.tasks", "tests.faults.tiny_tasks"),
+        job_timeout_s=60.0,
     )
     for name, seconds in TRIALS.items():
         with recordings.receive(

@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 from sqlalchemy.exc import OperationalError
 
-from server.processes.environment import make_environment
-from server.processes.supervisor import Workers
-from server.settings import Settings
+from sagittal.server.processes.environment import make_environment
+from sagittal.server.processes.supervisor import Workers
+from sagittal.server.settings import Settings
 from tests.faults.clinic import Clinic, alive, state_of, until
 from tests.faults.tiny_tasks import STAGES
 from tests.helpers.engines import on_both_engines
@@ -237,8 +237,8 @@ def test_stopping_gives_the_job_back_unharmed(clinic: Clinic, workers: Workers) 
 def test_a_killed_server_takes_worker_and_child_along_and_the_next_one_goes_on(clinic: Clinic) -> None:
     script = textwrap.dedent("""
         import sys, time
-        from server.processes.supervisor import Workers
-        from server.settings import load_settings
+        from sagittal.server.processes.supervisor import Workers
+        from sagittal.server.settings import load_settings
         workers = Workers(load_settings())
         workers.start()
         print(*workers.pids, flush=True)

@@ -15,13 +15,13 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from core.errors import SignalError
-from core.formats.source import SourceFile
-from server.jobs.attempt import Attempt
-from server.jobs.queue import Claim
-from server.services import analyses
-from server.storage.blobs import Blob
-from server.worker.task import Task, register
+from sagittal.core.errors import SignalError
+from sagittal.core.formats.source import SourceFile
+from sagittal.server.jobs.attempt import Attempt
+from sagittal.server.jobs.queue import Claim
+from sagittal.server.services import analyses
+from sagittal.server.storage.blobs import Blob
+from sagittal.server.worker.task import Task, register
 
 STAGES = ("first", "second", "third")
 

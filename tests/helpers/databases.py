@@ -6,8 +6,8 @@ import functools
 import tempfile
 from pathlib import Path
 
-from server.storage import fs
-from server.storage.migrate import upgrade
+from sagittal.server.storage import fs
+from sagittal.server.storage.migrate import upgrade
 
 
 @functools.cache

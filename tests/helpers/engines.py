@@ -14,8 +14,8 @@ from typing import Final
 
 import pytest
 
-from server.settings import Settings
-from server.storage.db import Source
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Source
 from tests.data import ENGINE
 from tests.helpers.databases import write_database
 from tests.helpers.postgres import NoPostgresError, make_database, make_lasting_database, start_server

@@ -6,9 +6,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from core.body.erkf.filter import ErkfTrack
-from core.frames import FOOT, Floats
-from core.rotation import yaw
+from sagittal.core.body.erkf.filter import ErkfTrack
+from sagittal.core.frames import FOOT, Floats
+from sagittal.core.rotation import yaw
 from tests.core.body.erkf.walks import SEGMENTS, Take, angles_of
 
 JOINTS = {

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.frames import Floats
+from sagittal.core.frames import Floats
 
 WINDOW_S = 0.5
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from core.feedback import Baseline, Cue, FeedbackEngine, Prescription
-from core.frames import Floats, Side
+from sagittal.core.feedback import Baseline, Cue, FeedbackEngine, Prescription
+from sagittal.core.frames import Floats, Side
 
 NAME = "step_length_m"
 OPEN = Baseline(mean=0.40, sd=0.03, n=40, session_id="before")

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-from core.pipeline import PipelineConfig
+from sagittal.core.pipeline import PipelineConfig
 from tests.helpers.parameter_calls import CALLS
 from tests.helpers.parameter_changes import (
     DirectCall,

@@ -11,10 +11,10 @@ from functools import cache
 
 import numpy as np
 
-from core.events.foot_movement import FootMovement
-from core.frames import R_NEUTRAL, Floats
-from core.fusion.orientations import Orientations
-from core.rotation import about, from_matrix, multiply
+from sagittal.core.events.foot_movement import FootMovement
+from sagittal.core.frames import R_NEUTRAL, Floats
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import about, from_matrix, multiply
 from tests.data import data_folder
 
 RATE = 100.0

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.frames import FOOT, SUFFIX, Floats, Side
-from core.rotation import rotate
-from core.simulate.truth import TrueStride, WalkTruth
-from core.simulate.walker import SIGN
+from sagittal.core.frames import FOOT, SUFFIX, Floats, Side
+from sagittal.core.rotation import rotate
+from sagittal.core.simulate.truth import TrueStride, WalkTruth
+from sagittal.core.simulate.walker import SIGN
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from functools import cache
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from core.formats import SourceFile, parse_manifest, read_recording
-from core.frames import SIDES, Floats, Side
-from core.pipeline import TakeAnalysis, analyse
-from core.recording import Recording
+from sagittal.core.formats import SourceFile, parse_manifest, read_recording
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.recording import Recording
 from tests.data import data_folder
 from tests.helpers.kept import keep_recorded
 

@@ -12,10 +12,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from core.formats import SourceFile, parse_manifest, read_recording
-from core.frames import FOOT, SIDES, Floats, Segment, Side
-from core.pipeline import TakeAnalysis, analyse
-from core.recording import Recording, Subject
+from sagittal.core.formats import SourceFile, parse_manifest, read_recording
+from sagittal.core.frames import FOOT, SIDES, Floats, Segment, Side
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.recording import Recording, Subject
 from tests.data import data_folder
 from tests.helpers.kept import keep_recorded
 

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from core.body.l7s.filter import L7sInputs, L7sParams, L7sState, Worn, start_l7s_state
-from core.body.l7s.legs import LegModel
-from core.frames import Floats
+from sagittal.core.body.l7s.filter import L7sInputs, L7sParams, L7sState, Worn, start_l7s_state
+from sagittal.core.body.l7s.legs import LegModel
+from sagittal.core.frames import Floats
 
 EYE = np.eye(3)
 Z = EYE[2]

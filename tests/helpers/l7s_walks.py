@@ -13,25 +13,25 @@ from math import pi, radians
 
 import numpy as np
 
-from core.angles.measure import measure_angles
-from core.body.l7s.filter import Adjoint, L7sParams, Worn
-from core.body.l7s.inputs import free_acceleration
-from core.body.l7s.poses import l7s_poses
-from core.body.model import BodyModel
-from core.body.poses import Poses
-from core.body.still import FOOT_STILL, still_samples
-from core.calibration import calibrate
-from core.calibration.result import CalibratedRecording
-from core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.held_samples import SampleSeries
-from core.recording import UniformRecording
-from core.rotation import about, angle_between, multiply, rotate, to_matrix
-from core.simulate import SCRIPTS, WalkTruth, simulate
-from core.simulate.script import Arc, Pivot, Script, Stand, Straight, scale_script
-from core.simulate.walker import Walker
-from core.timeline import synchronise
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body.l7s.filter import Adjoint, L7sParams, Worn
+from sagittal.core.body.l7s.inputs import free_acceleration
+from sagittal.core.body.l7s.poses import l7s_poses
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.poses import Poses
+from sagittal.core.body.still import FOOT_STILL, still_samples
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.held_samples import SampleSeries
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rotation import about, angle_between, multiply, rotate, to_matrix
+from sagittal.core.simulate import SCRIPTS, WalkTruth, simulate
+from sagittal.core.simulate.script import Arc, Pivot, Script, Stand, Straight, scale_script
+from sagittal.core.simulate.walker import Walker
+from sagittal.core.timeline import synchronise
 
 _AHEAD = Straight(6.4, 0.64, 0.54)
 _CIRCLE = (Arc(1.2, 2 * pi, 0.56, 0.56), Arc(1.2, -2 * pi, 0.56, 0.56))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from core.formats.live_log import (
+from sagittal.core.formats.live_log import (
     FILE_MARK,
     Clock,
     Finish,
@@ -22,7 +22,7 @@ from core.formats.live_log import (
     hello_json,
     record,
 )
-from core.recording import ImuStream, Recording
+from sagittal.core.recording import ImuStream, Recording
 
 Samples = NDArray[np.float32]
 

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from core.agreement.live import LiveAgreement
-from core.calibration.live_attempt import WornSensors
-from core.errors import Notice
-from core.frames import Floats
-from core.online.calibrating import LiveCalibrator
-from core.recording import SensorSignals, UniformRecording
-from core.timeline.live import UniformBlock
+from sagittal.core.agreement.live import LiveAgreement
+from sagittal.core.calibration.live_attempt import WornSensors
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Floats
+from sagittal.core.online.calibrating import LiveCalibrator
+from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.timeline.live import UniformBlock
 
 
 def cut_blocks(recording: UniformRecording, sizes: Sequence[int] = (50,)) -> Iterator[UniformBlock]:

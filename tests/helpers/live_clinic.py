@@ -13,9 +13,9 @@ import httpx
 import websockets
 from websockets.asyncio.client import ClientConnection
 
-from core.formats.live_log import PROTOCOL, Hello, hello_json
-from server.services import patients, sessions
-from server.storage.tables import new_id
+from sagittal.core.formats.live_log import PROTOCOL, Hello, hello_json
+from sagittal.server.services import patients, sessions
+from sagittal.server.storage.tables import new_id
 from tests.helpers.live_takes import HELLO
 from tests.server.clinic import Clinic
 

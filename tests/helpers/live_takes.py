@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from core.formats.live_log import (
+from sagittal.core.formats.live_log import (
     Finish,
     Hello,
     SampleBatch,
@@ -19,9 +19,9 @@ from core.formats.live_log import (
     scan,
     view_samples,
 )
-from server.live.intake import TakeEnd
-from server.live.protocol import ProtocolError
-from server.storage import segments
+from sagittal.server.live.intake import TakeEnd
+from sagittal.server.live.protocol import ProtocolError
+from sagittal.server.storage import segments
 
 HELLO = Hello(
     take="7" * 32,

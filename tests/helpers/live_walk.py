@@ -7,12 +7,12 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from core.formats.live_log import Hello
-from core.simulate import simulate_scenario
-from server.live.follower import Follower
-from server.live.messages import Command, FeedItem, FollowTake, Report
-from server.live.playback import DueBatch, cut, hello_of
-from server.storage.tables import new_id
+from sagittal.core.formats.live_log import Hello
+from sagittal.core.simulate import simulate_scenario
+from sagittal.server.live.follower import Follower
+from sagittal.server.live.messages import Command, FeedItem, FollowTake, Report
+from sagittal.server.live.playback import DueBatch, cut, hello_of
+from sagittal.server.storage.tables import new_id
 
 PER_BATCH = 5
 

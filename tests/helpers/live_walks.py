@@ -8,13 +8,13 @@ from unittest.mock import patch
 
 import numpy as np
 
-from core.events.result import GaitEvent
-from core.formats.live_log import Hello, SampleBatch, SensorInfo, StreamInfo
-from core.frames import Floats, Side
-from core.online import LiveFrame, LiveStride, OnlineSession
-from core.online.chain import LiveChain
-from core.parameters.live_history import SampleHistory
-from core.recording import UniformRecording
+from sagittal.core.events.result import GaitEvent
+from sagittal.core.formats.live_log import Hello, SampleBatch, SensorInfo, StreamInfo
+from sagittal.core.frames import Floats, Side
+from sagittal.core.online import LiveFrame, LiveStride, OnlineSession
+from sagittal.core.online.chain import LiveChain
+from sagittal.core.parameters.live_history import SampleHistory
+from sagittal.core.recording import UniformRecording
 
 
 def hello_of(recording: UniformRecording) -> Hello:

@@ -13,9 +13,9 @@ from functools import cache
 import numpy as np
 from scipy.io import loadmat
 
-from core.frames import GRAVITY, Floats
-from core.recording import ImuStream, Recording, UniformRecording
-from core.timeline import synchronise
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.recording import ImuStream, Recording, UniformRecording
+from sagittal.core.timeline import synchronise
 from tests.data import data_folder
 from tests.helpers.kept import keep_recorded
 

@@ -11,22 +11,22 @@ from itertools import pairwise
 
 import numpy as np
 
-from core.angles.measure import measure_angles
-from core.body import BodyModel
-from core.body.arms import measure_arms
-from core.body.corrected import correct_signals
-from core.body.erkf.headings import align_forward_axes
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.poses import ErkfRun, foot_tracks, replace_orientations, run_erkf
-from core.body.pose_params import PoseParams
-from core.body.tree import PRESETS
-from core.calibration import calibrate
-from core.calibration.result import CalibratedRecording
-from core.events.result import StrideFlag
-from core.frames import SIDES, SUFFIX, Floats, Segment, Side
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.rotation import from_matrix, multiply, rotate
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body import BodyModel
+from sagittal.core.body.arms import measure_arms
+from sagittal.core.body.corrected import correct_signals
+from sagittal.core.body.erkf.headings import align_forward_axes
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.poses import ErkfRun, foot_tracks, replace_orientations, run_erkf
+from sagittal.core.body.pose_params import PoseParams
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.events.result import StrideFlag
+from sagittal.core.frames import SIDES, SUFFIX, Floats, Segment, Side
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import from_matrix, multiply, rotate
 from tests.data import data_folder
 from tests.helpers.kept import keep_recorded
 from tests.helpers.walks import neura_walk

@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from core.frames import Floats
+from sagittal.core.frames import Floats
 from tests.data import data_folder
 
 WALK, STANDING = slice(1110, 2080), slice(300, 1000)

@@ -11,9 +11,9 @@ from functools import cache
 
 import numpy as np
 
-from core.frames import FOOT, SIDES, Bools, Floats, Segment
-from core.fusion.algorithms.benchmark import ReferenceTrial
-from core.rotation import conjugate, rotate
+from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment
+from sagittal.core.fusion.algorithms.benchmark import ReferenceTrial
+from sagittal.core.rotation import conjugate, rotate
 from tests.data import data_folder
 from tests.helpers.gaitmap import MARKERS, MOCAP_RATE, RATE, signals, table
 from tests.helpers.walks import neura_walk

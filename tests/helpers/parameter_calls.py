@@ -10,27 +10,27 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.exchange import judge_legs
-from core.agreement.labels import PATH, sort_by_joints
-from core.agreement.slips import PlaceStep, PlaceTurns, judge_turns, question_strides
-from core.agreement.standings import StandingTurn, _has_slipped
-from core.agreement.terms import LevelMotion, find_terms
-from core.calibration.functional import find_functional_movements
-from core.calibration.table_top import calibrate_table_top
-from core.calibration.walking import moving_mask
-from core.events.detection import detect_contacts
-from core.events.foot_contact import FootContactState, advance_foot_contacts
-from core.events.gyro_peaks import gyro_peak_events
-from core.events.lumbar import _sides, detect_steps, find_step_times
-from core.events.turns import find_turns
-from core.frames import GRAVITY, Floats, Segment
-from core.pipeline import PipelineConfig
-from core.quality.stuck import mark_stuck
-from core.recording import SensorSignals, Subject, UniformRecording
-from core.rest import drop_false_rests
-from core.rotation import exp
-from core.setup.axes import fit_axes
-from core.squat.repetitions import find_repetitions
+from sagittal.core.agreement.exchange import judge_legs
+from sagittal.core.agreement.labels import PATH, sort_by_joints
+from sagittal.core.agreement.slips import PlaceStep, PlaceTurns, judge_turns, question_strides
+from sagittal.core.agreement.standings import StandingTurn, _has_slipped
+from sagittal.core.agreement.terms import LevelMotion, find_terms
+from sagittal.core.calibration.functional import find_functional_movements
+from sagittal.core.calibration.table_top import calibrate_table_top
+from sagittal.core.calibration.walking import moving_mask
+from sagittal.core.events.detection import detect_contacts
+from sagittal.core.events.foot_contact import FootContactState, advance_foot_contacts
+from sagittal.core.events.gyro_peaks import gyro_peak_events
+from sagittal.core.events.lumbar import _sides, detect_steps, find_step_times
+from sagittal.core.events.turns import find_turns
+from sagittal.core.frames import GRAVITY, Floats, Segment
+from sagittal.core.pipeline import PipelineConfig
+from sagittal.core.quality.stuck import mark_stuck
+from sagittal.core.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.rest import drop_false_rests
+from sagittal.core.rotation import exp
+from sagittal.core.setup.axes import fit_axes
+from sagittal.core.squat.repetitions import find_repetitions
 from tests.core.calibration.test_table_top import carried
 from tests.core.events.foot_signal import foot_pitch, orientation, orientations
 from tests.core.events.test_foot_contact import RATE, burst, moved, walk_pitch

@@ -10,11 +10,11 @@ from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from core.errors import SagittalError
-from core.pipeline import PipelineConfig, TakeAnalysis
-from core.pipeline.recipes import ACTIVITY, SIGNALS, choose_recipe, run_stages, say_nothing
-from core.pipeline.stages import PipelineStage
-from core.recording import Recording
+from sagittal.core.errors import SagittalError
+from sagittal.core.pipeline import PipelineConfig, TakeAnalysis
+from sagittal.core.pipeline.recipes import ACTIVITY, SIGNALS, choose_recipe, run_stages, say_nothing
+from sagittal.core.pipeline.stages import PipelineStage
+from sagittal.core.recording import Recording
 
 Path = tuple[str, ...]
 """Names of fields, `[key]` of mappings and `[place]` in tuples, from the configuration down to one value."""

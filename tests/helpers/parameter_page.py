@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 from typing import Final
 
-from core.parameters.catalogue import CATALOGUE, NEEDS, CurveFigure, ParameterEntry
+from sagittal.core.parameters.catalogue import CATALOGUE, NEEDS, CurveFigure, ParameterEntry
 from tests.data import ROOT
 
 PAGE: Final = ROOT / "docs" / "parameters.md"

@@ -10,26 +10,26 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import Floats, Segment
-from core.pipeline import PipelineConfig
-from core.recording import GivenLimits, Recording, UniformRecording
-from core.simulate import (
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.pipeline import PipelineConfig
+from sagittal.core.recording import GivenLimits, Recording, UniformRecording
+from sagittal.core.simulate import (
     SwingsAndBows,
     simulate,
     simulate_movement,
     simulate_scenario,
     simulate_swings_and_bows,
 )
-from core.simulate.chest import ChestStyle, Day, PostureHold, simulate_day
-from core.simulate.daily import OFF, DailyItem, record_daily_life, simulate_daily_life
-from core.simulate.magnetics import Dipole
-from core.simulate.script import Arc, Script, Stand, Straight
-from core.simulate.scripts import ON_SKIN
-from core.simulate.setup import Dropout, Lag
-from core.simulate.standing import simulate_sway
-from core.simulate.tug import simulate_chair_rises, simulate_tug
-from core.simulate.walker import Walker
-from core.timeline import synchronise
+from sagittal.core.simulate.chest import ChestStyle, Day, PostureHold, simulate_day
+from sagittal.core.simulate.daily import OFF, DailyItem, record_daily_life, simulate_daily_life
+from sagittal.core.simulate.magnetics import Dipole
+from sagittal.core.simulate.script import Arc, Script, Stand, Straight
+from sagittal.core.simulate.scripts import ON_SKIN
+from sagittal.core.simulate.setup import Dropout, Lag
+from sagittal.core.simulate.standing import simulate_sway
+from sagittal.core.simulate.tug import simulate_chair_rises, simulate_tug
+from sagittal.core.simulate.walker import Walker
+from sagittal.core.timeline import synchronise
 from tests.helpers.parameter_calls import CALLS
 from tests.helpers.parameter_changes import DirectCall, StagedTake, replace_value
 from tests.helpers.perturbations import delay_sensor, find_middle, slip_sensor

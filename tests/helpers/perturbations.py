@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.agreement.repair import take_lag_out
-from core.agreement.strides import find_main_axis
-from core.frames import Floats, Segment
-from core.recording import UniformRecording
-from core.rotation import exp, rotate
-from core.timeline import TimelineParams
+from sagittal.core.agreement.repair import take_lag_out
+from sagittal.core.agreement.strides import find_main_axis
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rotation import exp, rotate
+from sagittal.core.timeline import TimelineParams
 
 SLIP_S = 0.3
 """A sensor that slips does so within this time."""

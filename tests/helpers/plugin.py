@@ -14,9 +14,9 @@ from typing import Final
 import hypothesis
 import pytest
 
-from server.processes.compiling import compile_filters
-from server.processes.environment import ONE_THREAD
-from server.storage.compile_cache import has_compiled_filters, share_compile_cache
+from sagittal.server.processes.compiling import compile_filters
+from sagittal.server.processes.environment import ONE_THREAD
+from sagittal.server.storage.compile_cache import has_compiled_filters, share_compile_cache
 from tests.data import ENGINE, NO_RECORDINGS, ROOT
 
 # before anything imports numba: every process that a test starts inherits it

@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from server.storage.migrate import upgrade
+from sagittal.server.storage.migrate import upgrade
 
 USERS: Final = ("postgres", "nobody")
 """Whom root starts it as: the first there is."""

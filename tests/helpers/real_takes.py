@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.io import loadmat
 
-from core.frames import Segment
-from core.pipeline import TakeAnalysis, analyse
-from core.recording import ImuStream, Recording
+from sagittal.core.frames import Segment
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.recording import ImuStream, Recording
 from tests.data import data_folder
 from tests.helpers.gaitmap import RATE, analysed, recording_of, signals
 from tests.helpers.ipol import WALKS, ipol_analysis, ipol_recording

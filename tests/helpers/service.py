@@ -41,7 +41,7 @@ def line_with(process: subprocess.Popen[str], pattern: str) -> str:
 def served(folder: Path) -> Iterator[Service]:
     """Run `sagittal serve` on a folder and set up its first administrator at the printed address."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "server.main", "serve", "--data", str(folder), "--port", "0"],
+        [sys.executable, "-m", "sagittal.server.main", "serve", "--data", str(folder), "--port", "0"],
         cwd=ROOT, stdout=subprocess.PIPE, text=True,
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
     )  # fmt: skip

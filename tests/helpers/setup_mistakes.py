@@ -8,15 +8,15 @@ from itertools import permutations, product
 
 import numpy as np
 
-from core.agreement import Agreement, AgreementParams
-from core.agreement.agree import compare_sensors
-from core.agreement.exchange import SensorExchange, find_exchange
-from core.formats.reader import correct_streams
-from core.frames import Floats, Segment
-from core.recording import Recording
-from core.setup import SetupRepair, propose_repair
-from core.setup.propose import propose_labels
-from core.timeline import synchronise
+from sagittal.core.agreement import Agreement, AgreementParams
+from sagittal.core.agreement.agree import compare_sensors
+from sagittal.core.agreement.exchange import SensorExchange, find_exchange
+from sagittal.core.formats.reader import correct_streams
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.recording import Recording
+from sagittal.core.setup import SetupRepair, propose_repair
+from sagittal.core.setup.propose import propose_labels
+from sagittal.core.timeline import synchronise
 
 SIGNED: tuple[Floats, ...] = tuple(
     np.eye(3)[list(order)] * np.array(signs)[:, None]

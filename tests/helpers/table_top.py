@@ -6,9 +6,9 @@ from functools import cache
 
 import numpy as np
 
-from core.frames import Segment
-from core.recording import ImuStream, Recording, Subject
-from core.rotation import multiply
+from sagittal.core.frames import Segment
+from sagittal.core.recording import ImuStream, Recording, Subject
+from sagittal.core.rotation import multiply
 from tests.core.body.chain.squats import HEIGHT_M, squat_on
 from tests.core.calibration.test_table_top import RATE, WORN, carry
 

@@ -14,10 +14,10 @@ from typing import Final
 from babel.messages.catalog import Catalog
 from babel.messages.pofile import read_po, write_po
 
-from server.report.level import ANATOMICAL, STANDING
+from sagittal.server.report.level import ANATOMICAL, STANDING
+from sagittal.web.language import CITED, LANGUAGES, SOURCE, catalogue_path
+from sagittal.web.template_texts import has_words, list_texts, reads_like_text
 from tests.data import ROOT
-from web.language import CITED, LANGUAGES, SOURCE, catalogue_path
-from web.template_texts import has_words, list_texts, reads_like_text
 
 SAID: Final = re.compile(
     r"^(Notice|_notify|_refuse|Problem|Offer|SignalError|CalibrationError|EstimationError"

@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.angles import JointAngles
-from core.body.feet import FootTracks
-from core.events.result import GaitEvent, GaitEvents
-from core.frames import FOOT, SIDES
-from core.measure import MeasuredGait, Tracks, measure_gait
-from core.pipeline import PipelineConfig, analyse
-from core.shoe import Shoe
-from core.simulate import WalkTruth, simulate_scenario
-from core.simulate.sensors import PLACES
-from core.simulate.walker import Anatomy
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.events.result import GaitEvent, GaitEvents
+from sagittal.core.frames import FOOT, SIDES
+from sagittal.core.measure import MeasuredGait, Tracks, measure_gait
+from sagittal.core.pipeline import PipelineConfig, analyse
+from sagittal.core.shoe import Shoe
+from sagittal.core.simulate import WalkTruth, simulate_scenario
+from sagittal.core.simulate.sensors import PLACES
+from sagittal.core.simulate.walker import Anatomy
 from tests.helpers.kept import keep
 
 _ANATOMY = Anatomy()

@@ -10,17 +10,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.events.result import Stride
-from core.formats import SourceFile, parse_manifest, read_recording
-from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment
-from core.parameters.result import Parameter
-from core.pipeline import TakeAnalysis, analyse
-from core.recording import Recording, SensorSignals, UniformRecording
-from core.rotation import rotate
-from core.simulate import SCRIPTS, WalkTruth, simulate, simulate_scenario
-from core.simulate.script import Script, SingleSteps
-from core.simulate.walker import SIGN, Walker
-from core.timeline import synchronise
+from sagittal.core.events.result import Stride
+from sagittal.core.formats import SourceFile, parse_manifest, read_recording
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.recording import Recording, SensorSignals, UniformRecording
+from sagittal.core.rotation import rotate
+from sagittal.core.simulate import SCRIPTS, WalkTruth, simulate, simulate_scenario
+from sagittal.core.simulate.script import Script, SingleSteps
+from sagittal.core.simulate.walker import SIGN, Walker
+from sagittal.core.timeline import synchronise
 from tests.data import data_folder
 from tests.helpers.kept import keep, keep_recorded
 

@@ -8,8 +8,8 @@ from functools import cache
 
 import numpy as np
 
-from core.frames import Floats, Side
-from core.norms.profile import MeanCurves
+from sagittal.core.frames import Floats, Side
+from sagittal.core.norms.profile import MeanCurves
 from tests.data import data_folder
 
 SIDE: dict[str, Side] = {"L": "left", "R": "right"}

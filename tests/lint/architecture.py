@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tests.data import ROOT
 
-ALLOWED_IN_CORE = {"numpy", "scipy", "numba", "core"}
+ALLOWED_IN_CORE = {"numpy", "scipy", "numba", "sagittal"}
 ALLOWED_IN_FORMATS = ALLOWED_IN_CORE | {"pyarrow", "defusedxml", "h5py"}
 DATED = ("core/sample_blocks.py", "core/activity/result.py", "core/activity/totals.py", "core/formats/cwa.py")
 """They handle dates read from a device's file; none reads the clock."""

@@ -144,7 +144,7 @@ def find_untested_modules() -> list[str]:
         for room in ROOMS
         for path in (ROOT / room).rglob("*.py")
         if path.name != "__init__.py"
-        and ".".join(path.relative_to(ROOT).with_suffix("").parts) not in imported
+        and ".".join(("sagittal", *path.relative_to(ROOT).with_suffix("").parts)) not in imported
         and not (ROOT / name_test(path.relative_to(ROOT))).exists()
     )
 

@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
-from core.parameters.catalogue import CATALOGUE
-from server.report.wording import NO_NORM, REASONS
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.report.wording import NO_NORM, REASONS
 from tests.data import ROOT
 
 MOST_WORDS: Final = 25

@@ -10,25 +10,30 @@ from typing import Any
 
 import numpy as np
 
-from core.body.estimate import PoseEstimate
-from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
-from core.errors import Notice
-from core.events.foot_pitch import pitch_signal
-from core.filter_comparison.result import FilterAgreement, FilterComparison, FilterRequest, FilterSpread
-from core.frames import FOOT, SIDES, Segment
-from core.fusion.algorithms.benchmark import OrientationScore
-from core.fusion.orientations import Orientations
-from core.measure import measure_gait
-from core.pipeline import TakeAnalysis
-from core.quality import QualityReport
-from core.recording import Recording, SensorSignals, Subject, UniformRecording
-from core.rotation import about
-from server.commands.sensitivity import analyse_simulated
-from server.jobs.queue import COMPARE_FILTERS, SENSITIVITY
-from server.report.exports import analysis_files
-from server.report.filter_files import filter_run_files
-from server.report.sensitivity import sensitivity_files, summarise_sensitivity
-from server.services import analyses, filter_runs, recordings, sensitivities, sessions
+from sagittal.core.body.estimate import PoseEstimate
+from sagittal.core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
+from sagittal.core.errors import Notice
+from sagittal.core.events.foot_pitch import pitch_signal
+from sagittal.core.filter_comparison.result import (
+    FilterAgreement,
+    FilterComparison,
+    FilterRequest,
+    FilterSpread,
+)
+from sagittal.core.frames import FOOT, SIDES, Segment
+from sagittal.core.fusion.algorithms.benchmark import OrientationScore
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.measure import measure_gait
+from sagittal.core.pipeline import TakeAnalysis
+from sagittal.core.quality import QualityReport
+from sagittal.core.recording import Recording, SensorSignals, Subject, UniformRecording
+from sagittal.core.rotation import about
+from sagittal.server.commands.sensitivity import analyse_simulated
+from sagittal.server.jobs.queue import COMPARE_FILTERS, SENSITIVITY
+from sagittal.server.report.exports import analysis_files
+from sagittal.server.report.filter_files import filter_run_files
+from sagittal.server.report.sensitivity import sensitivity_files, summarise_sensitivity
+from sagittal.server.services import analyses, filter_runs, recordings, sensitivities, sessions
 from tests.server import walk
 from tests.server.clinic import Clinic
 

@@ -9,14 +9,14 @@ from typing import Any, Final
 
 from sqlalchemy import insert
 
-from server.auth.tokens import token_hash
-from server.services import identities, prescriptions, programmes
-from server.storage.care_tables import emergency_access
-from server.storage.field_cipher import make_keys
-from server.storage.live_tables import live_take
-from server.storage.person_tables import consent
-from server.storage.report_tables import report_link, signed_report
-from server.storage.tables import (
+from sagittal.server.auth.tokens import token_hash
+from sagittal.server.services import identities, prescriptions, programmes
+from sagittal.server.storage.care_tables import emergency_access
+from sagittal.server.storage.field_cipher import make_keys
+from sagittal.server.storage.live_tables import live_take
+from sagittal.server.storage.person_tables import consent
+from sagittal.server.storage.report_tables import report_link, signed_report
+from sagittal.server.storage.tables import (
     analysis,
     analysis_file,
     file_upload,

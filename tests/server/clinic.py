@@ -14,11 +14,11 @@ from fastapi import FastAPI
 from pwdlib import PasswordHash
 from pwdlib.hashers.argon2 import Argon2Hasher
 
-from server.app import create_app
-from server.auth import accounts
-from server.auth.roles import Role
-from server.settings import Settings
-from server.storage.db import Database
+from sagittal.server.app import create_app
+from sagittal.server.auth import accounts
+from sagittal.server.auth.roles import Role
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database
 from tests.helpers.databases import write_database
 from tests.helpers.engines import choose_url
 

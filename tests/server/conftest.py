@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from server.auth import passwords
+from sagittal.server.auth import passwords
 from tests.helpers.engines import bare_source, engine, postgres, source  # noqa: F401 - fixtures
 from tests.server.clinic import CHEAP
 

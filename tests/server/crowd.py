@@ -10,11 +10,11 @@ from typing import Any
 
 from sqlalchemy import Engine, Table, event, insert
 
-from core.frames import SEGMENTS
-from core.quality.devices import DeviceCheck
-from server.services.provenance import CODE_VERSION
-from server.storage.blobs import Blob
-from server.storage.tables import (
+from sagittal.core.frames import SEGMENTS
+from sagittal.core.quality.devices import DeviceCheck
+from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.storage.blobs import Blob
+from sagittal.server.storage.tables import (
     analysis,
     analysis_file,
     device_check,

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from core.activity.result import (
+from sagittal.core.activity.result import (
     ActivityBout,
     ActivityKind,
     ActivityResult,
@@ -18,12 +18,12 @@ from core.activity.result import (
     TransitionCandidate,
     WearPeriod,
 )
-from core.activity.totals import sum_days, sum_hours
-from core.frames import Floats
-from core.pipeline import TakeAnalysis
-from core.quality import QualityReport
-from core.recording import Recording
-from server.report.exports import analysis_files
+from sagittal.core.activity.totals import sum_days, sum_hours
+from sagittal.core.frames import Floats
+from sagittal.core.pipeline import TakeAnalysis
+from sagittal.core.quality import QualityReport
+from sagittal.core.recording import Recording
+from sagittal.server.report.exports import analysis_files
 
 STARTED: Final = dt.datetime.fromisoformat("2026-11-16T18:00:00")
 """A Monday at six in the evening."""

@@ -6,13 +6,13 @@ import datetime as dt
 from collections.abc import Sequence
 from typing import Any
 
-from core.feedback import Cue
-from server.services import live, live_training, patients, sessions
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.blobs import BlobStore
-from server.storage.db import Database
-from server.storage.live_tables import live_take
-from server.storage.tables import new_id
+from sagittal.core.feedback import Cue
+from sagittal.server.services import live, live_training, patients, sessions
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.live_tables import live_take
+from sagittal.server.storage.tables import new_id
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import uvicorn
 
-from server.settings import Settings
-from server.web_server.build import build_server
-from server.web_server.connection import ConnectionLimits
-from server.web_server.listener import open_listener
+from sagittal.server.settings import Settings
+from sagittal.server.web_server.build import build_server
+from sagittal.server.web_server.connection import ConnectionLimits
+from sagittal.server.web_server.listener import open_listener
 
 
 @contextlib.asynccontextmanager

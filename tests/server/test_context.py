@@ -10,9 +10,9 @@ import httpx
 import pytest
 from fastapi import FastAPI, Request
 
-from server import context
-from server.context import DeviceId, Id, StudyVisits, address_of
-from server.services.studies import StudyChoice
+from sagittal.server import context
+from sagittal.server.context import DeviceId, Id, StudyVisits, address_of
+from sagittal.server.services.studies import StudyChoice
 
 pytestmark = pytest.mark.anyio
 

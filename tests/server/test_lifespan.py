@@ -11,16 +11,16 @@ import pytest
 from fastapi import FastAPI
 from sqlalchemy import select
 
-from server.lifespan import _say_estimators, _say_workers, run_installation
-from server.metrics import RequestMetrics
-from server.processes.supervisor import Workers
-from server.services import patients
-from server.services.custody import StrangersError
-from server.settings import Settings
-from server.storage.blob_folder import FolderBlobs
-from server.storage.db import Database
-from server.storage.high_water import read_mark
-from server.storage.tables import patient
+from sagittal.server.lifespan import _say_estimators, _say_workers, run_installation
+from sagittal.server.metrics import RequestMetrics
+from sagittal.server.processes.supervisor import Workers
+from sagittal.server.services import patients
+from sagittal.server.services.custody import StrangersError
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import read_mark
+from sagittal.server.storage.tables import patient
 from tests.helpers.databases import write_database
 
 

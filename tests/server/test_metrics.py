@@ -11,14 +11,14 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from sqlalchemy import update
 
-from server.jobs.table import TableQueue
-from server.metrics import BUCKETS_S, RequestMetrics, StateCollector
-from server.nodes.registry import Nodes
-from server.services import backup_schedule, live, patients, sessions
-from server.services.backup_schedule import BackupState, Outcome
-from server.settings import Settings
-from server.storage.db import Database
-from server.storage.tables import job, now
+from sagittal.server.jobs.table import TableQueue
+from sagittal.server.metrics import BUCKETS_S, RequestMetrics, StateCollector
+from sagittal.server.nodes.registry import Nodes
+from sagittal.server.services import backup_schedule, live, patients, sessions
+from sagittal.server.services.backup_schedule import BackupState, Outcome
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import job, now
 from tests.helpers.databases import write_database
 
 Labels = frozenset[tuple[str, str]]

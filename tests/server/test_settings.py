@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from server.settings import Settings, SettingsError, load_settings
+from sagittal.server.settings import Settings, SettingsError, load_settings
 
 EVERYWHERE = "0.0.0.0"  # noqa: S104 - never bound here
 

@@ -9,7 +9,7 @@ from typing import Final
 import pytest
 from jinja2 import meta
 
-from server.http.templates import load_templates
+from sagittal.server.http.templates import load_templates
 from tests.data import ROOT
 
 TEMPLATES: Final = sorted((ROOT / "web" / "templates").glob("*.html"))

@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from core.activity.monitor import monitor_activity
-from core.activity.result import KINDS, ActivityResult
-from core.frames import Segment
-from core.recording import ImuStream, as_long_stream
-from core.simulate.chest import ChestStyle, Day, PostureHold, simulate_day
-from core.simulate.daily import KIND_OF, DailySimulation, plan_daily_life, simulate_daily_life
-from core.simulate.scripts import ON_SKIN
+from sagittal.core.activity.monitor import monitor_activity
+from sagittal.core.activity.result import KINDS, ActivityResult
+from sagittal.core.frames import Segment
+from sagittal.core.recording import ImuStream, as_long_stream
+from sagittal.core.simulate.chest import ChestStyle, Day, PostureHold, simulate_day
+from sagittal.core.simulate.daily import KIND_OF, DailySimulation, plan_daily_life, simulate_daily_life
+from sagittal.core.simulate.scripts import ON_SKIN
 from tests.data import data_folder
 from tests.helpers import mobgap
 from tests.helpers.event_scoring import match

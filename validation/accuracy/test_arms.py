@@ -10,15 +10,15 @@ from statistics import fmean
 
 import numpy as np
 
-from core.angles.measure import measure_angles
-from core.body.arms import MeasuredArms
-from core.body.erkf.poses import ErkfRun, foot_tracks, replace_orientations, run_erkf
-from core.body.mounting import MountedSensors
-from core.body.tree import PRESETS
-from core.frames import FOOT, SHANK, SIDES, Bools, Floats
-from core.rest import index_window
-from core.rotation import wrap_angle
-from core.simulate import WalkTruth, simulate_scenario
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body.arms import MeasuredArms
+from sagittal.core.body.erkf.poses import ErkfRun, foot_tracks, replace_orientations, run_erkf
+from sagittal.core.body.mounting import MountedSensors
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.frames import FOOT, SHANK, SIDES, Bools, Floats
+from sagittal.core.rest import index_window
+from sagittal.core.rotation import wrap_angle
+from sagittal.core.simulate import WalkTruth, simulate_scenario
 from tests.helpers.neura import SHIPPED, Chain, chain, take
 from tests.helpers.neura_angles import scores
 from tests.helpers.walks import analysed

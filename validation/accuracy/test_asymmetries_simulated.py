@@ -10,8 +10,8 @@ from typing import Final
 
 import pytest
 
-from core.measure import MeasuredGait
-from core.parameters.symmetry import compare_sides
+from sagittal.core.measure import MeasuredGait
+from sagittal.core.parameters.symmetry import compare_sides
 from tests.helpers.true_walks import measured_walk
 from validation.figures import record
 

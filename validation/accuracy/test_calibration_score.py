@@ -14,20 +14,20 @@ from functools import cache
 
 import numpy as np
 
-from core.agreement import check_agreement
-from core.body.mounting import mount_sensors
-from core.calibration import calibrate
-from core.calibration.result import CalibratedRecording
-from core.calibration.score import RULES, CalibrationScore, score_calibration
-from core.frames import SHANK, SIDES, THIGH, Segment
-from core.fusion.mahony import estimate_orientations
-from core.pipeline import PipelineConfig
-from core.quality.stuck import drop_stuck_sensors
-from core.recording import UniformRecording
-from core.rotation import about, to_matrix
-from core.simulate import RecordingSetup, SwingsAndBows, simulate_swings_and_bows
-from core.simulate.scripts import ON_SKIN
-from core.timeline import synchronise
+from sagittal.core.agreement import check_agreement
+from sagittal.core.body.mounting import mount_sensors
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.calibration.score import RULES, CalibrationScore, score_calibration
+from sagittal.core.frames import SHANK, SIDES, THIGH, Segment
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.pipeline import PipelineConfig
+from sagittal.core.quality.stuck import drop_stuck_sensors
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rotation import about, to_matrix
+from sagittal.core.simulate import RecordingSetup, SwingsAndBows, simulate_swings_and_bows
+from sagittal.core.simulate.scripts import ON_SKIN
+from sagittal.core.timeline import synchronise
 from tests.helpers.gaitmap import RATE, recording_of, signals
 from tests.helpers.ipol import WALKS, ipol_recording
 from tests.helpers.walks import simulated

@@ -12,15 +12,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body import BodyModel
-from core.body.erkf import filter as erkf_filter
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.poses import run_erkf
-from core.body.still import QUIETEST, contact_samples
-from core.frames import FOOT, SIDES, Bools, Floats, Side
-from core.parameters import measure_distances
-from core.pipeline import analyse
-from core.pipeline.analysis import TakeAnalysis
+from sagittal.core.body import BodyModel
+from sagittal.core.body.erkf import filter as erkf_filter
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.poses import run_erkf
+from sagittal.core.body.still import QUIETEST, contact_samples
+from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Side
+from sagittal.core.parameters import measure_distances
+from sagittal.core.pipeline import analyse
+from sagittal.core.pipeline.analysis import TakeAnalysis
 from tests.helpers.gaitmap import COPIES, recording_of, resampled, true_strides
 from tests.helpers.gaitmap import RATE as GAITMAP_RATE
 from tests.helpers.ipol import FEET, RATE, WALKS, checked_events, first_s, ipol_analysis, ipol_recording

@@ -14,10 +14,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.feet import FootTracks
-from core.frames import SIDES, SUFFIX, Floats, Side
-from core.parameters import gait_parameters, measure_distances
-from core.pipeline import TakeAnalysis, analyse
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.frames import SIDES, SUFFIX, Floats, Side
+from sagittal.core.parameters import gait_parameters, measure_distances
+from sagittal.core.pipeline import TakeAnalysis, analyse
 from tests.data import data_folder
 from tests.helpers.neura import STRAIGHT
 from tests.helpers.walks import neura_recording

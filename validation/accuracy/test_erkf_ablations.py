@@ -14,14 +14,14 @@ from math import pi, radians
 
 import numpy as np
 
-from core.body.erkf.filter import filter_block
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.smoother import smooth
-from core.body.erkf.start import start_state
-from core.body.tree import ImuTree
-from core.frames import Floats
-from core.rotation import about, conjugate, exp, multiply, rotate
-from core.simulate import Arc, Pivot, RecordingSetup, SoftTissue, Stand, Straight, Walker, simulate
+from sagittal.core.body.erkf.filter import filter_block
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.smoother import smooth
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.body.tree import ImuTree
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import about, conjugate, exp, multiply, rotate
+from sagittal.core.simulate import Arc, Pivot, RecordingSetup, SoftTissue, Stand, Straight, Walker, simulate
 from tests.core.body.erkf.walks import SEGMENTS, Take, take_of
 from tests.helpers.erkf_scoring import HEADER, Score, largest, score
 from validation.figures import record

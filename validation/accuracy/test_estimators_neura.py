@@ -10,14 +10,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from core.body import BodyModel
-from core.body.erkf.poses import run_erkf
-from core.body.l7s.filter import Worn
-from core.body.l7s.inputs import free_acceleration
-from core.body.l7s.poses import l7s_poses
-from core.body.still import FOOT_STILL, still_samples
-from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
-from core.fusion.orientations import Orientations
+from sagittal.core.body import BodyModel
+from sagittal.core.body.erkf.poses import run_erkf
+from sagittal.core.body.l7s.filter import Worn
+from sagittal.core.body.l7s.inputs import free_acceleration
+from sagittal.core.body.l7s.poses import l7s_poses
+from sagittal.core.body.still import FOOT_STILL, still_samples
+from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
+from sagittal.core.fusion.orientations import Orientations
 from tests.helpers.neura import BODY, HEIGHT_M, SHIPPED, angles_deg, healthy, stride_errors_m, take
 from tests.helpers.neura_angles import scores
 from tests.helpers.walks import neura_analysis

@@ -14,9 +14,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.erkf.headings import turn_forward_axes
-from core.frames import Floats, Segment
-from core.rotation import conjugate, multiply
+from sagittal.core.body.erkf.headings import turn_forward_axes
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.rotation import conjugate, multiply
 from tests.helpers.neura import (
     SEGMENTS,
     WALK,

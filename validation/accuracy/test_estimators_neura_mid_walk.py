@@ -13,9 +13,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.calibration import calibrate
-from core.frames import SIDES, Floats, Side
-from core.fusion.mahony import estimate_orientations
+from sagittal.core.calibration import calibrate
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.fusion.mahony import estimate_orientations
 from tests.helpers.neura import RATE, Chain, chain, healthy, true_strides
 from tests.helpers.neura_angles import reference
 from tests.helpers.walks import cut, neura_walk

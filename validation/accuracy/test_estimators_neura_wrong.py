@@ -19,23 +19,23 @@ from typing import cast
 import numpy as np
 import pytest
 
-from core import events
-from core.body import contact_mask, forward_kinematics
-from core.body.corrected import correct_signals
-from core.body.erkf.filter import erkf_inputs, filter_block
-from core.body.erkf.headings import turn_forward_axes
-from core.body.erkf.health import REFUSED_PCT, RESIDUAL_MM
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.start import start_state
-from core.calibration import calibrate
-from core.calibration.gyro_pca import about_vertical
-from core.calibration.result import CalibratedRecording
-from core.calibration.standing import vertical_frame
-from core.frames import FOOT, SIDES, Floats, Segment, Side
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.recording import SensorSignals, UniformRecording
-from core.rest import index_window
+from sagittal.core import events
+from sagittal.core.body import contact_mask, forward_kinematics
+from sagittal.core.body.corrected import correct_signals
+from sagittal.core.body.erkf.filter import erkf_inputs, filter_block
+from sagittal.core.body.erkf.headings import turn_forward_axes
+from sagittal.core.body.erkf.health import REFUSED_PCT, RESIDUAL_MM
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.gyro_pca import about_vertical
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.calibration.standing import vertical_frame
+from sagittal.core.frames import FOOT, SIDES, Floats, Segment, Side
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.rest import index_window
 from tests.helpers.neura import (
     BODY,
     RATE,

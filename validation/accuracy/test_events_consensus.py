@@ -12,13 +12,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import calibration, timeline
-from core.events.consensus import agree_on_contacts, all_detectors
-from core.events.gyro_peaks import RECONSTRUCTION, GyroPeakPresets, gyro_peak_events
-from core.events.result import EventKind, GaitEvents
-from core.frames import SIDES
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
+from sagittal.core import calibration, timeline
+from sagittal.core.events.consensus import agree_on_contacts, all_detectors
+from sagittal.core.events.gyro_peaks import RECONSTRUCTION, GyroPeakPresets, gyro_peak_events
+from sagittal.core.events.result import EventKind, GaitEvents
+from sagittal.core.frames import SIDES
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
 from tests.helpers.event_scoring import Score, match
 from tests.helpers.gaitmap import COPIES, RATE, recording_of, reference_strides, resampled
 from tests.helpers.walks import neura_walk, simulated

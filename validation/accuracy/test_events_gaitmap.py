@@ -14,10 +14,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import calibration, events, timeline
-from core.events.result import EventKind, GaitEvents, Strides
-from core.frames import SIDES, Floats, Side
-from core.fusion.mahony import estimate_orientations
+from sagittal.core import calibration, events, timeline
+from sagittal.core.events.result import EventKind, GaitEvents, Strides
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.fusion.mahony import estimate_orientations
 from tests.helpers.event_scoring import Score, match
 from tests.helpers.gaitmap import COPIES, RATE, recording_of, reference_strides, resampled
 from validation.figures import record, record_in_short

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.events import detect
-from core.events.detection import KINDS
-from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
-from core.frames import FOOT, SIDES, Side
-from core.fusion.orientations import Orientations
+from sagittal.core.events import detect
+from sagittal.core.events.detection import KINDS
+from sagittal.core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
+from sagittal.core.frames import FOOT, SIDES, Side
+from sagittal.core.fusion.orientations import Orientations
 from validation.accuracy.test_events_consensus import take
 from validation.figures import record
 

@@ -12,9 +12,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.events.lumbar import detect_steps
-from core.events.steps import Steps
-from core.frames import SIDES, Floats
+from sagittal.core.events.lumbar import detect_steps
+from sagittal.core.events.steps import Steps
+from sagittal.core.frames import SIDES, Floats
 from tests.helpers.event_scoring import Score, match
 from tests.helpers.mobgap import TRIALS, Period, periods, uniform
 from tests.helpers.walks import neura_walk, only

@@ -16,12 +16,12 @@ from functools import cache
 
 import numpy as np
 
-from core import calibration, events, timeline
-from core.errors import Notice
-from core.events.result import GaitEvents, Strides
-from core.formats import SourceFile, parse_manifest, read_recording
-from core.frames import SIDES, SUFFIX, Floats, Side
-from core.fusion.mahony import estimate_orientations
+from sagittal.core import calibration, events, timeline
+from sagittal.core.errors import Notice
+from sagittal.core.events.result import GaitEvents, Strides
+from sagittal.core.formats import SourceFile, parse_manifest, read_recording
+from sagittal.core.frames import SIDES, SUFFIX, Floats, Side
+from sagittal.core.fusion.mahony import estimate_orientations
 from tests.data import data_folder
 from tests.helpers.event_scoring import match
 from validation.figures import record

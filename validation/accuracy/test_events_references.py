@@ -15,15 +15,15 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from core import calibration, timeline
-from core.events.detection import detect, detect_contacts
-from core.events.foot_contact import FootContactParams
-from core.events.foot_movement import measure_foot_movements
-from core.events.result import EventKind, GaitEvents, Stride
-from core.events.strides import stride_list
-from core.frames import SIDES, Floats, Side
-from core.fusion.mahony import estimate_orientations
-from core.recording import Recording
+from sagittal.core import calibration, timeline
+from sagittal.core.events.detection import detect, detect_contacts
+from sagittal.core.events.foot_contact import FootContactParams
+from sagittal.core.events.foot_movement import measure_foot_movements
+from sagittal.core.events.result import EventKind, GaitEvents, Stride
+from sagittal.core.events.strides import stride_list
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.recording import Recording
 from tests.helpers import force_plate
 from tests.helpers.event_scoring import match
 from tests.helpers.gaitmap import COPIES, RATE, recording_of, resampled

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from core import calibration, events, timeline
-from core.events.detection import detect_contacts
-from core.events.foot_movement import measure_foot_movements
-from core.frames import SIDES
-from core.fusion.mahony import estimate_orientations
-from core.simulate import simulate_scenario
+from sagittal.core import calibration, events, timeline
+from sagittal.core.events.detection import detect_contacts
+from sagittal.core.events.foot_movement import measure_foot_movements
+from sagittal.core.frames import SIDES
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.simulate import simulate_scenario
 from tests.helpers.event_scoring import match
 from tests.helpers.walks import simulated
 from validation.figures import record

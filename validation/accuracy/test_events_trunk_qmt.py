@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from core import calibration
-from core.events import detect
-from core.events.lumbar import detect_steps, split_about_vertical
-from core.events.result import GaitEvents
-from core.events.turns import find_turns
-from core.frames import SIDES, Segment, Side
-from core.fusion.mahony import estimate_orientations
-from core.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core import calibration
+from sagittal.core.events import detect
+from sagittal.core.events.lumbar import detect_steps, split_about_vertical
+from sagittal.core.events.result import GaitEvents
+from sagittal.core.events.turns import find_turns
+from sagittal.core.frames import SIDES, Segment, Side
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.recording import SensorSignals, Subject, UniformRecording
 from tests.data import data_folder
 from tests.helpers.event_scoring import Score, match
 from validation.figures import record

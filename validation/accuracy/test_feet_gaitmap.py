@@ -13,12 +13,12 @@ from functools import cache
 
 import numpy as np
 
-from core.body import nominal_body
-from core.events.result import Stride
-from core.frames import FOOT, SIDES, Floats, Side
-from core.measure import MeasuredGait, Tracks, measure_gait
-from core.parameters.stance import FLAT_RAD, NAMES, find_stances
-from core.shoe import Shoe
+from sagittal.core.body import nominal_body
+from sagittal.core.events.result import Stride
+from sagittal.core.frames import FOOT, SIDES, Floats, Side
+from sagittal.core.measure import MeasuredGait, Tracks, measure_gait
+from sagittal.core.parameters.stance import FLAT_RAD, NAMES, find_stances
+from sagittal.core.shoe import Shoe
 from tests.helpers.gaitmap import MARKERS, MOCAP_RATE, analysed, table
 from validation.figures import record, record_in_short
 

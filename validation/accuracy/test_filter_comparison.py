@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.filter_comparison import FilterComparison, FilterRequest, compare_filters
-from core.formats.orientation_table import OrientationTable
-from core.frames import Floats, Segment
-from core.fusion.algorithms.choice import LABELS
-from core.pipeline import TakeAnalysis
+from sagittal.core.filter_comparison import FilterComparison, FilterRequest, compare_filters
+from sagittal.core.formats.orientation_table import OrientationTable
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.fusion.algorithms.choice import LABELS
+from sagittal.core.pipeline import TakeAnalysis
 from tests.data import data_folder
 from tests.helpers.walks import analysed, neura_analysis, simulated
 from validation.figures import record

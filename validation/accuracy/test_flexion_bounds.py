@@ -13,9 +13,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.angles.cardan import cardan_zxy
-from core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Floats, Segment, Side
-from core.rotation import conjugate, exp, multiply
+from sagittal.core.angles.cardan import cardan_zxy
+from sagittal.core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Floats, Segment, Side
+from sagittal.core.rotation import conjugate, exp, multiply
 from tests.helpers.neura import WALK, healthy
 from tests.helpers.neura_angles import reference, scores
 from validation.figures import record

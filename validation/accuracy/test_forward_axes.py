@@ -15,13 +15,13 @@ from typing import Any, cast
 
 import numpy as np
 
-from core.calibration import calibrate
-from core.frames import FOOT, SHANK, THIGH, Segment
-from core.recording import UniformRecording
-from core.rest import index_window
-from core.rotation import to_matrix, wrap_angle, yaw
-from core.simulate import WalkTruth
-from core.simulate.patients import PATIENTS
+from sagittal.core.calibration import calibrate
+from sagittal.core.frames import FOOT, SHANK, THIGH, Segment
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import index_window
+from sagittal.core.rotation import to_matrix, wrap_angle, yaw
+from sagittal.core.simulate import WalkTruth
+from sagittal.core.simulate.patients import PATIENTS
 from tests.helpers.walks import only, simulated
 from validation.figures import record
 from validation.marks import WHOLE, sample

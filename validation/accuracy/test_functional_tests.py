@@ -7,21 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.body.tree import PRESETS
-from core.events.turns import find_turns
-from core.frames import Segment
-from core.functional_tests.guided import GuidedTest
-from core.functional_tests.rising import find_changes
-from core.functional_tests.sway import SwayParams, measure_sway
-from core.functional_tests.trunk import follow_trunk
-from core.functional_tests.tug import measure_tug
-from core.online import OnlineSession
-from core.pipeline import analyse
-from core.simulate import Stand, Straight, simulate
-from core.simulate.patients import PATIENTS
-from core.simulate.scripts import ON_SKIN
-from core.simulate.tug import simulate_tug
-from core.timeline import synchronise
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.events.turns import find_turns
+from sagittal.core.frames import Segment
+from sagittal.core.functional_tests.guided import GuidedTest
+from sagittal.core.functional_tests.rising import find_changes
+from sagittal.core.functional_tests.sway import SwayParams, measure_sway
+from sagittal.core.functional_tests.trunk import follow_trunk
+from sagittal.core.functional_tests.tug import measure_tug
+from sagittal.core.online import OnlineSession
+from sagittal.core.pipeline import analyse
+from sagittal.core.simulate import Stand, Straight, simulate
+from sagittal.core.simulate.patients import PATIENTS
+from sagittal.core.simulate.scripts import ON_SKIN
+from sagittal.core.simulate.tug import simulate_tug
+from sagittal.core.timeline import synchronise
 from tests.core.functional_tests.test_guided import blocks, followed
 from tests.helpers.ipol import ipol_recording
 from tests.helpers.kept import keep

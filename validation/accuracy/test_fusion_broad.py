@@ -9,8 +9,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.frames import Floats
-from core.fusion.algorithms.benchmark import (
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.benchmark import (
     OrientationScore,
     ReferenceTrial,
     find_rest,
@@ -19,11 +19,11 @@ from core.fusion.algorithms.benchmark import (
     run_trial,
     score_orientation,
 )
-from core.fusion.algorithms.choice import OWN
-from core.fusion.algorithms.gains import FixedGain
-from core.fusion.algorithms.listed import ALGORITHMS, BY_NAME, Algorithm
-from core.fusion.algorithms.parameters import MadgwickGains
-from core.rotation import angle_between, multiply
+from sagittal.core.fusion.algorithms.choice import OWN
+from sagittal.core.fusion.algorithms.gains import FixedGain
+from sagittal.core.fusion.algorithms.listed import ALGORITHMS, BY_NAME, Algorithm
+from sagittal.core.fusion.algorithms.parameters import MadgwickGains
+from sagittal.core.rotation import angle_between, multiply
 from tests.data import data_folder
 from validation.figures import record
 from validation.marks import whole_only

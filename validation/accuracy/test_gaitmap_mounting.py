@@ -8,15 +8,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.calibration import calibrate
-from core.calibration.anterior import Method
-from core.calibration.calibrate import CalibrationParams
-from core.calibration.result import Calibration
-from core.formats import SourceFile, parse_manifest, read_recording
-from core.frames import Floats
-from core.fusion.mahony import estimate_orientations
-from core.rotation import rotate
-from core.timeline import synchronise
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.anterior import Method
+from sagittal.core.calibration.calibrate import CalibrationParams
+from sagittal.core.calibration.result import Calibration
+from sagittal.core.formats import SourceFile, parse_manifest, read_recording
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.rotation import rotate
+from sagittal.core.timeline import synchronise
 from tests.data import data_folder
 
 COPIES = ("imu_sample.csv", "imu_sample_not_rotated.csv")

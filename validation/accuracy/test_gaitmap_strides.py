@@ -16,22 +16,22 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import calibration
-from core.body import BodyModel
-from core.body.corrected import correct_signals
-from core.body.erkf.filter import ErkfTrack, erkf_inputs, filter_block
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.poses import ErkfRun, run_erkf
-from core.body.erkf.start import start_state
-from core.body.still import FOOT_STILL, still_samples
-from core.body.tree import person_tree
-from core.calibration.result import CalibratedRecording
-from core.frames import FOOT, GRAVITY, SIDES, Floats, Side
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.parameters import measure_distances
-from core.rotation import rotate
-from core.timeline import synchronise
+from sagittal.core import calibration
+from sagittal.core.body import BodyModel
+from sagittal.core.body.corrected import correct_signals
+from sagittal.core.body.erkf.filter import ErkfTrack, erkf_inputs, filter_block
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.poses import ErkfRun, run_erkf
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.body.still import FOOT_STILL, still_samples
+from sagittal.core.body.tree import person_tree
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.frames import FOOT, GRAVITY, SIDES, Floats, Side
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.parameters import measure_distances
+from sagittal.core.rotation import rotate
+from sagittal.core.timeline import synchronise
 from tests.helpers.gaitmap import COPIES, RATE, analysed, block_mean, recording_of, signals, true_strides
 from validation.figures import record, record_in_short
 

@@ -14,16 +14,16 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.angles.measure import measure_angles
-from core.body import nominal_body
-from core.body.erkf.headings import align_forward_axes, turn_forward_axes
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.poses import replace_orientations, run_erkf
-from core.body.tree import PRESETS
-from core.calibration import calibrate
-from core.frames import Segment
-from core.fusion.mahony import estimate_orientations
-from core.rest import index_window
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body import nominal_body
+from sagittal.core.body.erkf.headings import align_forward_axes, turn_forward_axes
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.poses import replace_orientations, run_erkf
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.calibration import calibrate
+from sagittal.core.frames import Segment
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.rest import index_window
 from tests.helpers.walks import rms_deg, simulated
 from validation.figures import record
 from validation.marks import WHOLE

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import pytest
 
-from core.simulate import PATIENTS
-from server.report.bundle import load_bundle
-from server.report.exports import analysis_files
-from server.report.headline import Headline
-from server.report.model import report_model
+from sagittal.core.simulate import PATIENTS
+from sagittal.server.report.bundle import load_bundle
+from sagittal.server.report.exports import analysis_files
+from sagittal.server.report.headline import Headline
+from sagittal.server.report.model import report_model
 from tests.helpers.walks import analysed
 from validation.marks import sample
 

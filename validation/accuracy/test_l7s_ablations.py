@@ -12,11 +12,11 @@ from typing import Final, get_args
 
 import numpy as np
 
-from core.body.l7s.filter import Adjoint, L7sParams, filter_block, start_l7s_state
-from core.body.l7s.inputs import take_of
-from core.body.l7s.legs import FIGURE, LegModel, solve_legs
-from core.body.poses import Poses
-from core.frames import FOOT, SIDES, Floats
+from sagittal.core.body.l7s.filter import Adjoint, L7sParams, filter_block, start_l7s_state
+from sagittal.core.body.l7s.inputs import take_of
+from sagittal.core.body.l7s.legs import FIGURE, LegModel, solve_legs
+from sagittal.core.body.poses import Poses
+from sagittal.core.frames import FOOT, SIDES, Floats
 from tests.helpers.l7s_textbook import Textbook, textbook
 from tests.helpers.l7s_walks import Trial, trial, trial_scores
 from validation.figures import record

@@ -15,19 +15,19 @@ from typing import Final, get_args
 import numpy as np
 import pytest
 
-from core.angles.measure import measure_angles
-from core.body.l7s.filter import Worn
-from core.body.l7s.inputs import free_acceleration
-from core.body.l7s.poses import l7s_poses
-from core.body.model import BodyModel
-from core.calibration import calibrate
-from core.calibration.result import CalibratedRecording
-from core.frames import FOOT, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.parameters.uncertainty import ESTIMATED_DEG, FEET_ALONE_DEG
-from core.recording import UniformRecording
-from core.simulate import WalkTruth
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body.l7s.filter import Worn
+from sagittal.core.body.l7s.inputs import free_acceleration
+from sagittal.core.body.l7s.poses import l7s_poses
+from sagittal.core.body.model import BodyModel
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.frames import FOOT, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.parameters.uncertainty import ESTIMATED_DEG, FEET_ALONE_DEG
+from sagittal.core.recording import UniformRecording
+from sagittal.core.simulate import WalkTruth
 from tests.data import data_folder
 from tests.helpers.l7s_walks import FLEXION, steps_of
 from tests.helpers.neura import BODY, chain, true_strides

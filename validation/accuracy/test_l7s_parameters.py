@@ -15,11 +15,11 @@ from typing import Final
 import numpy as np
 import pytest
 
-from core.frames import SIDES, SUFFIX, Floats, Segment
-from core.parameters.catalogue import CurveFigure, list_curve_figures
-from core.parameters.uncertainty import ESTIMATED_DEG, FEET_ALONE_AT_CONTACT_DEG, FEET_ALONE_DEG
-from core.pipeline import analyse
-from core.simulate import simulate_scenario
+from sagittal.core.frames import SIDES, SUFFIX, Floats, Segment
+from sagittal.core.parameters.catalogue import CurveFigure, list_curve_figures
+from sagittal.core.parameters.uncertainty import ESTIMATED_DEG, FEET_ALONE_AT_CONTACT_DEG, FEET_ALONE_DEG
+from sagittal.core.pipeline import analyse
+from sagittal.core.simulate import simulate_scenario
 from tests.helpers.l7s_walks import FLEXION
 from validation.figures import record
 

@@ -15,18 +15,18 @@ from typing import Final, get_args
 import numpy as np
 import pytest
 
-from core.body.l7s.filter import Adjoint, L7sParams, Worn
-from core.body.l7s.inputs import free_acceleration
-from core.body.l7s.legs import BODIES
-from core.body.l7s.poses import l7s_poses
-from core.body.poses import Poses
-from core.calibration import calibrate
-from core.frames import FOOT, SHANK, SIDES, Floats, Segment, Side
-from core.fusion.orientations import Orientations
-from core.rotation import angle_between, exp, multiply, to_matrix
-from core.simulate import RecordingSetup, simulate
-from core.simulate.script import Stand, Straight
-from core.timeline import synchronise
+from sagittal.core.body.l7s.filter import Adjoint, L7sParams, Worn
+from sagittal.core.body.l7s.inputs import free_acceleration
+from sagittal.core.body.l7s.legs import BODIES
+from sagittal.core.body.l7s.poses import l7s_poses
+from sagittal.core.body.poses import Poses
+from sagittal.core.calibration import calibrate
+from sagittal.core.frames import FOOT, SHANK, SIDES, Floats, Segment, Side
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import angle_between, exp, multiply, to_matrix
+from sagittal.core.simulate import RecordingSetup, simulate
+from sagittal.core.simulate.script import Stand, Straight
+from sagittal.core.timeline import synchronise
 from tests.helpers.l7s_walks import (
     MOVEMENTS,
     PEOPLE,

@@ -16,19 +16,19 @@ from typing import Final
 import numpy as np
 import pytest
 
-from core import calibration, events
-from core.body import contact_mask
-from core.body.estimate import estimate_poses
-from core.body.health import HealthFinding, find_worst_verdict
-from core.body.mounting import mount_sensors
-from core.body.pose_params import PoseParams
-from core.body.tree import PRESETS
-from core.errors import SagittalError
-from core.estimators import Estimator
-from core.frames import SIDES, Segment
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.recording import SensorSignals, UniformRecording
+from sagittal.core import calibration, events
+from sagittal.core.body import contact_mask
+from sagittal.core.body.estimate import estimate_poses
+from sagittal.core.body.health import HealthFinding, find_worst_verdict
+from sagittal.core.body.mounting import mount_sensors
+from sagittal.core.body.pose_params import PoseParams
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.errors import SagittalError
+from sagittal.core.estimators import Estimator
+from sagittal.core.frames import SIDES, Segment
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.recording import SensorSignals, UniformRecording
 from tests.helpers.l7s_walks import FLEXION
 from tests.helpers.neura import BODY, angles_deg
 from tests.helpers.neura_angles import scores

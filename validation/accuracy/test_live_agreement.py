@@ -12,13 +12,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.agreement import check_agreement
-from core.errors import Notice
-from core.frames import Segment
-from core.pipeline import PipelineConfig
-from core.recording import UniformRecording
-from core.simulate import PATIENTS, SCRIPTS, simulate_scenario
-from core.timeline import synchronise
+from sagittal.core.agreement import check_agreement
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Segment
+from sagittal.core.pipeline import PipelineConfig
+from sagittal.core.recording import UniformRecording
+from sagittal.core.simulate import PATIENTS, SCRIPTS, simulate_scenario
+from sagittal.core.timeline import synchronise
 from tests.helpers.live_agreement import find_standings, listen, walk_again
 from tests.helpers.perturbations import find_middle, slip_sensor
 from tests.helpers.walks import neura_recording, only, simulated
@@ -188,7 +188,7 @@ def test_write_down_the_figures() -> None:
 
 
 def test_the_limits_are_those_of_a_file() -> None:
-    from core.agreement.params import LiveAgreementParams
+    from sagittal.core.agreement.params import LiveAgreementParams
 
     assert LiveAgreementParams().agreement == PipelineConfig().agreement
     assert set(LAGS) <= set(MUST)

@@ -12,21 +12,21 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body import nominal_body
-from core.body.apart import lean_legs_apart
-from core.body.erkf.headings import align_forward_axes
-from core.body.erkf.params import ErkfParams
-from core.body.tree import PRESETS
-from core.calibration import calibrate
-from core.calibration.live_attempt import WornSensors
-from core.calibration.result import CalibratedRecording, Calibration
-from core.frames import Segment
-from core.fusion.mahony import estimate_orientations
-from core.online.calibrated import LiveCalibration, compile_calibration_kernels
-from core.online.calibrating import LiveCalibrator
-from core.recording import UniformRecording
-from core.rotation import from_matrix, log
-from core.timeline.live import UniformBlock
+from sagittal.core.body import nominal_body
+from sagittal.core.body.apart import lean_legs_apart
+from sagittal.core.body.erkf.headings import align_forward_axes
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.live_attempt import WornSensors
+from sagittal.core.calibration.result import CalibratedRecording, Calibration
+from sagittal.core.frames import Segment
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.online.calibrated import LiveCalibration, compile_calibration_kernels
+from sagittal.core.online.calibrating import LiveCalibrator
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rotation import from_matrix, log
+from sagittal.core.timeline.live import UniformBlock
 from tests.helpers.walks import neura_walk, simulated
 from validation.figures import record
 

@@ -11,9 +11,9 @@ from functools import cache
 
 import pytest
 
-from core.feedback import AnalysedStride, Cue, FeedbackEngine, FeedbackSplit, Prescription, split
-from core.measure import MeasuredGait
-from core.online import LiveFrame
+from sagittal.core.feedback import AnalysedStride, Cue, FeedbackEngine, FeedbackSplit, Prescription, split
+from sagittal.core.measure import MeasuredGait
+from sagittal.core.online import LiveFrame
 from tests.helpers.live_walks import live
 from tests.helpers.walks import analysed, simulated
 from validation.figures import record, record_in_short

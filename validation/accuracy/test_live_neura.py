@@ -13,16 +13,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.corrected import correct_signals
-from core.body.erkf.filter import erkf_inputs, filter_block
-from core.body.erkf.live_erkf import live_params
-from core.body.erkf.start import start_state
-from core.body.live_still import StillnessDetector
-from core.body.tree import person_tree
-from core.events import detect_contacts
-from core.events.foot_movement import measure_foot_movements
-from core.events.result import GaitEvent
-from core.frames import FOOT, SIDES, Floats, Side
+from sagittal.core.body.corrected import correct_signals
+from sagittal.core.body.erkf.filter import erkf_inputs, filter_block
+from sagittal.core.body.erkf.live_erkf import live_params
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.body.live_still import StillnessDetector
+from sagittal.core.body.tree import person_tree
+from sagittal.core.events import detect_contacts
+from sagittal.core.events.foot_movement import measure_foot_movements
+from sagittal.core.events.result import GaitEvent
+from sagittal.core.frames import FOOT, SIDES, Floats, Side
 from tests.helpers.gaitmap import RATE
 from tests.helpers.live_walks import Run, recorded
 from tests.helpers.neura import stride_errors_m, take

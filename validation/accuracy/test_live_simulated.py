@@ -13,12 +13,12 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from core.body.tree import PRESETS
-from core.frames import SIDES, Floats, Side
-from core.fusion.live_drift import HeadingHold
-from core.online.chain import COURSES
-from core.rotation import yaw
-from core.simulate import WalkTruth
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.fusion.live_drift import HeadingHold
+from sagittal.core.online.chain import COURSES
+from sagittal.core.rotation import yaw
+from sagittal.core.simulate import WalkTruth
 from tests.helpers.live_walks import Run, recorded
 from tests.helpers.walks import only, simulated
 from validation.figures import record

@@ -15,11 +15,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.angles.measure import measure_angles
-from core.calibration import CalibrationParams, calibrate
-from core.calibration.anterior import Method
-from core.frames import FOOT, Floats
-from core.fusion.mahony import estimate_orientations
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.calibration import CalibrationParams, calibrate
+from sagittal.core.calibration.anterior import Method
+from sagittal.core.frames import FOOT, Floats
+from sagittal.core.fusion.mahony import estimate_orientations
 from tests.helpers.neura_angles import PLANES, scores
 from tests.helpers.walks import neura_walk
 from validation.figures import record

@@ -14,11 +14,11 @@ from functools import cache
 
 import numpy as np
 
-from core.frames import Floats
-from core.norms import adult_kinematics, adult_reference
-from core.norms.at_speed import bands_at_speed, curve_models, move_curve, reference_at_speed
-from core.norms.profile import gvs
-from core.norms.speed import COMFORTABLE
+from sagittal.core.frames import Floats
+from sagittal.core.norms import adult_kinematics, adult_reference
+from sagittal.core.norms.at_speed import bands_at_speed, curve_models, move_curve, reference_at_speed
+from sagittal.core.norms.profile import gvs
+from sagittal.core.norms.speed import COMFORTABLE
 from tests.data import data_folder
 from validation.figures import record
 

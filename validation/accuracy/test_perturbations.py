@@ -13,15 +13,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.agreement import check_agreement
-from core.agreement.exchange import LEGS, SWAPS, Swap, undo_exchange
-from core.frames import Floats, Segment
-from core.pipeline import PipelineConfig, TakeAnalysis, analyse, resume
-from core.quality.stuck import mark_stuck
-from core.recording import Recording, UniformRecording
-from core.rotation import exp, rotate
-from core.simulate import PATIENTS, simulate_scenario
-from core.timeline import synchronise
+from sagittal.core.agreement import check_agreement
+from sagittal.core.agreement.exchange import LEGS, SWAPS, Swap, undo_exchange
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.pipeline import PipelineConfig, TakeAnalysis, analyse, resume
+from sagittal.core.quality.stuck import mark_stuck
+from sagittal.core.recording import Recording, UniformRecording
+from sagittal.core.rotation import exp, rotate
+from sagittal.core.simulate import PATIENTS, simulate_scenario
+from sagittal.core.timeline import synchronise
 from tests.helpers.perturbations import delay_sensor, find_middle, slip_sensor
 from tests.helpers.walks import neura_analysis
 from validation.accuracy.test_events_trunk_qmt import take as qmt_take

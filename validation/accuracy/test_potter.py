@@ -8,13 +8,13 @@ from math import radians
 
 import numpy as np
 
-from core.body.erkf.filter import ErkfInputs, filter_block
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.start import start_state
-from core.body.tree import walker3
-from core.frames import SIDES, Floats
-from core.rotation import conjugate, multiply, to_matrix
-from core.simulate.potter import LEG, PotterWalk, potter_walk
+from sagittal.core.body.erkf.filter import ErkfInputs, filter_block
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.body.tree import walker3
+from sagittal.core.frames import SIDES, Floats
+from sagittal.core.rotation import conjugate, multiply, to_matrix
+from sagittal.core.simulate.potter import LEG, PotterWalk, potter_walk
 from validation.figures import record, record_in_short
 
 STRIDES = 200

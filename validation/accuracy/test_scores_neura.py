@@ -13,13 +13,13 @@ from functools import cache
 
 import numpy as np
 
-from core.angles import JointAngles
-from core.events.result import Strides
-from core.frames import SIDES
-from core.norms.profile import NINE, SAGITTAL
-from core.parameters import cycle_curves
-from core.parameters.result import CycleCurves
-from core.scores import Scores, score_curves
+from sagittal.core.angles import JointAngles
+from sagittal.core.events.result import Strides
+from sagittal.core.frames import SIDES
+from sagittal.core.norms.profile import NINE, SAGITTAL
+from sagittal.core.parameters import cycle_curves
+from sagittal.core.parameters.result import CycleCurves
+from sagittal.core.scores import Scores, score_curves
 from tests.data import data_folder
 from tests.helpers.neura import STRAIGHT
 from tests.helpers.walks import neura_analysis

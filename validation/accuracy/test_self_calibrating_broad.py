@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.frames import Floats
-from core.fusion.algorithms.benchmark import ReferenceTrial, read_trial, run_own, score_orientation
-from core.fusion.self_calibrating import SelfCalibratingFilter
-from core.rotation import conjugate, log, multiply
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.benchmark import ReferenceTrial, read_trial, run_own, score_orientation
+from sagittal.core.fusion.self_calibrating import SelfCalibratingFilter
+from sagittal.core.rotation import conjugate, log, multiply
 from tests.data import data_folder
 from validation.figures import record
 

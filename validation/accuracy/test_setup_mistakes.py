@@ -14,11 +14,11 @@ from functools import cache, partial
 import numpy as np
 import pytest
 
-from core.agreement.exchange import LEGS, SWAPS, undo_exchange
-from core.frames import GRAVITY, Floats, Segment
-from core.pipeline import TakeAnalysis, analyse
-from core.recording import ImuStream, Recording
-from core.simulate import PATIENTS, simulate_scenario
+from sagittal.core.agreement.exchange import LEGS, SWAPS, undo_exchange
+from sagittal.core.frames import GRAVITY, Floats, Segment
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.simulate import PATIENTS, simulate_scenario
 from tests.helpers.ipol import WALKS, ipol_recording
 from tests.helpers.kept import keep_recorded
 from tests.helpers.setup_mistakes import (

@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.angles import JointAngles
-from core.angles.measure import measure_angles
-from core.calibration import calibrate
-from core.frames import Floats
-from core.fusion.mahony import estimate_orientations
+from sagittal.core.angles import JointAngles
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.calibration import calibrate
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.mahony import estimate_orientations
 from tests.helpers.walks import rms_deg, simulated
 from validation.figures import record
 

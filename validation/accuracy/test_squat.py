@@ -8,21 +8,21 @@ from math import radians
 
 import numpy as np
 
-from core.angles.measure import measure_angles
-from core.body.chain.leg import estimate_leg
-from core.calibration.fixed_offset import make_fixed_mounts
-from core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
-from core.frames import SHANK, SIDES, Floats, Segment
-from core.pipeline import analyse
-from core.rotation import about, to_matrix
-from core.simulate import RecordingSetup, SensorNoise, SoftTissue, Squats, simulate_squats
-from core.simulate.mems import MEMS
-from core.simulate.squat_chain import measure_leg, place_as_agreed, place_sensors
-from core.squat.joints import JOINTS
-from core.squat.sensitivity import LENGTHS, TURNS, SensitivityTable, analyse_sensitivity
-from core.timeline import synchronise
-from server.commands.sensitivity import simulate_case
-from server.report.sensitivity import COLUMNS
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body.chain.leg import estimate_leg
+from sagittal.core.calibration.fixed_offset import make_fixed_mounts
+from sagittal.core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
+from sagittal.core.frames import SHANK, SIDES, Floats, Segment
+from sagittal.core.pipeline import analyse
+from sagittal.core.rotation import about, to_matrix
+from sagittal.core.simulate import RecordingSetup, SensorNoise, SoftTissue, Squats, simulate_squats
+from sagittal.core.simulate.mems import MEMS
+from sagittal.core.simulate.squat_chain import measure_leg, place_as_agreed, place_sensors
+from sagittal.core.squat.joints import JOINTS
+from sagittal.core.squat.sensitivity import LENGTHS, TURNS, SensitivityTable, analyse_sensitivity
+from sagittal.core.timeline import synchronise
+from sagittal.server.commands.sensitivity import simulate_case
+from sagittal.server.report.sensitivity import COLUMNS
 from tests.core.body.chain.squats import HEIGHT_M, run, squat_on
 from tests.core.calibration.test_table_top import QUIET, WORN, carry, errors_deg, take, worn_on
 from validation.figures import record

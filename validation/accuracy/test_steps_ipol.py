@@ -10,8 +10,8 @@ from functools import cache
 
 import numpy as np
 
-from core.events.lumbar import detect_steps
-from core.timeline import synchronise
+from sagittal.core.events.lumbar import detect_steps
+from sagittal.core.timeline import synchronise
 from tests.helpers.event_scoring import Score, match
 from tests.helpers.ipol import WALKS, checked_events, first_s, ipol_recording
 from validation.figures import record

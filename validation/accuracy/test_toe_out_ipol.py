@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from core.frames import SIDES, Floats, Side
+from sagittal.core.frames import SIDES, Floats, Side
 from tests.helpers.ipol import FEET, SUBJECTS, WALKS, ipol_analysis
 from validation.figures import record
 

@@ -6,8 +6,8 @@ and short walks about a room less so; the limits are our choice.
 
 from __future__ import annotations
 
-from core.parameters.result import Parameter
-from core.pipeline import analyse
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.pipeline import analyse
 from tests.helpers.mobgap import TRIALS, recording
 from validation.figures import record
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from core.fusion.algorithms.benchmark import run_trial, score_orientation
-from core.fusion.algorithms.listed import BY_NAME
-from core.fusion.algorithms.parameters import AlgorithmGains
-from core.fusion.algorithms.presets import TUNED_ON_WALKERS, BodyPlace
+from sagittal.core.fusion.algorithms.benchmark import run_trial, score_orientation
+from sagittal.core.fusion.algorithms.listed import BY_NAME
+from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
+from sagittal.core.fusion.algorithms.presets import TUNED_ON_WALKERS, BodyPlace
 from tests.helpers.optical_segments import SegmentTrial, gaitmap_feet, inclination_rms, neura_segments
 from validation.accuracy.tuned_walks import CHECKED, FITTED, PLACEMENTS, Person, trial
 from validation.figures import record

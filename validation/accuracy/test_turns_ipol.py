@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.frames import Floats, Segment
-from core.pipeline import analyse
-from core.simulate import simulate_scenario
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.pipeline import analyse
+from sagittal.core.simulate import simulate_scenario
 from tests.helpers.ipol import FEET, WALKS, checked_events, first_s, ipol_analysis, ipol_recording
 from validation.figures import record
 

@@ -11,13 +11,13 @@ from functools import cache
 
 import numpy as np
 
-from core.events.result import GaitEvents
-from core.frames import SIDES, Side
-from core.parameters.catalogue import CATALOGUE, list_curve_figures
-from core.parameters.kinematic import stride_figures
-from core.parameters.result import Parameter
-from core.parameters.uncertainty import state_uncertainty
-from core.parameters.variability import summarise_values
+from sagittal.core.events.result import GaitEvents
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.parameters.catalogue import CATALOGUE, list_curve_figures
+from sagittal.core.parameters.kinematic import stride_figures
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.uncertainty import state_uncertainty
+from sagittal.core.parameters.variability import summarise_values
 from tests.helpers.gaitmap import RATE, analysed, reference_strides, true_strides
 from tests.helpers.true_walks import measured_walk
 from validation.accuracy import test_distances_neura as distances

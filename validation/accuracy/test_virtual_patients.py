@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from core.frames import SIDES, SUFFIX, Side
-from core.pipeline import TakeAnalysis, analyse
-from core.simulate import PATIENTS, WalkTruth, simulate_scenario
+from sagittal.core.frames import SIDES, SUFFIX, Side
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.simulate import PATIENTS, WalkTruth, simulate_scenario
 from tests.helpers.walks import analysed
 from validation.figures import record
 

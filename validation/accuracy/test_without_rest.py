@@ -17,11 +17,11 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from core.frames import FOOT, Segment
-from core.pipeline import TakeAnalysis, analyse
-from core.recording import Recording
-from core.rest import find_rest_windows, index_window
-from core.timeline import synchronise
+from sagittal.core.frames import FOOT, Segment
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.recording import Recording
+from sagittal.core.rest import find_rest_windows, index_window
+from sagittal.core.timeline import synchronise
 from tests.helpers import mobgap
 from tests.helpers.ipol import WALKS
 from tests.helpers.real_takes import NAMES, UNCUT, analyse_take, cut_recording, read_take

@@ -14,14 +14,14 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import FOOT, SHANK, THIGH, Segment, Side
-from core.fusion.algorithms.benchmark import ReferenceTrial
-from core.fusion.algorithms.presets import BodyPlace
-from core.rotation import about, multiply, rotate
-from core.simulate.mems import MEMS
-from core.simulate.script import scale_script
-from core.simulate.scripts import SCRIPTS
-from core.simulate.simulation import Simulation, simulate
+from sagittal.core.frames import FOOT, SHANK, THIGH, Segment, Side
+from sagittal.core.fusion.algorithms.benchmark import ReferenceTrial
+from sagittal.core.fusion.algorithms.presets import BodyPlace
+from sagittal.core.rotation import about, multiply, rotate
+from sagittal.core.simulate.mems import MEMS
+from sagittal.core.simulate.script import scale_script
+from sagittal.core.simulate.scripts import SCRIPTS
+from sagittal.core.simulate.simulation import Simulation, simulate
 
 PLACEMENTS: Final[tuple[BodyPlace, ...]] = ("foot", "shank", "thigh", "pelvis")
 REST_S: Final = 5.0

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import block_diag
 
-from core.body.erkf.filter import ErkfInputs, ErkfState
-from core.body.erkf.params import ErkfParams
-from core.body.tree import ImuTree
-from core.frames import GRAVITY, Floats
-from core.rotation import exp, multiply, to_matrix
+from sagittal.core.body.erkf.filter import ErkfInputs, ErkfState
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.tree import ImuTree
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.rotation import exp, multiply, to_matrix
 
 EYE, UP = np.eye(3), np.array([0.0, 0.0, 1.0])
 

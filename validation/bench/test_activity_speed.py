@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core.activity.monitor import monitor_activity
-from core.formats import cwa, write_recording
-from core.formats.draft import signal_digest
-from core.recording import ImuStream, Recording
-from core.sample_blocks import LongStream, SampleBlock
-from core.simulate.daily import plan_daily_life, simulate_daily_life
+from sagittal.core.activity.monitor import monitor_activity
+from sagittal.core.formats import cwa, write_recording
+from sagittal.core.formats.draft import signal_digest
+from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.simulate.daily import plan_daily_life, simulate_daily_life
 from tests.data import ROOT
 from tests.helpers.pairs import cpu_s, in_pairs, plain_python
 from validation.bench.long_cwa import write_long_cwa
@@ -93,7 +93,7 @@ DAYS = (1.0, 7.0) if WHOLE else (0.5, 1.0)
 
 ALONE = """
 import resource, sys
-from server.main import main
+from sagittal.server.main import main
 code = main(sys.argv[1:])
 used = resource.getrusage(resource.RUSAGE_SELF)
 with open("/proc/self/status") as status:

@@ -21,9 +21,9 @@ SCRIPT = """
 import json, sys, time
 from math import pi
 from pathlib import Path
-from core.body.pose_params import PoseParams
-from core.pipeline import PipelineConfig, analyse
-from core.simulate import Arc, Stand, Straight, simulate
+from sagittal.core.body.pose_params import PoseParams
+from sagittal.core.pipeline import PipelineConfig, analyse
+from sagittal.core.simulate import Arc, Stand, Straight, simulate
 
 def peak_mb():
     # not ru_maxrss: that begins with the peak of the process that started this one

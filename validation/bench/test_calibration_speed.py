@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sys
 
-from core.agreement import check_agreement
-from core.calibration import calibrate
-from core.calibration.score import score_calibration
+from sagittal.core.agreement import check_agreement
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.score import score_calibration
 from tests.helpers.pairs import in_pairs, plain_python
 from tests.helpers.walks import cut, simulated
 

@@ -11,8 +11,8 @@ import time
 from collections.abc import Sequence
 
 import sagittal
-from server.demo.clinic import VISITS, DemoVisit, record
-from server.processes.compiling import compile_filters_once
+from sagittal.server.demo.clinic import VISITS, DemoVisit, record
+from sagittal.server.processes.compiling import compile_filters_once
 from tests.data import ROOT
 
 LIMIT = 1.6
@@ -23,7 +23,7 @@ The start, of about 3 s, weighs the more the faster analyses become."""
 def run_demo() -> float:
     """Start the demo, stop it when all visits are analysed; seconds that took, as it says itself."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "server.main", "demo"], cwd=ROOT, stdout=subprocess.PIPE, text=True,
+        [sys.executable, "-m", "sagittal.server.main", "demo"], cwd=ROOT, stdout=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"}, start_new_session=True,
     )  # fmt: skip
     assert process.stdout is not None

@@ -15,10 +15,10 @@ from typing import Final
 import numpy as np
 import pytest
 
-from core.body.erkf.filter import ErkfInputs, ErkfTrack, filter_block
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.smoother import smooth
-from core.body.erkf.start import start_state
+from sagittal.core.body.erkf.filter import ErkfInputs, ErkfTrack, filter_block
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.smoother import smooth
+from sagittal.core.body.erkf.start import start_state
 from tests.core.body.erkf.walks import mixed_walk
 from validation.bench.erkf_textbook import Textbook
 from validation.figures import record_goal

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import pytest
 
-from server.services import patients, sessions
+from sagittal.server.services import patients, sessions
 from tests.server import analysed, crowd
 from tests.server.api.test_files import API, new_session
 from tests.server.api.test_tables import table

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.frames import Floats
-from core.fusion.algorithms.filter import FusionFilter, RestMeans
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.filter import FusionFilter, RestMeans
 from validation.bench.test_mahony import best
 
 N = 20_000

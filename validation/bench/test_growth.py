@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 import pytest
 
-from core.online import OnlineSession, compile_live_kernels
+from sagittal.core.online import OnlineSession, compile_live_kernels
 from tests.data import ROOT
 from tests.helpers.live_walks import batches, hello_of
 from tests.helpers.walks import simulated
@@ -39,8 +39,8 @@ from dataclasses import replace
 from math import pi
 from pathlib import Path
 from statistics import median
-from core.formats import write_recording
-from core.simulate import Arc, Stand, Straight, simulate
+from sagittal.core.formats import write_recording
+from sagittal.core.simulate import Arc, Stand, Straight, simulate
 
 lap = (Straight(20.0, 0.64, 0.54), Arc(1.5, pi, 0.52, 0.56)) * 2
 for word in sys.argv[2:]:
@@ -59,7 +59,7 @@ from dataclasses import replace
 from pathlib import Path
 from statistics import median
 import numpy as np
-from core.formats import list_source_files, read_recording, write_recording
+from sagittal.core.formats import list_source_files, read_recording, write_recording
 
 source, target, times = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
 take = read_recording(list(list_source_files([source])))
@@ -79,10 +79,10 @@ ANALYSE = """
 import json, sys, time
 from pathlib import Path
 from statistics import median
-from server.processes.memory import share_allocator
+from sagittal.server.processes.memory import share_allocator
 share_allocator()
-from core.formats import list_source_files
-from server.services import analysing
+from sagittal.core.formats import list_source_files
+from sagittal.server.services import analysing
 
 def analysed(path):
     stages, began = [], time.process_time()
@@ -307,7 +307,7 @@ def command_s(words: list[str], scratch: Path) -> float:
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     subprocess.run(
-        [sys.executable, "-m", "server.main", *words],
+        [sys.executable, "-m", "sagittal.server.main", *words],
         cwd=ROOT, capture_output=True, check=True,
         env={**environment, "PYTHONPYCACHEPREFIX": str(scratch / "modules"), "OPENBLAS_NUM_THREADS": "1"},
     )  # fmt: skip

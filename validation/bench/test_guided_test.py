@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from core.functional_tests.guided import GuidedTest
+from sagittal.core.functional_tests.guided import GuidedTest
 from tests.core.functional_tests.test_guided import blocks, pelvis_tug
 
 PUSH_MS: Final = 0.05

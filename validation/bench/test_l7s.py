@@ -9,15 +9,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
-from core.body.l7s.inputs import free_acceleration, take_of
-from core.body.l7s.legs import LegModel
-from core.body.l7s.poses import compile_l7s_kernel
-from core.body.l7s.smoother import smooth_track
-from core.body.still import FOOT_STILL, still_samples
-from core.calibration import calibrate
-from core.frames import FOOT, SIDES
-from core.fusion.mahony import estimate_orientations
+from sagittal.core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
+from sagittal.core.body.l7s.inputs import free_acceleration, take_of
+from sagittal.core.body.l7s.legs import LegModel
+from sagittal.core.body.l7s.poses import compile_l7s_kernel
+from sagittal.core.body.l7s.smoother import smooth_track
+from sagittal.core.body.still import FOOT_STILL, still_samples
+from sagittal.core.calibration import calibrate
+from sagittal.core.frames import FOOT, SIDES
+from sagittal.core.fusion.mahony import estimate_orientations
 from tests.helpers.l7s_textbook import textbook
 from tests.helpers.pairs import in_pairs
 from tests.helpers.walks import simulated

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from sqlalchemy import func, select
 
-from core.formats.live_log import Hello, SampleBatch, SensorInfo, StreamInfo, encode_batch
-from core.frames import SEGMENTS
-from server.live.client import StreamReport, stream
-from server.services import live, sessions
-from server.storage.live_tables import live_take
+from sagittal.core.formats.live_log import Hello, SampleBatch, SensorInfo, StreamInfo, encode_batch
+from sagittal.core.frames import SEGMENTS
+from sagittal.server.live.client import StreamReport, stream
+from sagittal.server.services import live, sessions
+from sagittal.server.storage.live_tables import live_take
 from tests.faults.clinic import Clinic
 from tests.faults.test_server_deaths import serving
 

@@ -25,7 +25,7 @@ import pytest
 import websockets
 from websockets.typing import Subprotocol
 
-from core.formats.live_log import (
+from sagittal.core.formats.live_log import (
     PROTOCOL,
     Finish,
     Hello,
@@ -37,8 +37,8 @@ from core.formats.live_log import (
     read_batch_header,
     view_samples,
 )
-from core.simulate import simulate_scenario
-from server.live.playback import cut, hello_of
+from sagittal.core.simulate import simulate_scenario
+from sagittal.server.live.playback import cut, hello_of
 from tests.helpers.service import new_session, served
 from validation.figures import record_goal
 
@@ -150,7 +150,7 @@ def estimators(pid: int) -> list[int]:
     for path in Path("/proc").glob("[0-9]*"):
         try:
             parent = int((path / "stat").read_text().rsplit(")", 1)[1].split()[1])
-            if parent == pid and b"server.live.estimator" in (path / "cmdline").read_bytes():
+            if parent == pid and b"sagittal.server.live.estimator" in (path / "cmdline").read_bytes():
                 found.append(int(path.name))
         except (OSError, IndexError):
             continue

@@ -26,13 +26,13 @@ import numpy as np
 import pytest
 from sqlalchemy import func, select
 
-from core.formats import write_recording
-from core.simulate import RecordingSetup, Stand, Straight, simulate
-from server.jobs.opening import open_queue
-from server.processes.supervisor import Workers
-from server.settings import Settings
-from server.storage.db import Database, Source
-from server.storage.tables import analysis, job
+from sagittal.core.formats import write_recording
+from sagittal.core.simulate import RecordingSetup, Stand, Straight, simulate
+from sagittal.server.jobs.opening import open_queue
+from sagittal.server.processes.supervisor import Workers
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database, Source
+from sagittal.server.storage.tables import analysis, job
 from tests.helpers.service import Service, new_session, served
 
 pytestmark = pytest.mark.timeout(3600)

@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from core.calibration import calibrate
-from core.fusion.attitude import AttitudeParams, AttitudeState, advance, compile_attitude_kernel
-from core.fusion.mahony import estimate_orientations
-from core.recording import UniformRecording
+from sagittal.core.calibration import calibrate
+from sagittal.core.fusion.attitude import AttitudeParams, AttitudeState, advance, compile_attitude_kernel
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.recording import UniformRecording
 from tests.helpers.walks import simulated
 
 N = 60_000

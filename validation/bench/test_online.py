@@ -17,15 +17,15 @@ from typing import Final
 import numpy as np
 import pytest
 
-from core.body.erkf.live_erkf import LiveErkf
-from core.body.tree import PRESETS
-from core.events.foot_movement import FootMovement
-from core.events.live_contacts import ContactDetector
-from core.formats.live_log import SampleBatch
-from core.frames import Segment
-from core.online import LiveStride, OnlineSession, compile_live_kernels
-from core.parameters.live_strides import LiveStrides
-from core.recording import UniformRecording
+from sagittal.core.body.erkf.live_erkf import LiveErkf
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.events.foot_movement import FootMovement
+from sagittal.core.events.live_contacts import ContactDetector
+from sagittal.core.formats.live_log import SampleBatch
+from sagittal.core.frames import Segment
+from sagittal.core.online import LiveStride, OnlineSession, compile_live_kernels
+from sagittal.core.parameters.live_strides import LiveStrides
+from sagittal.core.recording import UniformRecording
 from tests.helpers.live_walks import batches, hello_of
 from tests.helpers.walks import only, simulated
 

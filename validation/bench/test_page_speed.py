@@ -16,7 +16,7 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
-from core.simulate import mt_files, simulate_scenario
+from sagittal.core.simulate import mt_files, simulate_scenario
 from tests.browser.conftest import CHROMIUM, DESK, FLAT, SOLID
 from tests.helpers.service import new_session, served, upload, wait_for
 from validation.figures import record_goal, record_speed

@@ -10,9 +10,9 @@ from math import pi
 
 import numpy as np
 
-from core.measure import measure_gait
-from core.parameters import take_figures
-from core.simulate import Arc, Stand, Straight, simulate
+from sagittal.core.measure import measure_gait
+from sagittal.core.parameters import take_figures
+from sagittal.core.simulate import Arc, Stand, Straight, simulate
 from tests.helpers.true_walks import true_tracks
 
 LIMIT_S = 0.06

@@ -16,10 +16,10 @@ from typing import Any
 
 import pytest
 
-from core.events.edits import Edit
-from core.measure import Tracks, measure_gait
-from server.pages.shell import FRAGMENT
-from server.services import patients, sessions
+from sagittal.core.events.edits import Edit
+from sagittal.core.measure import Tracks, measure_gait
+from sagittal.server.pages.shell import FRAGMENT
+from sagittal.server.services import patients, sessions
 from tests.helpers.pairs import cpu_s, in_pairs, plain_python
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic, open_clinic

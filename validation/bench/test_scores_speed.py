@@ -8,13 +8,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from core.flags import judge_flags
-from core.frames import SIDES
-from core.norms import look_up_norms
-from core.norms.profile import NINE
-from core.parameters.result import CycleCurves
-from core.scores import score_curves
-from core.standing_angles import NAMES
+from sagittal.core.flags import judge_flags
+from sagittal.core.frames import SIDES
+from sagittal.core.norms import look_up_norms
+from sagittal.core.norms.profile import NINE
+from sagittal.core.parameters.result import CycleCurves
+from sagittal.core.scores import score_curves
+from sagittal.core.standing_angles import NAMES
 
 STRIDES = 280
 """Per side: ten minutes with turns and rests at 110 steps a minute leave fewer."""

@@ -10,8 +10,8 @@ from typing import Final
 import pytest
 from sqlalchemy import update
 
-from server.storage.db import Source
-from server.storage.tables import job
+from sagittal.server.storage.db import Source
+from sagittal.server.storage.tables import job
 from tests.server import crowd
 from tests.server.clinic import open_clinic
 

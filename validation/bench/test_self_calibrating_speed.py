@@ -7,7 +7,7 @@ import sys
 import numpy as np
 from vqf import VQF, offlineVQF
 
-from core.fusion.self_calibrating import SelfCalibratingFilter, smooth_orientations
+from sagittal.core.fusion.self_calibrating import SelfCalibratingFilter, smooth_orientations
 from tests.helpers.pairs import in_pairs
 
 N, RATE = 60_000, 100.0

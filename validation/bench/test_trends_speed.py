@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from server.report.trends import follow_figures, names_in
-from server.services import histories, patients, sessions
+from sagittal.server.report.trends import follow_figures, names_in
+from sagittal.server.services import histories, patients, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic, open_clinic
 

@@ -6,10 +6,10 @@ import os
 
 import pytest
 
-from core.fusion.algorithms.benchmark import ReferenceTrial, read_trial
-from core.fusion.algorithms.swarm import SwarmRules
-from core.fusion.algorithms.tuning import GainTuner, TrialSplit
-from server.services import tunings
+from sagittal.core.fusion.algorithms.benchmark import ReferenceTrial, read_trial
+from sagittal.core.fusion.algorithms.swarm import SwarmRules
+from sagittal.core.fusion.algorithms.tuning import GainTuner, TrialSplit
+from sagittal.server.services import tunings
 from tests.core.fusion.algorithms.motion import trial_bytes
 from validation.bench.test_mahony import best
 

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 import viser
 
-from core.norms import adult_kinematics
-from server.viewer.ghost import match_ghost
-from server.viewer.live_figure import LiveFigure
-from server.viewer.live_reference import LiveReference
-from server.viewer.live_watch import LiveWatch
-from server.viewer.motion import prepare_motion
-from server.viewer.replay_figure import ReplayFigure
+from sagittal.core.norms import adult_kinematics
+from sagittal.server.viewer.ghost import match_ghost
+from sagittal.server.viewer.live_figure import LiveFigure
+from sagittal.server.viewer.live_reference import LiveReference
+from sagittal.server.viewer.live_watch import LiveWatch
+from sagittal.server.viewer.motion import prepare_motion
+from sagittal.server.viewer.replay_figure import ReplayFigure
 from tests.server import walk
 from tests.server.viewer.pictures import POSES, RATE_HZ, picture
 from validation.figures import record_goal

@@ -8,12 +8,12 @@ from typing import Final
 
 import numpy as np
 
-from core.body.chain.leg import LegMotion
-from core.body.estimate import PoseEstimate
-from core.body.kinematics import forward_kinematics, nominal_body
-from core.estimators import AUTO, SQUAT_CHAIN
-from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
-from core.fusion.orientations import Orientations
+from sagittal.core.body.chain.leg import LegMotion
+from sagittal.core.body.estimate import PoseEstimate
+from sagittal.core.body.kinematics import forward_kinematics, nominal_body
+from sagittal.core.estimators import AUTO, SQUAT_CHAIN
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from sagittal.core.fusion.orientations import Orientations
 
 HAND_OVER_S: Final = 0.5
 """In this time the pelvis passes from one leg's chain to the other's (our choice, for the eye)."""

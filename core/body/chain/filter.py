@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from core.body.chain.kernel import (
+from sagittal.core.body.chain.kernel import (
     START_ACCELERATION,
     START_RATE,
     ChainArrays,
@@ -21,9 +21,9 @@ from core.body.chain.kernel import (
     make_scratch,
     predict_signals,
 )
-from core.body.chain.model import RevoluteChain
-from core.errors import EstimationError, ParameterError
-from core.frames import Bools, Floats
+from sagittal.core.body.chain.model import RevoluteChain
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.frames import Bools, Floats
 
 START_STEPS: Final = 15
 """Steps of Gauss and Newton to the start; six are enough from 40°."""

@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from core.body.model import LEG_FRACTION, NOMINAL_HEIGHT_M, SHANK_FRACTION, THIGH_FRACTION
-from core.calibration.fixed_offset import SHIN_FACE
-from core.errors import ParameterError
-from core.frames import Floats, Side
+from sagittal.core.body.model import LEG_FRACTION, NOMINAL_HEIGHT_M, SHANK_FRACTION, THIGH_FRACTION
+from sagittal.core.calibration.fixed_offset import SHIN_FACE
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats, Side
 
 PELVIS_WIDTH_FRACTION: Final = 0.137
 """Between the anterior superior iliac spines as a fraction of body height: own estimate, 24 cm at 1.75 m.

@@ -13,9 +13,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import GRAVITY, Bools, Floats
-from core.inner import inner_njit
-from core.rotation.compiled import cross, exp_so3, multiply3, transform
+from sagittal.core.frames import GRAVITY, Bools, Floats
+from sagittal.core.inner import inner_njit
+from sagittal.core.rotation.compiled import cross, exp_so3, multiply3, transform
 
 LOST_TURN = 2.0
 """rad²/s by which an angle becomes uncertain while its sensor is silent, up to `MOST_TURN`, rad²."""

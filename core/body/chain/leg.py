@@ -9,17 +9,17 @@ from typing import Final
 
 import numpy as np
 
-from core.body.chain.filter import ChainFilter, ChainFilterParams, ChainMotion
-from core.body.chain.geometry import LegGeometry
-from core.body.chain.model import RevoluteChain, build_leg_chain, leg_segments, require_leg
-from core.body.corrected import correct_signals
-from core.calibration.result import CalibratedRecording
-from core.errors import EstimationError
-from core.estimators import SQUAT_CHAIN
-from core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
-from core.fusion.orientations import Orientations
-from core.rest import index_window
-from core.rotation import from_matrix
+from sagittal.core.body.chain.filter import ChainFilter, ChainFilterParams, ChainMotion
+from sagittal.core.body.chain.geometry import LegGeometry
+from sagittal.core.body.chain.model import RevoluteChain, build_leg_chain, leg_segments, require_leg
+from sagittal.core.body.corrected import correct_signals
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.errors import EstimationError
+from sagittal.core.estimators import SQUAT_CHAIN
+from sagittal.core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rest import index_window
+from sagittal.core.rotation import from_matrix
 
 UNCERTAIN: Final = radians(5.0)
 """Angles with a larger standard deviation are withheld: after a silence of a sensor (our choice)."""

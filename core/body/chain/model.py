@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from core.body.chain.geometry import LegGeometry
-from core.errors import EstimationError, ParameterError
-from core.frames import R_NEUTRAL, SHANK, THIGH, Floats, Segment, Side
+from sagittal.core.body.chain.geometry import LegGeometry
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.frames import R_NEUTRAL, SHANK, THIGH, Floats, Segment, Side
 
 FORWARD: Final = (1.0, 0.0, 0.0)
 UP: Final = (0.0, 1.0, 0.0)
@@ -91,7 +91,7 @@ class RevoluteChain:
 
     def links(self, angles: Floats) -> list[Floats]:
         """Orientations (n, 3, 3) in the world of the links that carry sensors, from angles (n, J)."""
-        from core.rotation import exp, to_matrix
+        from sagittal.core.rotation import exp, to_matrix
 
         found, R = [], np.broadcast_to(self.base, (len(angles), 3, 3))
         for j, axis in enumerate(self.axes):

@@ -22,8 +22,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.erkf.gaps import bridge_gaps
-from core.body.erkf.kernel import (
+from sagittal.core.body.erkf.gaps import bridge_gaps
+from sagittal.core.body.erkf.kernel import (
     CONTACT,
     INVALID,
     NONE_KEPT,
@@ -37,14 +37,14 @@ from core.body.erkf.kernel import (
     SmootherRecord,
     filter_segments,
 )
-from core.body.erkf.lanes import IN_LINE
-from core.body.erkf.params import ErkfParams
-from core.body.still import AT_REST, contact_samples, still_samples
-from core.body.tree import ImuTree
-from core.errors import EstimationError, ParameterError, SignalError
-from core.frames import Bools, Floats
-from core.held_samples import SampleSeries
-from core.memory import make_pages
+from sagittal.core.body.erkf.lanes import IN_LINE
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.still import AT_REST, contact_samples, still_samples
+from sagittal.core.body.tree import ImuTree
+from sagittal.core.errors import EstimationError, ParameterError, SignalError
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.held_samples import SampleSeries
+from sagittal.core.memory import make_pages
 
 HEADING_SD: Final = radians(10.0)
 """Of a measured heading, rad (our choice). No stage measures one, so it is no parameter."""

@@ -16,9 +16,9 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.tree import ImuTree
-from core.frames import GRAVITY, Bools, Floats
-from core.rotation import conjugate, multiply, to_matrix
+from sagittal.core.body.tree import ImuTree
+from sagittal.core.frames import GRAVITY, Bools, Floats
+from sagittal.core.rotation import conjugate, multiply, to_matrix
 
 HOLD_S: Final = 0.3
 """So long a sensor goes on as it last did: a gap of 0.3 s in mid-swing costs 1.4° at the ankle."""

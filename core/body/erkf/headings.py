@@ -16,20 +16,20 @@ from typing import Final
 
 import numpy as np
 
-from core.body.corrected import correct_signals
-from core.body.erkf.filter import erkf_inputs
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.smoother import smooth
-from core.body.erkf.start import start_state
-from core.body.health import HealthFinding
-from core.body.model import BodyModel
-from core.body.tree import person_tree
-from core.calibration.result import CalibratedRecording
-from core.errors import Notice, Severity
-from core.frames import Segment
-from core.fusion.orientations import Orientations
-from core.rest import index_window
-from core.rotation import about, from_matrix, multiply, to_matrix, wrap_angle, yaw
+from sagittal.core.body.corrected import correct_signals
+from sagittal.core.body.erkf.filter import erkf_inputs
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.smoother import smooth
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.body.health import HealthFinding
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.tree import person_tree
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.errors import Notice, Severity
+from sagittal.core.frames import Segment
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rest import index_window
+from sagittal.core.rotation import about, from_matrix, multiply, to_matrix, wrap_angle, yaw
 
 LOOKED_AT_S: Final = 120.0
 """Part of the take that is filtered for this, from the standing zero on: some fifty strides."""

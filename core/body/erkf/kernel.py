@@ -13,9 +13,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.erkf.predict import move, propagate, reset_before
-from core.body.erkf.sweep import copy_row, move_smoothed, multiply_lower, sweep_back
-from core.body.erkf.updates import (
+from sagittal.core.body.erkf.predict import move, propagate, reset_before
+from sagittal.core.body.erkf.sweep import copy_row, move_smoothed, multiply_lower, sweep_back
+from sagittal.core.body.erkf.updates import (
     POSITION,
     VELOCITY,
     complete_rows,
@@ -28,9 +28,9 @@ from core.body.erkf.updates import (
     turn_apart,
     velocity_rows,
 )
-from core.frames import Bools, Floats
-from core.inner import inner_njit
-from core.rotation.compiled import to_matrix, turn
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.inner import inner_njit
+from sagittal.core.rotation.compiled import to_matrix, turn
 
 INVALID, CONTACT, STILL, PATCHED = 1, 2, 4, 8
 """Bits of a sample's flags."""

@@ -17,16 +17,24 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.erkf.filter import ErkfInputs, links_of, memory_of, new_output, new_record, noise_of
-from core.body.erkf.gaps import HOLD_S
-from core.body.erkf.kernel import CONTACT, INVALID, NONE_KEPT, PATCHED, STILL, ErkfOutput, filter_segments
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.start import start_state
-from core.body.live_still import ROLLING_MPS
-from core.body.tree import ImuTree
-from core.frames import Bools, Floats
-from core.fusion.live_rest import LOST_TILT, RestLooks
-from core.rotation import exp, multiply, rotate
+from sagittal.core.body.erkf.filter import ErkfInputs, links_of, memory_of, new_output, new_record, noise_of
+from sagittal.core.body.erkf.gaps import HOLD_S
+from sagittal.core.body.erkf.kernel import (
+    CONTACT,
+    INVALID,
+    NONE_KEPT,
+    PATCHED,
+    STILL,
+    ErkfOutput,
+    filter_segments,
+)
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.body.live_still import ROLLING_MPS
+from sagittal.core.body.tree import ImuTree
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.fusion.live_rest import LOST_TILT, RestLooks
+from sagittal.core.rotation import exp, multiply, rotate
 
 HEADING_SD: Final = radians(2.0)
 """Of each segment's heading while standing, where forward axes were made to agree with the joints on the walk

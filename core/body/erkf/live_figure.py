@@ -8,12 +8,12 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.erkf.live_sensors import FilteredSensors, FootPaths
-from core.body.erkf.live_watch import JointWatch
-from core.body.live_estimator import BodyBlock, FootBlock, MeasuredBlock, list_worn_feet
-from core.errors import Notice
-from core.estimators import ERKF, LIVE_LINKED_PATHS, LIVE_SINGLE_PATHS, NO_FIGURE, LiveMethod
-from core.frames import FOOT, SHANK, SIDES, THIGH, Segment
+from sagittal.core.body.erkf.live_sensors import FilteredSensors, FootPaths
+from sagittal.core.body.erkf.live_watch import JointWatch
+from sagittal.core.body.live_estimator import BodyBlock, FootBlock, MeasuredBlock, list_worn_feet
+from sagittal.core.errors import Notice
+from sagittal.core.estimators import ERKF, LIVE_LINKED_PATHS, LIVE_SINGLE_PATHS, NO_FIGURE, LiveMethod
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Segment
 
 LEVEL_S: Final = 0.1
 """The figure is let down or lifted to the floor of the foot that rests within about so long: for the eye."""

@@ -7,18 +7,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from core.body.erkf.gaps import GapBridge
-from core.body.erkf.live_erkf import LiveErkf, SignalBlock
-from core.body.erkf.params import ErkfParams
-from core.body.live_estimator import FootBlock, MeasuredBlock
-from core.body.live_still import StillnessDetector
-from core.body.model import BodyModel
-from core.body.tree import person_tree
-from core.calibration.result import SegmentCalibration
-from core.frames import GRAVITY, R_NEUTRAL, Floats, Segment
-from core.rest import count_runs
-from core.rotation import from_matrix, multiply
-from core.timeline.columns import find_columns, take_columns, take_mask
+from sagittal.core.body.erkf.gaps import GapBridge
+from sagittal.core.body.erkf.live_erkf import LiveErkf, SignalBlock
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.live_estimator import FootBlock, MeasuredBlock
+from sagittal.core.body.live_still import StillnessDetector
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.tree import person_tree
+from sagittal.core.calibration.result import SegmentCalibration
+from sagittal.core.frames import GRAVITY, R_NEUTRAL, Floats, Segment
+from sagittal.core.rest import count_runs
+from sagittal.core.rotation import from_matrix, multiply
+from sagittal.core.timeline.columns import find_columns, take_columns, take_mask
 
 
 class FilteredBlock(NamedTuple):

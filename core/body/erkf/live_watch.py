@@ -7,10 +7,10 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.erkf.health import RESIDUAL_MM, TOLD
-from core.body.tree import ImuTree
-from core.errors import Notice
-from core.frames import Bools, Floats
+from sagittal.core.body.erkf.health import RESIDUAL_MM, TOLD
+from sagittal.core.body.tree import ImuTree
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Bools, Floats
 
 WINDOW_S: Final = 5.0
 """Of movement, over which the distance is averaged. Right set-ups then have 3 to 17 mm live (five simulated

@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.errors import ParameterError
+from sagittal.core.errors import ParameterError
 
 Integration = Literal["trapezoid", "euler"]
 """euler: Potter 2021 eq 8, the sample at the start of the step; it costs 0.6 to 0.9° at 100 Hz

@@ -8,26 +8,33 @@ from typing import cast
 
 import numpy as np
 
-from core.body.arms import MeasuredArms
-from core.body.corrected import SIGNALS, CorrectedSignals, correct_signals
-from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, TakeInputs, erkf_inputs, find_rests
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.smoother import do_nothing, smooth
-from core.body.erkf.start import start_state
-from core.body.feet import FootTracks
-from core.body.kinematics import incomplete_legs
-from core.body.model import BodyModel
-from core.body.places import joint_places, sensor_place
-from core.body.poses import Poses, figure_precision
-from core.body.tree import ImuTree, person_tree
-from core.calibration.result import CalibratedRecording
-from core.estimators import ERKF, LINKED_PATHS, SINGLE_PATHS
-from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
-from core.fusion.orientations import Orientations
-from core.held_samples import cut_blocks
-from core.recording import UniformRecording
-from core.rest import find_runs
-from core.rotation import from_matrix, multiply, rotate
+from sagittal.core.body.arms import MeasuredArms
+from sagittal.core.body.corrected import SIGNALS, CorrectedSignals, correct_signals
+from sagittal.core.body.erkf.filter import (
+    ErkfInputs,
+    ErkfState,
+    ErkfTrack,
+    TakeInputs,
+    erkf_inputs,
+    find_rests,
+)
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.smoother import do_nothing, smooth
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.body.kinematics import incomplete_legs
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.places import joint_places, sensor_place
+from sagittal.core.body.poses import Poses, figure_precision
+from sagittal.core.body.tree import ImuTree, person_tree
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.estimators import ERKF, LINKED_PATHS, SINGLE_PATHS
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.held_samples import cut_blocks
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import find_runs
+from sagittal.core.rotation import from_matrix, multiply, rotate
 
 NEAR_START_S = 1.0
 """Rest that begins so early is a standing start."""

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numba
 
-from core.body.erkf.lanes import IN_LINE, mix, read_columns, read_lanes, write_columns, write_lanes
-from core.frames import GRAVITY
-from core.inner import inner_njit
-from core.rotation.compiled import (
+from sagittal.core.body.erkf.lanes import IN_LINE, mix, read_columns, read_lanes, write_columns, write_lanes
+from sagittal.core.frames import GRAVITY
+from sagittal.core.inner import inner_njit
+from sagittal.core.rotation.compiled import (
     multiply3,
     sine_quotients,
     skew_polynomial,

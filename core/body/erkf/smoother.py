@@ -15,12 +15,19 @@ from typing import Final
 
 import numpy as np
 
-from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, TakeInputs, new_record, prepare_run
-from core.body.erkf.kernel import filter_segments, row_length
-from core.body.erkf.params import ErkfParams
-from core.body.tree import ImuTree
-from core.errors import ParameterError
-from core.memory import make_pages
+from sagittal.core.body.erkf.filter import (
+    ErkfInputs,
+    ErkfState,
+    ErkfTrack,
+    TakeInputs,
+    new_record,
+    prepare_run,
+)
+from sagittal.core.body.erkf.kernel import filter_segments, row_length
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.tree import ImuTree
+from sagittal.core.errors import ParameterError
+from sagittal.core.memory import make_pages
 
 SEGMENT = 128
 """Samples per segment, at least: 21 MB of kept states for ten minutes of seven sensors, and a record of 8 MB.

@@ -17,11 +17,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.erkf.filter import ErkfInputs, ErkfState
-from core.body.erkf.params import ErkfParams
-from core.body.tree import ImuTree, Joint
-from core.frames import Floats
-from core.rotation import from_matrix, rotate, to_matrix
+from sagittal.core.body.erkf.filter import ErkfInputs, ErkfState
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.tree import ImuTree, Joint
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import from_matrix, rotate, to_matrix
 
 MOVING_S = 1.0
 """Time over which gravity is averaged where no sample is at rest, about one stride."""

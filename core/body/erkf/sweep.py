@@ -5,10 +5,10 @@ Equations: docs/science/erkf.md, "Smoother".
 
 from __future__ import annotations
 
-from core.body.erkf.predict import propagate_back, propagate_error
-from core.body.erkf.updates import back_correct
-from core.inner import inner_njit
-from core.rotation.compiled import turn
+from sagittal.core.body.erkf.predict import propagate_back, propagate_error
+from sagittal.core.body.erkf.updates import back_correct
+from sagittal.core.inner import inner_njit
+from sagittal.core.rotation.compiled import turn
 
 
 @inner_njit(_nrt=False)

@@ -12,9 +12,9 @@ from math import atan2, sqrt
 
 import numba
 
-from core.body.erkf.lanes import IN_LINE, mix, read_lanes, spread, write_lanes
-from core.inner import inner_njit
-from core.rotation.compiled import skew, times_cross, wrap_angle
+from sagittal.core.body.erkf.lanes import IN_LINE, mix, read_lanes, spread, write_lanes
+from sagittal.core.inner import inner_njit
+from sagittal.core.rotation.compiled import skew, times_cross, wrap_angle
 
 FIRST, SECOND, UNIT, TURNS = range(4)
 """A block's place: first error of its IMUs (SECOND is −1 for one IMU), offset of the ±1 (−1: none), whether

@@ -8,9 +8,9 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.l7s.updates import WIDTH, inject
-from core.body.se3 import move_pose
-from core.inner import inner_njit
+from sagittal.core.body.l7s.updates import WIDTH, inject
+from sagittal.core.body.se3 import move_pose
+from sagittal.core.inner import inner_njit
 
 MOST: Final = 4
 """Rows: two of a leg."""

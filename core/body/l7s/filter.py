@@ -25,10 +25,10 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.body.l7s.legs import HIP_SIDE, LEGS, LegModel
-from core.errors import EstimationError, ParameterError
-from core.frames import FOOT, Bools, Floats
-from core.rotation import about, to_matrix, wrap_angle
+from sagittal.core.body.l7s.legs import HIP_SIDE, LEGS, LegModel
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.frames import FOOT, Bools, Floats
+from sagittal.core.rotation import about, to_matrix, wrap_angle
 
 Worn = Literal["3I", "2I"]
 """3I: pelvis and both feet carry an IMU; 2I: the feet only."""
@@ -145,8 +145,8 @@ def filter_block(
     ------
     EstimationError `bad_signal` when an input is not finite, `l7s_diverged` when a constraint cannot be met.
     """
-    from core.body.l7s import kernel
-    from core.body.l7s.updates import WIDTH
+    from sagittal.core.body.l7s import kernel
+    from sagittal.core.body.l7s.updates import WIDTH
 
     params = params or L7sParams()
     R = np.ascontiguousarray(inputs.R, np.float64)

@@ -18,14 +18,14 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.l7s.checks import BREAK_S, STRIDE_S
-from core.body.l7s.filter import L7sInputs
-from core.body.l7s.inputs import L7sTake
-from core.body.l7s.legs import LEGS, LegModel
-from core.frames import Bools, Floats
-from core.held_samples import cut_blocks, is_complete
-from core.inner import inner_njit
-from core.rest import find_runs
+from sagittal.core.body.l7s.checks import BREAK_S, STRIDE_S
+from sagittal.core.body.l7s.filter import L7sInputs
+from sagittal.core.body.l7s.inputs import L7sTake
+from sagittal.core.body.l7s.legs import LEGS, LegModel
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.held_samples import cut_blocks, is_complete
+from sagittal.core.inner import inner_njit
+from sagittal.core.rest import find_runs
 
 ROLLS: Final = radians(20.0)
 """Rise of the heel up to which the ball is taken to stay. Later the foot rolls on over its toes: up to 30° a

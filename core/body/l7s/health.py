@@ -8,10 +8,10 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from core.body.health import LONGEST_MOVING_S, HealthFinding, longest_run_s
-from core.body.poses import Poses
-from core.errors import Notice
-from core.frames import Protocol, Segment
+from sagittal.core.body.health import LONGEST_MOVING_S, HealthFinding, longest_run_s
+from sagittal.core.body.poses import Poses
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Protocol, Segment
 
 CONSTRAINT_MM: Final = (1.0, 10.0)
 """What constraints leave after projection: below .01 with two, 10 accepted with one

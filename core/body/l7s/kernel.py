@@ -5,10 +5,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from core.body.l7s.constraints import make_scratch, project
-from core.body.l7s.updates import VELOCITY, WIDTH, N, apply_rows, inject, make_form, reset
-from core.inner import inner_njit
-from core.rotation.compiled import log_so3
+from sagittal.core.body.l7s.constraints import make_scratch, project
+from sagittal.core.body.l7s.updates import VELOCITY, WIDTH, N, apply_rows, inject, make_form, reset
+from sagittal.core.inner import inner_njit
+from sagittal.core.rotation.compiled import log_so3
 
 
 @inner_njit(_nrt=False)

@@ -7,7 +7,7 @@ from math import acos, cos, sin, sqrt
 import numba
 import numpy as np
 
-from core.rotation.compiled import cross, from_matrix, multiply3
+from sagittal.core.rotation.compiled import cross, from_matrix, multiply3
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]

@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
-from core.body.kinematics import sole_points
-from core.body.model import BodyModel
-from core.errors import EstimationError
-from core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
-from core.rotation import about, to_matrix
+from sagittal.core.body.kinematics import sole_points
+from sagittal.core.body.model import BodyModel
+from sagittal.core.errors import EstimationError
+from sagittal.core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
+from sagittal.core.rotation import about, to_matrix
 
 BODIES: Final[tuple[Segment, ...]] = ("pelvis", "foot_l", "foot_r")
 """Order of the three bodies of the state (paper: p, lf, rf)."""
@@ -123,7 +123,7 @@ def solve_legs(R: Floats, p: Floats, model: LegModel) -> Legs:
     ----------
     Sy 2021 eq 40–44. Where the leg is longer than thigh and shank (the cosine passes 1) the knee is straight.
     """
-    from core.body.l7s.leg_kernel import write_legs
+    from sagittal.core.body.l7s.leg_kernel import write_legs
 
     n = len(R)
     legs = Legs(np.empty((n, 7, 4)), np.empty((n, 7, 3)), np.empty((n, 2)), np.empty((n, 2)))

@@ -6,16 +6,24 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from core.body.erkf.live_sensors import FootPaths
-from core.body.l7s.filter import L7sInputs, L7sParams, L7sState, L7sTrack, Worn, filter_block, start_l7s_state
-from core.body.l7s.inputs import KnownSamples, arrange_inputs, bodies_of, remove_gravity
-from core.body.l7s.legs import FIGURE, LegModel, solve_legs
-from core.body.live_estimator import BodyBlock, MeasuredBlock
-from core.body.model import BodyModel
-from core.calibration.result import SegmentCalibration
-from core.errors import EstimationError, Notice
-from core.estimators import L7S_2I, L7S_3I, LIVE_SINGLE_PATHS, LiveMethod
-from core.frames import Bools, Segment
+from sagittal.core.body.erkf.live_sensors import FootPaths
+from sagittal.core.body.l7s.filter import (
+    L7sInputs,
+    L7sParams,
+    L7sState,
+    L7sTrack,
+    Worn,
+    filter_block,
+    start_l7s_state,
+)
+from sagittal.core.body.l7s.inputs import KnownSamples, arrange_inputs, bodies_of, remove_gravity
+from sagittal.core.body.l7s.legs import FIGURE, LegModel, solve_legs
+from sagittal.core.body.live_estimator import BodyBlock, MeasuredBlock
+from sagittal.core.body.model import BodyModel
+from sagittal.core.calibration.result import SegmentCalibration
+from sagittal.core.errors import EstimationError, Notice
+from sagittal.core.estimators import L7S_2I, L7S_3I, LIVE_SINGLE_PATHS, LiveMethod
+from sagittal.core.frames import Bools, Segment
 
 
 class LiveL7s:

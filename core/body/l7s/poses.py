@@ -12,21 +12,21 @@ from typing import Final, get_args
 
 import numpy as np
 
-from core.body.l7s.checks import SeenWalk, longest_gaps, walking_checks
-from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
-from core.body.l7s.health import l7s_health, list_health_notices
-from core.body.l7s.inputs import KnownSamples, L7sTake, bodies_of, take_of
-from core.body.l7s.legs import BODIES, FIGURE, LEGS, LegModel, solve_legs
-from core.body.l7s.smoother import smooth_track
-from core.body.l7s.windows import PlacedWindow, place_windows
-from core.body.model import NOMINAL_HEIGHT_M, BodyModel
-from core.body.poses import Poses, figure_precision
-from core.errors import Notice
-from core.estimators import L7S_2I, L7S_3I
-from core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
-from core.fusion.orientations import Orientations
-from core.held_samples import SampleSeries, cut_blocks, give_pages_back, make_room
-from core.rotation import angle_between, from_matrix
+from sagittal.core.body.l7s.checks import SeenWalk, longest_gaps, walking_checks
+from sagittal.core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
+from sagittal.core.body.l7s.health import l7s_health, list_health_notices
+from sagittal.core.body.l7s.inputs import KnownSamples, L7sTake, bodies_of, take_of
+from sagittal.core.body.l7s.legs import BODIES, FIGURE, LEGS, LegModel, solve_legs
+from sagittal.core.body.l7s.smoother import smooth_track
+from sagittal.core.body.l7s.windows import PlacedWindow, place_windows
+from sagittal.core.body.model import NOMINAL_HEIGHT_M, BodyModel
+from sagittal.core.body.poses import Poses, figure_precision
+from sagittal.core.errors import Notice
+from sagittal.core.estimators import L7S_2I, L7S_3I
+from sagittal.core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.held_samples import SampleSeries, cut_blocks, give_pages_back, make_room
+from sagittal.core.rotation import angle_between, from_matrix
 
 STRETCHED_M: Final = 1e-6
 """A leg this close to its full length is at the bound: the knee is within .2° of straight. The projection
@@ -49,7 +49,8 @@ def l7s_poses(
     Parameters
     ----------
     orientations : of the worn segments; others are not read.
-    acceleration : segment → (n, 3) in W without gravity, m/s² (`core.body.l7s.inputs.free_acceleration`).
+    acceleration : segment → (n, 3) in W without gravity, m/s²
+        (`sagittal.core.body.l7s.inputs.free_acceleration`).
     steps : side → (n,) foot still on the floor: zero velocity, not contact.
     worn : None = 3I with a pelvis, else 2I. both_ways : places from what comes before and after
         (core/body/l7s/smoother.py); False gives the filter's, as they are live.

@@ -17,13 +17,13 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.l7s.constraints import make_scratch, project_places
-from core.body.l7s.filter import L7sInputs, L7sTrack
-from core.body.l7s.foot_place import find_sensor_offsets
-from core.body.l7s.legs import LegModel
-from core.body.l7s.node_kernel import KEPT, move_nodes
-from core.errors import EstimationError
-from core.frames import Bools, Floats
+from sagittal.core.body.l7s.constraints import make_scratch, project_places
+from sagittal.core.body.l7s.filter import L7sInputs, L7sTrack
+from sagittal.core.body.l7s.foot_place import find_sensor_offsets
+from sagittal.core.body.l7s.legs import LegModel
+from sagittal.core.body.l7s.node_kernel import KEPT, move_nodes
+from sagittal.core.errors import EstimationError
+from sagittal.core.frames import Bools, Floats
 
 NODE_S: Final = 0.02
 """Time between nodes: a brisk walker's foot rests for some 40 ms. Half of it changes flexion by 0.1°."""

@@ -15,8 +15,8 @@ from math import sqrt
 import numba
 import numpy as np
 
-from core.body.se3 import move_pose, right_jacobian
-from core.inner import inner_njit
+from sagittal.core.body.se3 import move_pose, right_jacobian
+from sagittal.core.inner import inner_njit
 
 N = 27
 """Length of the error vector."""

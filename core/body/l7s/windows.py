@@ -14,13 +14,13 @@ from typing import Final
 
 import numpy as np
 
-from core.body.l7s.filter import L7sInputs, L7sParams, L7sTrack, filter_block, start_l7s_state
-from core.body.l7s.foot_place import find_sensor_offsets
-from core.body.l7s.inputs import L7sTake
-from core.body.l7s.legs import LEGS
-from core.body.l7s.smoother import NODE_S, find_hop, smooth_track
-from core.frames import Bools, Floats
-from core.held_samples import SHORT
+from sagittal.core.body.l7s.filter import L7sInputs, L7sParams, L7sTrack, filter_block, start_l7s_state
+from sagittal.core.body.l7s.foot_place import find_sensor_offsets
+from sagittal.core.body.l7s.inputs import L7sTake
+from sagittal.core.body.l7s.legs import LEGS
+from sagittal.core.body.l7s.smoother import NODE_S, find_hop, smooth_track
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.held_samples import SHORT
 
 WHOLE: Final = SHORT
 """Samples up to which a take is one window, and 200 MB."""

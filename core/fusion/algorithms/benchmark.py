@@ -15,12 +15,12 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import FormatError, SignalError
-from core.frames import Bools, Floats
-from core.fusion.algorithms.filter import FusionFilter, RestMeans
-from core.fusion.algorithms.parameters import AlgorithmGains
-from core.fusion.self_calibrating import SelfCalibratingFilter
-from core.rotation import conjugate, multiply, split_heading
+from sagittal.core.errors import FormatError, SignalError
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.fusion.algorithms.filter import FusionFilter, RestMeans
+from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
+from sagittal.core.fusion.self_calibrating import SelfCalibratingFilter
+from sagittal.core.rotation import conjugate, multiply, split_heading
 
 REST_S: Final = 1.0
 """Shortest rest before the movement that a filter is started from."""

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from core.errors import ParameterError
-from core.fusion.algorithms.listed import ALGORITHMS, BY_NAME
+from sagittal.core.errors import ParameterError
+from sagittal.core.fusion.algorithms.listed import ALGORITHMS, BY_NAME
 
 
 @dataclass(frozen=True)

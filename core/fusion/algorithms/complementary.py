@@ -13,8 +13,8 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.fusion.algorithms.gain_kernel import choose_level, is_moving
-from core.fusion.algorithms.vectors import (
+from sagittal.core.fusion.algorithms.gain_kernel import choose_level, is_moving
+from sagittal.core.fusion.algorithms.vectors import (
     climb_direction,
     dot,
     half_turn,
@@ -26,7 +26,7 @@ from core.fusion.algorithms.vectors import (
     turn_to_sensor,
     turn_to_world,
 )
-from core.rotation.compiled import multiply
+from sagittal.core.rotation.compiled import multiply
 
 KINDS: Final = (
     "cross", "hua", "gd", "lm", "lm_c", "justa", "aqua", "tilt_heading", "fcf", "glin", "svd", "invariant",

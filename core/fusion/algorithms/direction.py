@@ -10,10 +10,10 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.frames import Floats
-from core.fusion.algorithms.gain_kernel import choose_level
-from core.fusion.algorithms.kalman import take_scalar
-from core.fusion.algorithms.vectors import (
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.gain_kernel import choose_level
+from sagittal.core.fusion.algorithms.kalman import take_scalar
+from sagittal.core.fusion.algorithms.vectors import (
     dot,
     half_turn,
     level,
@@ -23,7 +23,7 @@ from core.fusion.algorithms.vectors import (
     turn_by,
     unit,
 )
-from core.rotation.compiled import cross, from_matrix
+from sagittal.core.rotation.compiled import cross, from_matrix
 
 KINDS: Final = ("two_vectors", "vertical")
 """Filters; their place here is their number in the compiled loop."""

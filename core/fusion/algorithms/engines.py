@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import ParameterError
-from core.frames import Floats
-from core.fusion.algorithms import (
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms import (
     complementary,
     direction,
     error_state,
@@ -19,7 +19,7 @@ from core.fusion.algorithms import (
     quaternion_kalman,
     sigma_point,
 )
-from core.fusion.algorithms.gains import (
+from sagittal.core.fusion.algorithms.gains import (
     LEVELS,
     LONGEST_WINDOW,
     OUTPUT,
@@ -28,8 +28,8 @@ from core.fusion.algorithms.gains import (
     Gain,
     InnovationRules,
 )
-from core.fusion.algorithms.parameters import AlgorithmGains
-from core.rotation import conjugate, rotate
+from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
+from sagittal.core.rotation import conjugate, rotate
 
 GAINS_RATE_HZ: Final = 100.0
 """Rate for which gains per sample are given."""

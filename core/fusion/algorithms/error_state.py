@@ -12,10 +12,10 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.frames import Floats
-from core.fusion.algorithms.gain_kernel import choose_level
-from core.fusion.algorithms.kalman import take_block, take_scalar
-from core.fusion.algorithms.vectors import (
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.gain_kernel import choose_level
+from sagittal.core.fusion.algorithms.kalman import take_block, take_scalar
+from sagittal.core.fusion.algorithms.vectors import (
     dot,
     half_turn,
     heading_error,

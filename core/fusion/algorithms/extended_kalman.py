@@ -12,10 +12,10 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.frames import Floats
-from core.fusion.algorithms.gain_kernel import choose_level
-from core.fusion.algorithms.kalman import bound_worst_case, take_scalar
-from core.fusion.algorithms.vectors import (
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.gain_kernel import choose_level
+from sagittal.core.fusion.algorithms.kalman import bound_worst_case, take_scalar
+from sagittal.core.fusion.algorithms.vectors import (
     direction_jacobian,
     dot,
     half_turn,
@@ -24,7 +24,7 @@ from core.fusion.algorithms.vectors import (
     read_sample,
     to_sensor,
 )
-from core.rotation.compiled import multiply
+from sagittal.core.rotation.compiled import multiply
 
 BLOCKS: Final = {
     "bias": "b",

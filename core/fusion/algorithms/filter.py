@@ -7,13 +7,13 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import EstimationError, ParameterError, SignalError
-from core.frames import Floats
-from core.fusion.algorithms.engines import PREPARE, Prepared, Setting
-from core.fusion.algorithms.listed import BY_NAME, Algorithm
-from core.fusion.algorithms.parameters import AlgorithmGains
-from core.fusion.algorithms.vectors import level
-from core.rotation import from_matrix, normalise, rotate
+from sagittal.core.errors import EstimationError, ParameterError, SignalError
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.engines import PREPARE, Prepared, Setting
+from sagittal.core.fusion.algorithms.listed import BY_NAME, Algorithm
+from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
+from sagittal.core.fusion.algorithms.vectors import level
+from sagittal.core.rotation import from_matrix, normalise, rotate
 
 UPRIGHT: Final = 0.9
 """Share of the vertical along the sensor's x from which on z is the start's seed of heading instead."""

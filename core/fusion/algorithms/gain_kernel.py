@@ -7,7 +7,7 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.fusion.algorithms.gains import FUZZY_FALLS
+from sagittal.core.fusion.algorithms.gains import FUZZY_FALLS
 
 POINTS: Final = 201
 """Of the centroid."""

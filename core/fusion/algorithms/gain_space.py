@@ -1,6 +1,7 @@
 """Gains of an algorithm as a point in a unit box, over the logarithm of each number that may be tuned.
 
-Which numbers those are, and where they may lie, stands in the types of `core.fusion.algorithms.parameters`.
+Which numbers those are, and where they may lie, stands in the types of
+`sagittal.core.fusion.algorithms.parameters`.
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ from typing import Any, Final, get_type_hints
 
 import numpy as np
 
-from core.errors import ParameterError
-from core.frames import Floats
-from core.fusion.algorithms.gains import FixedGain, FuzzyGain, Gain, ThreeLevelGain, TwoLevelGain
-from core.fusion.algorithms.parameters import MAGNETIC, AlgorithmGains
-from core.fusion.algorithms.schemes import Scheme
-from core.fusion.algorithms.tuning_ranges import DEVIATION, TURNING, TuningRange
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.gains import FixedGain, FuzzyGain, Gain, ThreeLevelGain, TwoLevelGain
+from sagittal.core.fusion.algorithms.parameters import MAGNETIC, AlgorithmGains
+from sagittal.core.fusion.algorithms.schemes import Scheme
+from sagittal.core.fusion.algorithms.tuning_ranges import DEVIATION, TURNING, TuningRange
 
 DIGITS: Final = 4
 """Significant digits of a tuned gain: more would be noise of the data."""

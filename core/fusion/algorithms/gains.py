@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import ParameterError
-from core.frames import Floats
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats
 
 LEVELS: Final = slice(0, 3)
 """Where a row has the values of its levels."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from core.estimators import PaperReference
-from core.fusion.algorithms import parameters as p
+from sagittal.core.estimators import PaperReference
+from sagittal.core.fusion.algorithms import parameters as p
 
 Engine = Literal["E1", "E2", "E3", "E4", "E5", "E6"]
 Grade = Literal["A", "B", "C"]

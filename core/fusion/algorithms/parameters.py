@@ -2,7 +2,8 @@
 
 Units: accelerometer and magnetometer in shares of their norm at rest, rates in rad/s, noises σ and shares per
 sample as at 100 Hz; at other rates they are converted. A gain that may follow the motion takes a fixed
-value or two or three levels (`core.fusion.algorithms.gains`). Values: docs/science/filters.md, "Gains".
+value or two or three levels (`sagittal.core.fusion.algorithms.gains`). Values: docs/science/filters.md,
+"Gains".
 Each number that tuning may change has its range in its type; one without is left as it is.
 """
 
@@ -12,8 +13,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import Annotated, Final
 
-from core.fusion.algorithms.gains import FixedGain, Gain, InnovationRules, TwoLevelGain
-from core.fusion.algorithms.tuning_ranges import (
+from sagittal.core.fusion.algorithms.gains import FixedGain, Gain, InnovationRules, TwoLevelGain
+from sagittal.core.fusion.algorithms.tuning_ranges import (
     DEVIATION,
     DRIFT,
     LEFT,

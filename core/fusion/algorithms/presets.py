@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from core.fusion.algorithms.gains import FixedGain, ThreeLevelGain, TwoLevelGain
-from core.fusion.algorithms.parameters import (
+from sagittal.core.fusion.algorithms.gains import FixedGain, ThreeLevelGain, TwoLevelGain
+from sagittal.core.fusion.algorithms.parameters import (
     AlgorithmGains,
     AquaGains,
     MadgwickGains,
@@ -16,7 +16,7 @@ from core.fusion.algorithms.parameters import (
     MahonyGains,
     Nazarahari2021Gains,
 )
-from core.fusion.algorithms.schemes import Scheme
+from sagittal.core.fusion.algorithms.schemes import Scheme
 
 LegSegment = Literal["thigh", "shank", "foot"]
 BodyPlace = Literal["foot", "shank", "thigh", "pelvis"]

@@ -12,11 +12,11 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.frames import Floats
-from core.fusion.algorithms.gain_kernel import choose_level, infer_gain
-from core.fusion.algorithms.gains import LONGEST_WINDOW
-from core.fusion.algorithms.kalman import take_block
-from core.fusion.algorithms.vectors import (
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.gain_kernel import choose_level, infer_gain
+from sagittal.core.fusion.algorithms.gains import LONGEST_WINDOW
+from sagittal.core.fusion.algorithms.kalman import take_block
+from sagittal.core.fusion.algorithms.vectors import (
     direction_jacobian,
     dot,
     half_turn,
@@ -28,7 +28,7 @@ from core.fusion.algorithms.vectors import (
     to_sensor,
     unit,
 )
-from core.rotation.compiled import from_matrix, multiply
+from sagittal.core.rotation.compiled import from_matrix, multiply
 
 KINDS: Final = (
     "wahba", "gd_plain", "gd_recursive", "linear", "algebraic", "pseudo", "gd_disturbed"

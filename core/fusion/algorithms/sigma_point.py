@@ -13,11 +13,11 @@ from typing import Final, Literal
 import numba
 import numpy as np
 
-from core.errors import ParameterError
-from core.frames import Floats
-from core.fusion.algorithms.gain_kernel import choose_level
-from core.fusion.algorithms.kalman import take_away, triangularise
-from core.fusion.algorithms.vectors import normalise, rate_jacobian, read_sample, to_sensor, turn_by
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.gain_kernel import choose_level
+from sagittal.core.fusion.algorithms.kalman import take_away, triangularise
+from sagittal.core.fusion.algorithms.vectors import normalise, rate_jacobian, read_sample, to_sensor, turn_by
 
 Points = Literal["merwe", "julier95", "spherical_simplex", "menegaz", "cubature"]
 POINTS: Final[tuple[Points, ...]] = ("merwe", "julier95", "spherical_simplex", "menegaz", "cubature")

@@ -13,8 +13,8 @@ from typing import Any, Final, Self
 
 import numpy as np
 
-from core.errors import ParameterError
-from core.frames import Floats
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats
 
 Cost = Callable[[Floats], Floats]
 """Points (p, d) in the unit box → what is to be small (p,); inf where there is no value."""

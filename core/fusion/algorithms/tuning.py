@@ -17,14 +17,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from core.errors import EstimationError, ParameterError, SignalError
-from core.frames import Floats
-from core.fusion.algorithms.benchmark import ReferenceTrial, find_rest, run_trial, score_orientation
-from core.fusion.algorithms.filter import find_algorithm
-from core.fusion.algorithms.gain_space import GainSpace, choose_scheme, gains_to_json
-from core.fusion.algorithms.parameters import AlgorithmGains
-from core.fusion.algorithms.schemes import Scheme
-from core.fusion.algorithms.swarm import Swarm, SwarmRules, advance_swarm, read_swarm, write_swarm
+from sagittal.core.errors import EstimationError, ParameterError, SignalError
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.benchmark import ReferenceTrial, find_rest, run_trial, score_orientation
+from sagittal.core.fusion.algorithms.filter import find_algorithm
+from sagittal.core.fusion.algorithms.gain_space import GainSpace, choose_scheme, gains_to_json
+from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
+from sagittal.core.fusion.algorithms.schemes import Scheme
+from sagittal.core.fusion.algorithms.swarm import Swarm, SwarmRules, advance_swarm, read_swarm, write_swarm
 
 Keep = Callable[[bytes, float, str], None]
 """(checkpoint, share done 0 to 1, sentence): told after every iteration."""

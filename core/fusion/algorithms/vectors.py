@@ -1,6 +1,6 @@
 """Quaternion algebra of the filters, inside compiled loops; what a function gives goes into its last one.
 
-Quaternions are scalar first and turn sensor to world. `core.rotation.compiled` has what is not here.
+Quaternions are scalar first and turn sensor to world. `sagittal.core.rotation.compiled` has what is not here.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from math import atan2, cos, sin, sqrt
 
 import numba
 
-from core.rotation.compiled import cross, multiply
+from sagittal.core.rotation.compiled import cross, multiply
 
 LEAST_NORM = 0.1
 """A reading shorter than this share of its norm at rest has no direction."""

@@ -4,13 +4,13 @@ One error-state Kalman filter for any number of sensors, live in blocks or over 
 docs/science/self-calibrating-filter.md.
 """
 
-from core.fusion.self_calibrating.filter import (
+from sagittal.core.fusion.self_calibrating.filter import (
     SelfCalibratingFilter,
     SensorEstimates,
     SmoothedOrientations,
     smooth_orientations,
 )
-from core.fusion.self_calibrating.params import SelfCalibratingParams
+from sagittal.core.fusion.self_calibrating.params import SelfCalibratingParams
 
 __all__ = [
     "SelfCalibratingFilter",

@@ -9,7 +9,7 @@ from math import sqrt
 
 import numba
 
-from core.fusion.self_calibrating.layout import (
+from sagittal.core.fusion.self_calibrating.layout import (
     ACC_BIAS,
     ACC_DELAY,
     BIAS,

@@ -7,13 +7,13 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import EstimationError, ParameterError
-from core.frames import Bools, Floats
-from core.fusion.self_calibrating import layout as at
-from core.fusion.self_calibrating.kernel import count_interval, run_forward, smooth_backward
-from core.fusion.self_calibrating.motion import average_backwards, judge_motion
-from core.fusion.self_calibrating.params import SelfCalibratingParams, make_weights
-from core.fusion.self_calibrating.start import start_from_first
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.fusion.self_calibrating import layout as at
+from sagittal.core.fusion.self_calibrating.kernel import count_interval, run_forward, smooth_backward
+from sagittal.core.fusion.self_calibrating.motion import average_backwards, judge_motion
+from sagittal.core.fusion.self_calibrating.params import SelfCalibratingParams, make_weights
+from sagittal.core.fusion.self_calibrating.start import start_from_first
 
 NOTHING: Final = (np.empty((0, 4)), np.empty((0, 6, 0)), np.empty((0, 0)), np.empty((0, 1)))
 

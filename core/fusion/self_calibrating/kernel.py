@@ -10,14 +10,14 @@ from math import exp, floor, sqrt
 import numba
 import numpy as np
 
-from core.fusion.self_calibrating.covariance import (
+from sagittal.core.fusion.self_calibrating.covariance import (
     place_of,
     predict_covariance,
     solve,
     take_scalar,
     write_transition,
 )
-from core.fusion.self_calibrating.layout import (
+from sagittal.core.fusion.self_calibrating.layout import (
     ACC_DELAY,
     BIAS,
     C_INTERVAL,
@@ -62,8 +62,8 @@ from core.fusion.self_calibrating.layout import (
     TILT,
     WITH_MAG,
 )
-from core.fusion.self_calibrating.motion import tilt
-from core.fusion.self_calibrating.params import (
+from sagittal.core.fusion.self_calibrating.motion import tilt
+from sagittal.core.fusion.self_calibrating.params import (
     ACC_NOISE,
     ACC_SHOCK_NOISE,
     FIELD_RATE,
@@ -84,8 +84,8 @@ from core.fusion.self_calibrating.params import (
     REST_NOISE,
     VELOCITY_TIME_S,
 )
-from core.fusion.self_calibrating.start import is_known, take_start
-from core.rotation import compiled
+from sagittal.core.fusion.self_calibrating.start import is_known, take_start
+from sagittal.core.rotation import compiled
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

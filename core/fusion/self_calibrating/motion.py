@@ -7,7 +7,7 @@ from math import exp
 import numba
 import numpy as np
 
-from core.fusion.self_calibrating.layout import (
+from sagittal.core.fusion.self_calibrating.layout import (
     C_MOTION,
     J_SHAKING,
     J_SLOW_SQUARE,
@@ -22,7 +22,7 @@ from core.fusion.self_calibrating.layout import (
     M_SPEED,
     M_SQUARE,
 )
-from core.fusion.self_calibrating.params import (
+from sagittal.core.fusion.self_calibrating.params import (
     GRAVITY_MPS2,
     INTENSITY_TIME_S,
     MOTION_TIME_S,
@@ -32,7 +32,7 @@ from core.fusion.self_calibrating.params import (
     REST_RATE,
     SLOW_SHARE,
 )
-from core.rotation import compiled
+from sagittal.core.rotation import compiled
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

@@ -6,8 +6,8 @@ from dataclasses import astuple, dataclass
 from math import isfinite
 from typing import Final, NamedTuple
 
-from core.errors import ParameterError
-from core.frames import GRAVITY
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import GRAVITY
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from math import sqrt
 import numba
 import numpy as np
 
-from core.fusion.self_calibrating.layout import (
+from sagittal.core.fusion.self_calibrating.layout import (
     ACC_BIAS,
     ACC_DELAY,
     BIAS,
@@ -36,8 +36,8 @@ from core.fusion.self_calibrating.layout import (
     TURNED,
     WITH_MAG,
 )
-from core.fusion.self_calibrating.motion import face_up
-from core.fusion.self_calibrating.params import (
+from sagittal.core.fusion.self_calibrating.motion import face_up
+from sagittal.core.fusion.self_calibrating.params import (
     ACC_DELAY_SD_S,
     GRAVITY_MPS2,
     GRAVITY_SD,
@@ -55,7 +55,7 @@ from core.fusion.self_calibrating.params import (
     START_SPEED,
     START_TILT,
 )
-from core.rotation import compiled
+from sagittal.core.rotation import compiled
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

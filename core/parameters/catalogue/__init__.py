@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from core.parameters.catalogue import (
+from sagittal.core.parameters.catalogue import (
     angles,
     daily,
     distances,
@@ -22,7 +22,7 @@ from core.parameters.catalogue import (
     trunk,
     walking,
 )
-from core.parameters.catalogue.entry import (
+from sagittal.core.parameters.catalogue.entry import (
     NEEDS,
     Comparison,
     CurveFigure,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from core.parameters.catalogue import errors
-from core.parameters.catalogue.entry import (
+from sagittal.core.parameters.catalogue import errors
+from sagittal.core.parameters.catalogue.entry import (
     ANKLE_AND_FOOT,
     DORSIFLEXION,
     FLEXION,

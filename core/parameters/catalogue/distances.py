@@ -4,8 +4,16 @@ from __future__ import annotations
 
 from typing import Final
 
-from core.parameters.catalogue import errors
-from core.parameters.catalogue.entry import DISTANCES, DURATION, HEIGHT, SIZE, WIDTH, NormKey, ParameterEntry
+from sagittal.core.parameters.catalogue import errors
+from sagittal.core.parameters.catalogue.entry import (
+    DISTANCES,
+    DURATION,
+    HEIGHT,
+    SIZE,
+    WIDTH,
+    NormKey,
+    ParameterEntry,
+)
 
 ENTRIES: Final = (
     ParameterEntry(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Final, Literal
 
-from core.parameters.catalogue.errors import MeasurementErrors
+from sagittal.core.parameters.catalogue.errors import MeasurementErrors
 
 Need = Literal[
     "foot_sensor", "foot_path", "foot_off", "other_foot", "linked_feet", "standing_width", "shoe",

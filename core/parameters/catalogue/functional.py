@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from core.parameters.catalogue.entry import (
+from sagittal.core.parameters.catalogue.entry import (
     CHAIR,
     DURATION,
     SIZE,
@@ -15,7 +15,7 @@ from core.parameters.catalogue.entry import (
     Need,
     ParameterEntry,
 )
-from core.parameters.catalogue.errors import TEST_EDGE, TEST_TOTAL, MeasurementErrors
+from sagittal.core.parameters.catalogue.errors import TEST_EDGE, TEST_TOTAL, MeasurementErrors
 
 SPEED: Final[Comparison] = ("faster", "slower")
 

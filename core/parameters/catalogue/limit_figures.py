@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from core.parameters.catalogue.entry import (
+from sagittal.core.parameters.catalogue.entry import (
     FLEXION,
     HEIGHT,
     LIMITS,

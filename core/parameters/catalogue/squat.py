@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from core.parameters.catalogue.entry import DURATION, FLEXION, SIZE, SQUAT, ParameterEntry
+from sagittal.core.parameters.catalogue.entry import DURATION, FLEXION, SIZE, SQUAT, ParameterEntry
 
 ENTRIES: Final = (
     ParameterEntry(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from core.parameters.catalogue import errors
-from core.parameters.catalogue.entry import DURATION, SUPPORT, ParameterEntry
+from sagittal.core.parameters.catalogue import errors
+from sagittal.core.parameters.catalogue.entry import DURATION, SUPPORT, ParameterEntry
 
 ENTRIES: Final = (
     ParameterEntry(

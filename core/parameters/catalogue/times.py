@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import inf
 from typing import Final
 
-from core.parameters.catalogue import errors
-from core.parameters.catalogue.entry import DURATION, SIZE, TIMING, NormKey, ParameterEntry
+from sagittal.core.parameters.catalogue import errors
+from sagittal.core.parameters.catalogue.entry import DURATION, SIZE, TIMING, NormKey, ParameterEntry
 
 ENTRIES: Final = (
     ParameterEntry(

@@ -6,8 +6,8 @@ from math import ceil
 
 import numpy as np
 
-from core.activity.frames import PER_MINUTE, Frames
-from core.frames import GRAVITY
+from sagittal.core.activity.frames import PER_MINUTE, Frames
+from sagittal.core.frames import GRAVITY
 
 
 def make_frames(count: int, first: int = 0, *, spread: float = 1.0, moved: float = 1.0) -> Frames:

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.activity.day_part import DayPart, read_day
-from core.activity.frames import PER_MINUTE, Frames, Slab
-from core.activity.params import ActivityParams
-from core.activity.result import WearPeriod
-from core.events.turns import Turn
-from core.frames import GRAVITY
+from sagittal.core.activity.day_part import DayPart, read_day
+from sagittal.core.activity.frames import PER_MINUTE, Frames, Slab
+from sagittal.core.activity.params import ActivityParams
+from sagittal.core.activity.result import WearPeriod
+from sagittal.core.events.turns import Turn
+from sagittal.core.frames import GRAVITY
 from tests.core.activity.frames_of_day import make_frames
 
 LEAN_DEG = 30.0

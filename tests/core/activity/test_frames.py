@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.activity.frames import PER_MINUTE, FrameStore, measure_length
+from sagittal.core.activity.frames import PER_MINUTE, FrameStore, measure_length
 from tests.core.activity.frames_of_day import make_frames
 
 

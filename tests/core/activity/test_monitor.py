@@ -10,18 +10,18 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.activity.monitor import monitor_activity
-from core.activity.params import ActivityParams
-from core.activity.result import ActivityResult
-from core.errors import SignalError
-from core.frames import GRAVITY
-from core.pipeline import analyse
-from core.recording import Recording, Subject, as_long_stream
-from core.sample_blocks import LongStream, SampleBlock
-from core.simulate import MOVEMENTS
-from core.simulate.chest import ChestSimulation, ChestStyle, Day, PostureHold, simulate_day
-from core.simulate.daily import DailyItem, DailySimulation, plan_daily_life, simulate_daily_life
-from core.simulate.scripts import ON_SKIN
+from sagittal.core.activity.monitor import monitor_activity
+from sagittal.core.activity.params import ActivityParams
+from sagittal.core.activity.result import ActivityResult
+from sagittal.core.errors import SignalError
+from sagittal.core.frames import GRAVITY
+from sagittal.core.pipeline import analyse
+from sagittal.core.recording import Recording, Subject, as_long_stream
+from sagittal.core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.simulate import MOVEMENTS
+from sagittal.core.simulate.chest import ChestSimulation, ChestStyle, Day, PostureHold, simulate_day
+from sagittal.core.simulate.daily import DailyItem, DailySimulation, plan_daily_life, simulate_daily_life
+from sagittal.core.simulate.scripts import ON_SKIN
 
 CHAIR: Day = (
     PostureHold("stand", 6.0),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from core.activity.postures import FixedStretch, decide_postures
-from core.activity.result import PosturalTransition, TransitionCandidate, TransitionKind
+from sagittal.core.activity.postures import FixedStretch, decide_postures
+from sagittal.core.activity.result import PosturalTransition, TransitionCandidate, TransitionKind
 
 
 def rise(kind: TransitionKind, at: float) -> PosturalTransition:

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from core.activity.frames import Slab
-from core.activity.params import ActivityParams
-from core.activity.reduction import follow_up, reduce_stream, working_rate
-from core.errors import SignalError
-from core.frames import GRAVITY, Floats
-from core.rotation import about, conjugate, rotate
-from core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.activity.frames import Slab
+from sagittal.core.activity.params import ActivityParams
+from sagittal.core.activity.reduction import follow_up, reduce_stream, working_rate
+from sagittal.core.errors import SignalError
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.rotation import about, conjugate, rotate
+from sagittal.core.sample_blocks import LongStream, SampleBlock
 
 PARAMS = ActivityParams(slab_s=60, margin_s=5)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.activity.params import StairParams
-from core.activity.stairs import calibrate_stairs, tell_stairs
-from core.errors import ParameterError
+from sagittal.core.activity.params import StairParams
+from sagittal.core.activity.stairs import calibrate_stairs, tell_stairs
+from sagittal.core.errors import ParameterError
 
 
 def test_stairs_are_told_by_a_persons_own_limits() -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.activity.transitions import measure_rise, tell_direction
-from core.frames import GRAVITY
+from sagittal.core.activity.transitions import measure_rise, tell_direction
+from sagittal.core.frames import GRAVITY
 
 
 def pulse(height_m: float, seconds: float = 2.0) -> np.ndarray:

@@ -8,10 +8,17 @@ from math import cos, radians, sin
 import numpy as np
 import pytest
 
-from core.activity.frames import PER_MINUTE, Frames, Singles
-from core.activity.params import UprightParams, WearParams
-from core.activity.wear import Wear, describe_period, find_forward, find_upright, find_wear, group_periods
-from core.frames import GRAVITY
+from sagittal.core.activity.frames import PER_MINUTE, Frames, Singles
+from sagittal.core.activity.params import UprightParams, WearParams
+from sagittal.core.activity.wear import (
+    Wear,
+    describe_period,
+    find_forward,
+    find_upright,
+    find_wear,
+    group_periods,
+)
+from sagittal.core.frames import GRAVITY
 from tests.core.activity.frames_of_day import make_frames
 
 WORN = WearParams()

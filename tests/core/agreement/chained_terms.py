@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from core.agreement.terms import LevelMotion, TermsPart
-from core.frames import Floats, Segment
+from sagittal.core.agreement.terms import LevelMotion, TermsPart
+from sagittal.core.frames import Floats, Segment
 
 RATE_HZ: Final = 50.0
 KNEE: Final = np.array([0.0, -0.2, 0.03]), np.array([0.01, 0.22, 0.0])

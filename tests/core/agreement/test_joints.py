@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from core.agreement.joints import CHAINS, LEG_JOINTS, list_worn_joints
+from sagittal.core.agreement.joints import CHAINS, LEG_JOINTS, list_worn_joints
 
 
 def test_a_joint_needs_both_its_sensors() -> None:

@@ -7,8 +7,8 @@ from math import log
 
 import pytest
 
-from core.agreement.labels import PATH, SortedLabels, sort_by_joints
-from core.frames import Segment
+from sagittal.core.agreement.labels import PATH, SortedLabels, sort_by_joints
+from sagittal.core.frames import Segment
 
 EXCHANGED_LEG: tuple[Segment, ...] = (*PATH[:4], "foot_r", "shank_r", "thigh_r")
 """The right leg put on upside down."""

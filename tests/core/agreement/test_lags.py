@@ -8,13 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.agreement import Agreement, AgreementParams, check_agreement
-from core.agreement.agree import compare_sensors
-from core.agreement.lags import find_drifts, find_sensor_lags
-from core.agreement.params import JointParams, LagParams
-from core.agreement.windows import JointWindows, compare_at_joint
-from core.frames import Segment
-from core.recording import UniformRecording
+from sagittal.core.agreement import Agreement, AgreementParams, check_agreement
+from sagittal.core.agreement.agree import compare_sensors
+from sagittal.core.agreement.lags import find_drifts, find_sensor_lags
+from sagittal.core.agreement.params import JointParams, LagParams
+from sagittal.core.agreement.windows import JointWindows, compare_at_joint
+from sagittal.core.frames import Segment
+from sagittal.core.recording import UniformRecording
 from tests.helpers.perturbations import delay_sensor
 from tests.helpers.walks import only, simulated
 

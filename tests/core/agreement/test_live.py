@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.agreement import check_agreement
-from core.agreement.exchange import LEGS, Swap, undo_exchange
-from core.agreement.live_terms import LiveTerms, RawSecond
-from core.agreement.params import JointParams
-from core.agreement.terms import find_terms
-from core.errors import Notice
-from core.recording import SensorSignals, UniformRecording
+from sagittal.core.agreement import check_agreement
+from sagittal.core.agreement.exchange import LEGS, Swap, undo_exchange
+from sagittal.core.agreement.live_terms import LiveTerms, RawSecond
+from sagittal.core.agreement.params import JointParams
+from sagittal.core.agreement.terms import find_terms
+from sagittal.core.errors import Notice
+from sagittal.core.recording import SensorSignals, UniformRecording
 from tests.helpers.live_agreement import find_standings, listen
 from tests.helpers.perturbations import delay_sensor, slip_sensor
 from tests.helpers.walks import only, simulated

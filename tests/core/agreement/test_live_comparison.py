@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.agreement.live_comparison import SensorComparison, Verdict
-from core.agreement.live_terms import RawSecond
-from core.agreement.params import LiveAgreementParams
-from core.recording import UniformRecording
+from sagittal.core.agreement.live_comparison import SensorComparison, Verdict
+from sagittal.core.agreement.live_terms import RawSecond
+from sagittal.core.agreement.params import LiveAgreementParams
+from sagittal.core.recording import UniformRecording
 from tests.helpers.perturbations import delay_sensor
 from tests.helpers.walks import only, simulated
 

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.agreement.exchange import Swap
-from core.agreement.live_joints import KEPT, LivePair, list_pairs, relabel
-from core.agreement.live_terms import TermSecond
-from core.agreement.params import JointParams
-from core.agreement.windows import JointWindows
-from core.frames import Segment
+from sagittal.core.agreement.exchange import Swap
+from sagittal.core.agreement.live_joints import KEPT, LivePair, list_pairs, relabel
+from sagittal.core.agreement.live_terms import TermSecond
+from sagittal.core.agreement.params import JointParams
+from sagittal.core.agreement.windows import JointWindows
+from sagittal.core.frames import Segment
 from tests.core.agreement.chained_terms import KNEE, RATE_HZ, make_terms
 
 PARAMS = JointParams()

@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.agreement.mirrored import find_mirrored, turn_round
-from core.agreement.params import ExchangeParams, JointParams
-from core.agreement.terms import TermsPart
-from core.agreement.windows import compare_at_joint
-from core.frames import Segment
+from sagittal.core.agreement.mirrored import find_mirrored, turn_round
+from sagittal.core.agreement.params import ExchangeParams, JointParams
+from sagittal.core.agreement.terms import TermsPart
+from sagittal.core.agreement.windows import compare_at_joint
+from sagittal.core.frames import Segment
 from tests.core.agreement.chained_terms import make_terms
 
 JOINTS: tuple[tuple[Segment, Segment], ...] = (("thigh_l", "shank_l"), ("shank_l", "foot_l"))

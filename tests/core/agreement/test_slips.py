@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.agreement import AgreementParams, check_agreement
-from core.agreement.params import SlipParams
-from core.agreement.repair import turn_back
-from core.agreement.slips import SensorSlip
-from core.agreement.strides import find_main_axis
-from core.frames import Floats, Segment
-from core.pipeline import resume
-from core.recording import SensorSignals, UniformRecording
-from core.rotation import exp, rotate
-from core.withheld import withhold_at_slips
+from sagittal.core.agreement import AgreementParams, check_agreement
+from sagittal.core.agreement.params import SlipParams
+from sagittal.core.agreement.repair import turn_back
+from sagittal.core.agreement.slips import SensorSlip
+from sagittal.core.agreement.strides import find_main_axis
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.pipeline import resume
+from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.rotation import exp, rotate
+from sagittal.core.withheld import withhold_at_slips
 from tests.helpers.perturbations import find_middle, slip_sensor
 from tests.helpers.walks import analysed, only, simulated
 
@@ -109,7 +109,7 @@ def test_the_main_axis_of_a_leg_is_what_it_turns_about() -> None:
 
 
 def test_angles_beside_a_slipped_sensor_are_withheld_from_there_on() -> None:
-    from core.angles import JointAngles
+    from sagittal.core.angles import JointAngles
 
     t_s = np.arange(100) / 10.0
     names = ("hip_flexion_l", "knee_flexion_l", "ankle_dorsiflexion_l", "knee_flexion_r")

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.agreement import AgreementParams, check_agreement
-from core.agreement.params import SlipParams
-from core.frames import Segment
-from core.pipeline import resume
-from core.recording import UniformRecording
+from sagittal.core.agreement import AgreementParams, check_agreement
+from sagittal.core.agreement.params import SlipParams
+from sagittal.core.frames import Segment
+from sagittal.core.pipeline import resume
+from sagittal.core.recording import UniformRecording
 from tests.helpers.perturbations import slip_sensor
 from tests.helpers.walks import analysed, cut, neura_walk, only, simulated
 

@@ -7,11 +7,11 @@ from math import radians
 
 import pytest
 
-from core.agreement.exchange import SensorExchange
-from core.agreement.lags import SensorDrift, SensorLag
-from core.agreement.params import ExchangeParams, LagParams, SlipParams
-from core.agreement.slips import SensorSlip
-from core.agreement.tell import (
+from sagittal.core.agreement.exchange import SensorExchange
+from sagittal.core.agreement.lags import SensorDrift, SensorLag
+from sagittal.core.agreement.params import ExchangeParams, LagParams, SlipParams
+from sagittal.core.agreement.slips import SensorSlip
+from sagittal.core.agreement.tell import (
     list_sensors,
     say_exchange,
     say_lag,

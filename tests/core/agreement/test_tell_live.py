@@ -6,17 +6,17 @@ from dataclasses import replace
 
 import pytest
 
-from core.agreement.exchange import SensorExchange
-from core.agreement.params import LagParams
-from core.agreement.tell import say_exchange, say_lag, say_slip
-from core.agreement.tell_live import (
+from sagittal.core.agreement.exchange import SensorExchange
+from sagittal.core.agreement.params import LagParams
+from sagittal.core.agreement.tell import say_exchange, say_lag, say_slip
+from sagittal.core.agreement.tell_live import (
     AGAIN,
     take_back,
     tell_exchange_now,
     tell_lag_now,
     tell_slip_now,
 )
-from core.errors import Notice
+from sagittal.core.errors import Notice
 from tests.core.agreement.test_tell import LATE, SLIP
 
 

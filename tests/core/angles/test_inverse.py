@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.angles import SIGNS, cardan_zxy, list_leg_joints, pelvis_angles
-from core.angles.inverse import leg_orientations, pelvis_orientation
-from core.frames import SIDES, Floats, Side
-from core.norms import adult_kinematics
-from core.rotation import conjugate, multiply, rotate
+from sagittal.core.angles import SIGNS, cardan_zxy, list_leg_joints, pelvis_angles
+from sagittal.core.angles.inverse import leg_orientations, pelvis_orientation
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.norms import adult_kinematics
+from sagittal.core.rotation import conjugate, multiply, rotate
 
 
 def measured(curves: dict[str, Floats], side: Side) -> dict[str, Floats]:
-    """Angles of the posture of these curves, as core.angles finds them, named and signed as the curves."""
+    """Angles of the posture of these curves, by `sagittal.core.angles`, with the names of the curves."""
     pelvis = pelvis_orientation(curves, side)
     own = 1.0 if side == "right" else -1.0
     tilt, obliquity = pelvis_angles(pelvis)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.angles import SIGNS, cardan_zxy, list_leg_joints, pelvis_angles
-from core.angles.kernel import AngleKernel, subtract_zero
-from core.body.tree import PRESETS
-from core.frames import SIDES, SUFFIX, Bools, Floats
-from core.rotation import conjugate, multiply
+from sagittal.core.angles import SIGNS, cardan_zxy, list_leg_joints, pelvis_angles
+from sagittal.core.angles.kernel import AngleKernel, subtract_zero
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.frames import SIDES, SUFFIX, Bools, Floats
+from sagittal.core.rotation import conjugate, multiply
 
 SEGMENTS = PRESETS["lower_body7"]
 

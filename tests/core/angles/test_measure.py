@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.angles import SIGNS, cardan_zxy, compute_headings, pelvis_angles
-from core.angles.measure import measure_angles
-from core.frames import R_NEUTRAL, SIDES, SUFFIX, Bools, Floats, Segment
-from core.fusion.orientations import Orientations
-from core.rotation import about, from_matrix, multiply, rotate
+from sagittal.core.angles import SIGNS, cardan_zxy, compute_headings, pelvis_angles
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.frames import R_NEUTRAL, SIDES, SUFFIX, Bools, Floats, Segment
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import about, from_matrix, multiply, rotate
 from tests.helpers.walks import simulated
 
 NEUTRAL = from_matrix(R_NEUTRAL)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.angles.result import SIGNS, JointAngles, list_leg_joints
+from sagittal.core.angles.result import SIGNS, JointAngles, list_leg_joints
 
 
 def test_joints_of_a_leg_are_linked_from_the_pelvis_to_the_foot() -> None:

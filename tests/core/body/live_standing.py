@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from core.body import BodyModel
-from core.body.live_estimator import MeasuredBlock
-from core.calibration.result import SegmentCalibration
-from core.frames import GRAVITY, R_NEUTRAL, Floats, Segment
-from core.rotation import from_matrix
+from sagittal.core.body import BodyModel
+from sagittal.core.body.live_estimator import MeasuredBlock
+from sagittal.core.calibration.result import SegmentCalibration
+from sagittal.core.frames import GRAVITY, R_NEUTRAL, Floats, Segment
+from sagittal.core.rotation import from_matrix
 
 RATE: Final = 100.0
 BODY: Final = BodyModel.from_height(1.7)

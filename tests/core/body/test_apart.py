@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.frames import SIDES, Floats, Side
-from core.pipeline import TakeAnalysis, analyse
-from core.recording import Recording, Subject
-from core.simulate import simulate_scenario
-from core.timeline import synchronise
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.recording import Recording, Subject
+from sagittal.core.simulate import simulate_scenario
+from sagittal.core.timeline import synchronise
 
 HEIGHT = 1.75
 

@@ -8,19 +8,19 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body import arms
-from core.body.arms import ArmParams, MeasuredArms, measure_arms, report_ahead
-from core.body.erkf.headings import turn_forward_axes
-from core.body.model import BodyModel
-from core.body.places import joint_places, sensor_place
-from core.body.tree import PRESETS, person_tree
-from core.calibration import calibrate
-from core.calibration.result import CalibratedRecording
-from core.frames import Floats, Segment
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.rotation import about, conjugate, multiply, rotate, to_matrix
-from core.simulate.soft_tissue import SoftTissue, skin_motion
+from sagittal.core.body import arms
+from sagittal.core.body.arms import ArmParams, MeasuredArms, measure_arms, report_ahead
+from sagittal.core.body.erkf.headings import turn_forward_axes
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.places import joint_places, sensor_place
+from sagittal.core.body.tree import PRESETS, person_tree
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import about, conjugate, multiply, rotate, to_matrix
+from sagittal.core.simulate.soft_tissue import SoftTissue, skin_motion
 from tests.helpers.walks import simulated
 
 WHOLE = PRESETS["lower_body7"]

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.body import contact_mask
+from sagittal.core.body import contact_mask
 
 T = np.arange(0.0, 10.0, 0.01)
 

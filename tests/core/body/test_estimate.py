@@ -9,20 +9,20 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import calibration, events
-from core.angles.measure import measure_angles
-from core.body import contact_mask
-from core.body.choice import list_possible_estimators
-from core.body.estimate import PoseEstimate, estimate_poses
-from core.body.mounting import MountedSensors, mount_sensors
-from core.body.pose_params import PoseParams
-from core.body.tree import PRESETS
-from core.errors import EstimationError
-from core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import LastReading
-from core.recording import UniformRecording
-from core.simulate import WalkTruth
+from sagittal.core import calibration, events
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body import contact_mask
+from sagittal.core.body.choice import list_possible_estimators
+from sagittal.core.body.estimate import PoseEstimate, estimate_poses
+from sagittal.core.body.mounting import MountedSensors, mount_sensors
+from sagittal.core.body.pose_params import PoseParams
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.errors import EstimationError
+from sagittal.core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import LastReading
+from sagittal.core.recording import UniformRecording
+from sagittal.core.simulate import WalkTruth
 from tests.helpers.walks import only, simulated
 
 WHOLE = PRESETS["lower_body7"]
@@ -247,7 +247,7 @@ def test_segment_names_are_known() -> None:
 
 
 def _down(q: Floats, length: float) -> Floats:
-    from core.rotation import rotate
+    from sagittal.core.rotation import rotate
 
     return rotate(q, np.array([0.0, -length, 0.0]))
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.body.estimate import PoseEstimate
-from core.body.health import HealthFinding, find_worst_verdict, longest_run_s
-from core.frames import FOOT, Segment
-from core.pipeline import TakeAnalysis, analyse
-from core.recording import Recording, UniformRecording
-from core.rotation import about, rotate
-from core.simulate import simulate_scenario
+from sagittal.core.body.estimate import PoseEstimate
+from sagittal.core.body.health import HealthFinding, find_worst_verdict, longest_run_s
+from sagittal.core.frames import FOOT, Segment
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.recording import Recording, UniformRecording
+from sagittal.core.rotation import about, rotate
+from sagittal.core.simulate import simulate_scenario
 from tests.core.body.test_estimate import estimated
 from tests.helpers.marks import sweep_after
 from tests.helpers.walks import simulated

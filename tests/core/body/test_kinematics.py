@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.body import BodyModel, contact_mask, forward_kinematics, nominal_body
-from core.body.kinematics import sole_points
-from core.body.poses import Poses
-from core.calibration import calibrate
-from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Side
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.rotation import rotate
-from core.simulate import WalkTruth
+from sagittal.core.body import BodyModel, contact_mask, forward_kinematics, nominal_body
+from sagittal.core.body.kinematics import sole_points
+from sagittal.core.body.poses import Poses
+from sagittal.core.calibration import calibrate
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Side
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import rotate
+from sagittal.core.simulate import WalkTruth
 from tests.helpers.walks import only, simulated
 
 BODY = BodyModel.from_height(1.75)

@@ -6,9 +6,9 @@ import inspect
 
 import pytest
 
-from core.body.erkf import live_figure as erkf
-from core.body.l7s import live_figure as l7s
-from core.body.live_estimator import LivePoseEstimator, list_worn_feet
+from sagittal.core.body.erkf import live_figure as erkf
+from sagittal.core.body.l7s import live_figure as l7s
+from sagittal.core.body.live_estimator import LivePoseEstimator, list_worn_feet
 
 
 def test_feet_are_listed_left_first_and_nothing_else() -> None:

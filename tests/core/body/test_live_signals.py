@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.body import BodyModel
-from core.body.erkf.gaps import GapBridge, bridge_gaps
-from core.body.live_still import StillnessDetector
-from core.body.still import AT_REST, FOOT_STILL, still_samples
-from core.body.tree import PRESETS, person_tree
-from core.frames import GRAVITY, Bools, Floats
+from sagittal.core.body import BodyModel
+from sagittal.core.body.erkf.gaps import GapBridge, bridge_gaps
+from sagittal.core.body.live_still import StillnessDetector
+from sagittal.core.body.still import AT_REST, FOOT_STILL, still_samples
+from sagittal.core.body.tree import PRESETS, person_tree
+from sagittal.core.frames import GRAVITY, Bools, Floats
 
 SEGMENTS = PRESETS["lower_body7"]
 RATE = 100.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.body.segment_kernel import write_segments
-from core.rotation import conjugate, exp, multiply, rotate
+from sagittal.core.body.segment_kernel import write_segments
+from sagittal.core.rotation import conjugate, exp, multiply, rotate
 
 
 def test_segments_are_where_their_sensors_say() -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.body.still import FOOT_STILL, contact_samples, still_samples
-from core.frames import GRAVITY, Bools, Floats
-from core.rest import find_runs
+from sagittal.core.body.still import FOOT_STILL, contact_samples, still_samples
+from sagittal.core.frames import GRAVITY, Bools, Floats
+from sagittal.core.rest import find_runs
 
 RATE = 100.0
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.body import BodyModel
-from core.body.tree import PRESETS, person_tree
-from core.rotation import conjugate, exp, multiply, rotate, to_matrix
+from sagittal.core.body import BodyModel
+from sagittal.core.body.tree import PRESETS, person_tree
+from sagittal.core.rotation import conjugate, exp, multiply, rotate, to_matrix
 
 SEGMENTS = PRESETS["lower_body7"]
 

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.calibration import CalibrationParams, calibrate
-from core.calibration.anterior import Method
-from core.calibration.result import Calibration
-from core.errors import CalibrationError, SignalError
-from core.frames import SEGMENTS, Floats, Segment
-from core.recording import UniformRecording
-from core.rotation import exp, from_matrix, log, normalise, rotate, to_matrix
-from core.simulate import Arc, Pivot, Stand, Straight, WalkTruth
+from sagittal.core.calibration import CalibrationParams, calibrate
+from sagittal.core.calibration.anterior import Method
+from sagittal.core.calibration.result import Calibration
+from sagittal.core.errors import CalibrationError, SignalError
+from sagittal.core.frames import SEGMENTS, Floats, Segment
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rotation import exp, from_matrix, log, normalise, rotate, to_matrix
+from sagittal.core.simulate import Arc, Pivot, Stand, Straight, WalkTruth
 from tests.helpers.walks import TOGETHER, cut, only, scripted, simulated, turned
 
 LEGS: tuple[Segment, ...] = ("thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r")

@@ -8,13 +8,13 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from core.calibration.declared import propose_mountings
-from core.calibration.mounting import WAYS, Way, say_other_way
-from core.frames import SEGMENTS, Segment
-from core.recording import UniformRecording
-from core.rotation import rotate
-from core.setup.repair import SetupRepair
-from core.simulate import WalkTruth
+from sagittal.core.calibration.declared import propose_mountings
+from sagittal.core.calibration.mounting import WAYS, Way, say_other_way
+from sagittal.core.frames import SEGMENTS, Segment
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rotation import rotate
+from sagittal.core.setup.repair import SetupRepair
+from sagittal.core.simulate import WalkTruth
 from tests.helpers.walks import cut, only, simulated
 
 NEAR = np.cos(np.radians(20.0))

@@ -8,15 +8,15 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.calibration.forward import (
+from sagittal.core.calibration.forward import (
     ForwardMeasure,
     ForwardParams,
     JointMeasure,
     MeasureName,
     weigh_forward_axes,
 )
-from core.frames import THIGH, Segment
-from core.rotation import wrap_angle
+from sagittal.core.frames import THIGH, Segment
+from sagittal.core.rotation import wrap_angle
 
 P = ForwardParams()
 

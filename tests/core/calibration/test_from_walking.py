@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.calibration import CalibrationParams, calibrate
-from core.calibration.heading import HeadingParams, pendulum_agreement
-from core.calibration.sensor_in_walk import WalkRungParams, find_flat_moments
-from core.errors import CalibrationError
-from core.frames import Floats, Segment
-from core.fusion.mahony import estimate_orientations
-from core.recording import UniformRecording
-from core.rotation import angle_between, exp, rotate, wrap_angle, yaw
+from sagittal.core.calibration import CalibrationParams, calibrate
+from sagittal.core.calibration.heading import HeadingParams, pendulum_agreement
+from sagittal.core.calibration.sensor_in_walk import WalkRungParams, find_flat_moments
+from sagittal.core.errors import CalibrationError
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rotation import angle_between, exp, rotate, wrap_angle, yaw
 from tests.helpers.walks import cut, only, simulated, turned
 
 START_S, END_S = 8.0, 20.0

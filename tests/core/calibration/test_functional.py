@@ -9,22 +9,22 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.agreement import check_agreement
-from core.angles.measure import measure_angles
-from core.calibration import calibrate
-from core.calibration.functional import FunctionalParams, find_functional_movements
-from core.calibration.live_attempt import WornSensors
-from core.calibration.result import CalibratedRecording
-from core.calibration.score import score_calibration
-from core.errors import ParameterError
-from core.frames import SEGMENTS, Segment
-from core.fusion.mahony import estimate_orientations
-from core.online.calibrating import LiveCalibrator
-from core.recording import UniformRecording
-from core.rest import find_runs
-from core.rotation import to_matrix
-from core.simulate import FunctionalTruth, RecordingSetup, SwingsAndBows, simulate_swings_and_bows
-from core.timeline import synchronise
+from sagittal.core.agreement import check_agreement
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.functional import FunctionalParams, find_functional_movements
+from sagittal.core.calibration.live_attempt import WornSensors
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.calibration.score import score_calibration
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import SEGMENTS, Segment
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.online.calibrating import LiveCalibrator
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rest import find_runs
+from sagittal.core.rotation import to_matrix
+from sagittal.core.simulate import FunctionalTruth, RecordingSetup, SwingsAndBows, simulate_swings_and_bows
+from sagittal.core.timeline import synchronise
 from tests.helpers.live_agreement import cut_blocks
 from tests.helpers.walks import only, rms_deg, simulated
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.calibration.gyro_pca import about_vertical, flexion_axis, gait_margin, sagittal_angle
-from core.calibration.standing import vertical_frame
-from core.errors import CalibrationError
-from core.frames import Floats, Segment
-from core.rotation import exp, from_matrix, log, normalise, to_matrix
+from sagittal.core.calibration.gyro_pca import about_vertical, flexion_axis, gait_margin, sagittal_angle
+from sagittal.core.calibration.standing import vertical_frame
+from sagittal.core.errors import CalibrationError
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.rotation import exp, from_matrix, log, normalise, to_matrix
 
 
 def flexing(R_sensor_segment: Floats, n: int = 1000, seed: int = 0) -> tuple[Floats, Floats]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.calibration.heading import (
+from sagittal.core.calibration.heading import (
     HeadingParams,
     acceleration_axis,
     nearest_sign,

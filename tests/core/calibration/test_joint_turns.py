@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.calibration.joint_turns import JointTurnParams, measure_joint_turns
-from core.frames import Floats, Segment
-from core.recording import UniformRecording
-from core.rotation import about, multiply, wrap_angle
+from sagittal.core.calibration.joint_turns import JointTurnParams, measure_joint_turns
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rotation import about, multiply, wrap_angle
 from tests.helpers.walks import only, simulated
 
 WALK: tuple[int, int] = (700, 1500)

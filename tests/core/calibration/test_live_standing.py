@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.calibration.live_standing import cut_last_part, find_upward_axes, judge_standing
-from core.frames import GRAVITY, Bools, Segment
-from core.recording import SensorSignals, Subject, UniformRecording
-from core.rest import RestParams
+from sagittal.core.calibration.live_standing import cut_last_part, find_upward_axes, judge_standing
+from sagittal.core.frames import GRAVITY, Bools, Segment
+from sagittal.core.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.rest import RestParams
 
 RATE = 50.0
 N = 500

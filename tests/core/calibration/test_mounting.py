@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.calibration.mounting import read_declared_angle, read_declared_direction
-from core.calibration.standing import vertical_frame
+from sagittal.core.calibration.mounting import read_declared_angle, read_declared_direction
+from sagittal.core.calibration.standing import vertical_frame
 
 
 @pytest.mark.parametrize(

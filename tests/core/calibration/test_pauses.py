@@ -7,13 +7,13 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.calibration import calibrate
-from core.calibration.standing import LEG_AHEAD, drop_pauses, measure_leg_ahead
-from core.errors import CalibrationError, SignalError
-from core.frames import Segment
-from core.pipeline import analyse
-from core.recording import UniformRecording
-from core.simulate import Stand, Straight, simulate_scenario
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.standing import LEG_AHEAD, drop_pauses, measure_leg_ahead
+from sagittal.core.errors import CalibrationError, SignalError
+from sagittal.core.frames import Segment
+from sagittal.core.pipeline import analyse
+from sagittal.core.recording import UniformRecording
+from sagittal.core.simulate import Stand, Straight, simulate_scenario
 from tests.helpers.real_takes import NAMES, cut_recording, read_take
 from tests.helpers.walks import TOGETHER, cut, only, scripted, simulated
 

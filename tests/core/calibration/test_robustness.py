@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.angles.measure import measure_angles
-from core.body import forward_kinematics, nominal_body
-from core.calibration import CalibrationParams, calibrate
-from core.calibration.anterior import Method
-from core.calibration.result import CalibratedRecording
-from core.errors import SagittalError
-from core.fusion.mahony import estimate_orientations
-from core.recording import UniformRecording
-from core.simulate import simulate_scenario
-from core.timeline import synchronise
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body import forward_kinematics, nominal_body
+from sagittal.core.calibration import CalibrationParams, calibrate
+from sagittal.core.calibration.anterior import Method
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.errors import SagittalError
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.recording import UniformRecording
+from sagittal.core.simulate import simulate_scenario
+from sagittal.core.timeline import synchronise
 from tests.helpers.walks import cut, only, rms_deg, simulated
 
 CODES = {"no_rest", "not_still", "rest_too_short", "no_walking", "not_single_axis", "pelvis_heading_unknown"}

@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.agreement import Agreement
-from core.calibration import calibrate
-from core.calibration.knee_axis import find_knee_axes
-from core.calibration.result import CalibratedRecording, SegmentCalibration
-from core.calibration.score import (
+from sagittal.core.agreement import Agreement
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.knee_axis import find_knee_axes
+from sagittal.core.calibration.result import CalibratedRecording, SegmentCalibration
+from sagittal.core.calibration.score import (
     RULES,
     CalibrationCheck,
     CalibrationScore,
@@ -20,9 +20,9 @@ from core.calibration.score import (
     judge_together,
     score_calibration,
 )
-from core.frames import Floats, Segment
-from core.rest import index_window
-from core.rotation import about, exp, multiply, rotate, to_matrix
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.rest import index_window
+from sagittal.core.rotation import about, exp, multiply, rotate, to_matrix
 from tests.helpers.walks import only, simulated
 
 

@@ -9,11 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.calibration.standing import choose_rest, find_rests, measure_standing, stand_all, vertical_frame
-from core.errors import SignalError
-from core.frames import Floats
-from core.recording import SensorSignals, Subject, UniformRecording
-from core.rest import RestParams
+from sagittal.core.calibration.standing import (
+    choose_rest,
+    find_rests,
+    measure_standing,
+    stand_all,
+    vertical_frame,
+)
+from sagittal.core.errors import SignalError
+from sagittal.core.frames import Floats
+from sagittal.core.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.rest import RestParams
 
 RATE = 100.0
 

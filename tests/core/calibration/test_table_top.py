@@ -9,16 +9,16 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.calibration.fixed_offset import make_fixed_mounts
-from core.calibration.table_top import TableTopParams, calibrate_table_top
-from core.errors import CalibrationError
-from core.frames import R_NEUTRAL, Floats, Segment
-from core.recording import SensorSignals, Subject, UniformRecording
-from core.rotation import angle_between, conjugate, exp, from_matrix, log, multiply
-from core.simulate.mems import MEMS, SensorNoise, add_sensor_errors
-from core.simulate.sensors import SensorPath, SimulatedSignals, ideal_signals
-from core.simulate.shapes import smoothstep
-from core.simulate.spline import sign_continuous
+from sagittal.core.calibration.fixed_offset import make_fixed_mounts
+from sagittal.core.calibration.table_top import TableTopParams, calibrate_table_top
+from sagittal.core.errors import CalibrationError
+from sagittal.core.frames import R_NEUTRAL, Floats, Segment
+from sagittal.core.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.rotation import angle_between, conjugate, exp, from_matrix, log, multiply
+from sagittal.core.simulate.mems import MEMS, SensorNoise, add_sensor_errors
+from sagittal.core.simulate.sensors import SensorPath, SimulatedSignals, ideal_signals
+from sagittal.core.simulate.shapes import smoothstep
+from sagittal.core.simulate.spline import sign_continuous
 
 RATE = 100.0
 EVERY = 4
@@ -103,8 +103,8 @@ def test_a_table_that_is_not_level_is_seen_by_gravity() -> None:
 
 
 def _turn_gravity(signals: SensorSignals, lean: Floats) -> Floats:
-    from core.calibration.table_top import integrate_turns
-    from core.rotation import rotate
+    from sagittal.core.calibration.table_top import integrate_turns
+    from sagittal.core.rotation import rotate
 
     q = np.empty((len(signals.gyr), 4))
     integrate_turns(np.ascontiguousarray(signals.gyr), 1.0 / RATE, np.array([1.0, 0.0, 0.0, 0.0]), q)

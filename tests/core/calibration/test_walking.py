@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.calibration.walking import (
+from sagittal.core.calibration.walking import (
     WalkingParams,
     mean_turn,
     measure_turned_angle,
@@ -14,9 +14,9 @@ from core.calibration.walking import (
     turn_sensors,
     turning_mask,
 )
-from core.frames import GRAVITY, Bools, Floats, Segment
-from core.recording import SensorSignals, Subject, UniformRecording
-from core.rotation import about, exp, multiply
+from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
+from sagittal.core.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.rotation import about, exp, multiply
 
 RATE = 50.0
 N = 1000

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from core.change import Change, name_fact, sort_changes
-from core.change.facts import SAME_AS
-from core.change.verdict import Verdict
-from core.frames import Side
-from core.parameters.catalogue import CATALOGUE
+from sagittal.core.change import Change, name_fact, sort_changes
+from sagittal.core.change.facts import SAME_AS
+from sagittal.core.change.verdict import Verdict
+from sagittal.core.frames import Side
+from sagittal.core.parameters.catalogue import CATALOGUE
 
 
 def change(name: str, side: Side | None, by: float, verdict: Verdict | None = "real_change") -> Change:

@@ -6,7 +6,7 @@ from math import sqrt
 
 import pytest
 
-from core.change.limits import (
+from sagittal.core.change.limits import (
     ChangeLimit,
     Limb,
     detectable_ratio,

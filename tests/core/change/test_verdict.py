@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.change import (
+from sagittal.core.change import (
     Change,
     estimate_repeatability,
     parameter_changes,
@@ -15,12 +15,12 @@ from core.change import (
     score_changes,
     score_name,
 )
-from core.frames import SIDES, Side
-from core.norms import NormValue
-from core.parameters.result import Parameter
-from core.parameters.symmetry import compare_sides
-from core.parameters.variability import summarise_values
-from core.scores import Score
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.norms import NormValue
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.symmetry import compare_sides
+from sagittal.core.parameters.variability import summarise_values
+from sagittal.core.scores import Score
 
 
 def parameter(name: str, mean: float | None, side: Side | None = None, unit: str = "deg") -> Parameter:

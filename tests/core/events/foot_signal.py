@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.frames import R_NEUTRAL, Bools, Floats, Segment
-from core.fusion.orientations import Orientations
-from core.rotation import about, from_matrix, multiply
+from sagittal.core.frames import R_NEUTRAL, Bools, Floats, Segment
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import about, from_matrix, multiply
 
 # foot pitch over the gait cycle in degrees, a0, cos1, sin1, … (fitted to the healthy walker)
 SERIES = (

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from core.events.alternation import AlternationParams, measure_foot_lag, tell_foot_lag
-from core.events.result import GaitEvent, GaitEvents
-from core.frames import Side
-from core.pipeline import TakeAnalysis, analyse, resume
-from core.simulate import simulate_scenario
+from sagittal.core.events.alternation import AlternationParams, measure_foot_lag, tell_foot_lag
+from sagittal.core.events.result import GaitEvent, GaitEvents
+from sagittal.core.frames import Side
+from sagittal.core.pipeline import TakeAnalysis, analyse, resume
+from sagittal.core.simulate import simulate_scenario
 from tests.helpers.perturbations import delay_sensor
 
 PARAMS = AlternationParams()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from core.events.bouts import find_bouts, walking_bouts
-from core.events.result import GaitEvent, GaitEvents
+from sagittal.core.events.bouts import find_bouts, walking_bouts
+from sagittal.core.events.result import GaitEvent, GaitEvents
 
 
 def steps(start: float, n: int, step: float = 0.5) -> list[float]:

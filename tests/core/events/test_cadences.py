@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from core import calibration
-from core.errors import CalibrationError
-from core.events.consensus import agree_on_contacts, all_detectors
-from core.events.lumbar import detect_steps
-from core.frames import SIDES
-from core.fusion.mahony import estimate_orientations
-from core.recording import UniformRecording
-from core.simulate.script import Stand, Straight
-from core.simulate.truth import WalkTruth
+from sagittal.core import calibration
+from sagittal.core.errors import CalibrationError
+from sagittal.core.events.consensus import agree_on_contacts, all_detectors
+from sagittal.core.events.lumbar import detect_steps
+from sagittal.core.frames import SIDES
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.recording import UniformRecording
+from sagittal.core.simulate.script import Stand, Straight
+from sagittal.core.simulate.truth import WalkTruth
 from tests.helpers.event_scoring import match
 from tests.helpers.walks import only, scripted
 

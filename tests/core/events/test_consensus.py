@@ -7,13 +7,13 @@ from functools import cache
 
 import pytest
 
-from core import calibration
-from core.events import detect, detect_contacts
-from core.events.consensus import ConsensusParams, agree_on_contacts, all_detectors, rate_confidence
-from core.events.foot_movement import measure_foot_movements
-from core.events.result import GaitEvent, GaitEvents
-from core.frames import FOOT, SIDES
-from core.fusion.mahony import estimate_orientations
+from sagittal.core import calibration
+from sagittal.core.events import detect, detect_contacts
+from sagittal.core.events.consensus import ConsensusParams, agree_on_contacts, all_detectors, rate_confidence
+from sagittal.core.events.foot_movement import measure_foot_movements
+from sagittal.core.events.result import GaitEvent, GaitEvents
+from sagittal.core.frames import FOOT, SIDES
+from sagittal.core.fusion.mahony import estimate_orientations
 from tests.helpers.event_scoring import match
 from tests.helpers.marks import slow_after
 from tests.helpers.walks import simulated

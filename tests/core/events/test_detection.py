@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.errors import Notice, SignalError
-from core.events import FootPitchParams, detect
-from core.fusion.orientations import Orientations
+from sagittal.core.errors import Notice, SignalError
+from sagittal.core.events import FootPitchParams, detect
+from sagittal.core.fusion.orientations import Orientations
 from tests.core.events.foot_signal import FINE, cycle_pitch, extremes, foot_pitch, orientations, walk
 
 

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.errors import ParameterError
-from core.events.edits import APART_S, Edit, apply_event_edits, apply_stride_edits, read_edit
-from core.events.result import GaitEvent, GaitEvents, Stride, Strides
-from core.frames import SIDES
+from sagittal.core.errors import ParameterError
+from sagittal.core.events.edits import APART_S, Edit, apply_event_edits, apply_stride_edits, read_edit
+from sagittal.core.events.result import GaitEvent, GaitEvents, Stride, Strides
+from sagittal.core.frames import SIDES
 
 END = 10.0
 

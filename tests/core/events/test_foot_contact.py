@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.events.detection import detect_contacts
-from core.events.foot_contact import (
+from sagittal.core.events.detection import detect_contacts
+from sagittal.core.events.foot_contact import (
     ContactReports,
     FootContactParams,
     FootContactState,
     advance_foot_contacts,
 )
-from core.events.foot_movement import FootMovement, measure_foot_movements
-from core.events.live_contacts import ContactDetector
-from core.events.result import GaitEvent
-from core.frames import FOOT, GRAVITY, SIDES, Floats
-from core.rotation import conjugate, rotate
+from sagittal.core.events.foot_movement import FootMovement, measure_foot_movements
+from sagittal.core.events.live_contacts import ContactDetector
+from sagittal.core.events.result import GaitEvent
+from sagittal.core.frames import FOOT, GRAVITY, SIDES, Floats
+from sagittal.core.rotation import conjugate, rotate
 from tests.core.events.foot_signal import foot_pitch, orientation, orientations
 
 RATE = 100.0
@@ -220,7 +220,7 @@ def test_a_flat_landing_is_where_the_foot_stops_turning_and_less_certain() -> No
 
 
 def test_motion_of_the_feet_is_without_bias_and_in_their_axes() -> None:
-    from core import calibration
+    from sagittal.core import calibration
     from tests.helpers.walks import simulated
 
     calibrated = calibration.calibrate(simulated()[0])

@@ -5,11 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.events import foot_contact_kernel as kernel
-from core.events.foot_contact import FootContactParams, FootContactState
-from core.events.foot_contact_kernel import COUNTERS, FASTEST, SPEED, START, SUMS, TOLD, TOP, WAY, ContactRule
-from core.frames import Floats
-from core.rotation import about
+from sagittal.core.events import foot_contact_kernel as kernel
+from sagittal.core.events.foot_contact import FootContactParams, FootContactState
+from sagittal.core.events.foot_contact_kernel import (
+    COUNTERS,
+    FASTEST,
+    SPEED,
+    START,
+    SUMS,
+    TOLD,
+    TOP,
+    WAY,
+    ContactRule,
+)
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import about
 from tests.core.events.test_foot_contact import (
     PUSH_S,
     RATE,

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch
-from core.frames import Floats
+from sagittal.core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch
+from sagittal.core.frames import Floats
 from tests.core.events.foot_signal import extremes, foot_pitch
 
 RATE = 100.0

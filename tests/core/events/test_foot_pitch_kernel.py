@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.events import foot_pitch_kernel
-from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch
-from core.frames import Bools, Floats
+from sagittal.core.events import foot_pitch_kernel
+from sagittal.core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch
+from sagittal.core.frames import Bools, Floats
 from tests.core.events.foot_signal import extremes, foot_pitch
 from tests.helpers.uncompiled import run_uncompiled
 

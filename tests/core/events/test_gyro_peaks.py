@@ -8,13 +8,19 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import calibration
-from core.errors import SignalError
-from core.events.gyro_peaks import LIMB, GyroPeakParams, GyroPeakPresets, gyro_peak_events, sagittal_rate
-from core.frames import R_NEUTRAL, SIDES, Floats
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.rotation import about, from_matrix, multiply
+from sagittal.core import calibration
+from sagittal.core.errors import SignalError
+from sagittal.core.events.gyro_peaks import (
+    LIMB,
+    GyroPeakParams,
+    GyroPeakPresets,
+    gyro_peak_events,
+    sagittal_rate,
+)
+from sagittal.core.frames import R_NEUTRAL, SIDES, Floats
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import about, from_matrix, multiply
 from tests.helpers.event_scoring import match
 from tests.helpers.walks import simulated
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from core.errors import SignalError
-from core.events import periodicity
-from core.events.lumbar import detect_steps
-from core.events.periodicity import step_times
-from core.events.steps import Steps
-from core.frames import GRAVITY, SIDES, Floats
-from core.recording import SensorSignals, Subject, UniformRecording
-from core.rotation import normalise
-from core.simulate import SCRIPTS
+from sagittal.core.errors import SignalError
+from sagittal.core.events import periodicity
+from sagittal.core.events.lumbar import detect_steps
+from sagittal.core.events.periodicity import step_times
+from sagittal.core.events.steps import Steps
+from sagittal.core.frames import GRAVITY, SIDES, Floats
+from sagittal.core.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.rotation import normalise
+from sagittal.core.simulate import SCRIPTS
 from tests.helpers.event_scoring import match
 from tests.helpers.marks import slow_after
 from tests.helpers.walks import cut, lost, only, simulated, turned

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from core import calibration, events, timeline
-from core.events.result import GaitEvents, Stride, Strides
-from core.frames import SIDES
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.parameters import stride_values, summarise_times
-from core.simulate import Simulation, simulate_scenario
+from sagittal.core import calibration, events, timeline
+from sagittal.core.events.result import GaitEvents, Stride, Strides
+from sagittal.core.frames import SIDES
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.parameters import stride_values, summarise_times
+from sagittal.core.simulate import Simulation, simulate_scenario
 from tests.helpers.event_scoring import match
 
 SCENARIOS = ("comfortable", "fast_with_turns")

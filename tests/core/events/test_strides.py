@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.events import StrideParams, detect, stride_list
-from core.events.result import MANUAL, GaitEvent, GaitEvents, Strides
-from core.frames import FOOT, Bools, Floats, Side
-from core.fusion.orientations import Orientations
+from sagittal.core.events import StrideParams, detect, stride_list
+from sagittal.core.events.result import MANUAL, GaitEvent, GaitEvents, Strides
+from sagittal.core.frames import FOOT, Bools, Floats, Side
+from sagittal.core.fusion.orientations import Orientations
 from tests.core.events.foot_signal import orientation, orientations, walk
 
 RATE = 100.0

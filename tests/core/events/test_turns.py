@@ -8,10 +8,10 @@ from math import pi, radians
 import numpy as np
 import pytest
 
-from core.events.lumbar import split_about_vertical
-from core.events.turns import Turn, body_yaw_rate, find_turns
-from core.frames import Floats, Segment
-from core.fusion.orientations import Orientations
+from sagittal.core.events.lumbar import split_about_vertical
+from sagittal.core.events.turns import Turn, body_yaw_rate, find_turns
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.fusion.orientations import Orientations
 from tests.helpers.walks import neura_analysis, simulated
 
 RATE = 100.0

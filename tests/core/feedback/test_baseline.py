@@ -6,9 +6,9 @@ import json
 
 import pytest
 
-from core.errors import ParameterError
-from core.feedback.baseline import Baseline
-from core.feedback.prescription import LEVELS
+from sagittal.core.errors import ParameterError
+from sagittal.core.feedback.baseline import Baseline
+from sagittal.core.feedback.prescription import LEVELS
 
 KNOWN = Baseline(0.4, 0.03, 40, "before", 3, 0.07, "Kesar", after_training=True)
 

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.errors import ParameterError
-from core.feedback import Baseline, Cue, FeedbackEngine, Prescription
-from core.feedback.engine import LATE_S, OPENING
-from core.feedback.prescription import LEVELS
+from sagittal.core.errors import ParameterError
+from sagittal.core.feedback import Baseline, Cue, FeedbackEngine, Prescription
+from sagittal.core.feedback.engine import LATE_S, OPENING
+from sagittal.core.feedback.prescription import LEVELS
 from tests.helpers.feedback import NAME, OPEN, prescription, train, walked
 
 IN, NEAR, AWAY = 0.60, 0.53, 0.45

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from core.errors import ParameterError
-from core.feedback.fields import RecordFields
+from sagittal.core.errors import ParameterError
+from sagittal.core.feedback.fields import RecordFields
 
 FULL = {
     "number": 2, "none": None, "whole": 3.0, "flag": True, "choice": "b", "choices": ["a", "b"],

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.feedback import Baseline, FeedbackEngine
-from core.feedback.guard import FIRST, LAST
-from core.frames import Floats
-from core.norms.adults import adult_reference
-from core.norms.profile import SAGITTAL
+from sagittal.core.feedback import Baseline, FeedbackEngine
+from sagittal.core.feedback.guard import FIRST, LAST
+from sagittal.core.frames import Floats
+from sagittal.core.norms.adults import adult_reference
+from sagittal.core.norms.profile import SAGITTAL
 from tests.helpers.feedback import OPEN, prescription, walked
 
 

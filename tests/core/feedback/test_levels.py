@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from core.feedback.baseline import Baseline
-from core.feedback.cue import Zone
-from core.feedback.levels import Ladder
-from core.feedback.prescription import LEVELS, Progression
-from core.feedback.zones import Zones
+from sagittal.core.feedback.baseline import Baseline
+from sagittal.core.feedback.cue import Zone
+from sagittal.core.feedback.levels import Ladder
+from sagittal.core.feedback.prescription import LEVELS, Progression
+from sagittal.core.feedback.zones import Zones
 
 ZONES = Zones(mean=0.60, sd=0.05)
 LOW = Zones(mean=0.60, sd=0.05, worse="low")

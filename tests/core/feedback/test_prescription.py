@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from core.errors import ParameterError
-from core.feedback import Baseline, Cue, Prescription, Tone
-from core.parameters.catalogue import CATALOGUE, list_curve_figures, list_trainable
-from core.parameters.catalogue.entry import PHASES, SUPPORT, TIMING
-from core.parameters.kinematic import FOOT_PITCH
-from core.parameters.spatial import NAMES as SPATIAL
+from sagittal.core.errors import ParameterError
+from sagittal.core.feedback import Baseline, Cue, Prescription, Tone
+from sagittal.core.parameters.catalogue import CATALOGUE, list_curve_figures, list_trainable
+from sagittal.core.parameters.catalogue.entry import PHASES, SUPPORT, TIMING
+from sagittal.core.parameters.kinematic import FOOT_PITCH
+from sagittal.core.parameters.spatial import NAMES as SPATIAL
 from tests.helpers.feedback import prescription
 
 

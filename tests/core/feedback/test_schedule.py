@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.feedback import Schedule
-from core.feedback.schedule import find_slot
+from sagittal.core.feedback import Schedule
+from sagittal.core.feedback.schedule import find_slot
 
 shares = st.lists(st.integers(0, 100), min_size=1, max_size=5).map(lambda s: tuple(sorted(s, reverse=True)))
 schedules = st.builds(

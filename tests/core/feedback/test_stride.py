@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import get_type_hints
 
-from core.feedback.stride import StrideLike
-from core.parameters.live_stride import LiveStride
+from sagittal.core.feedback.stride import StrideLike
+from sagittal.core.parameters.live_stride import LiveStride
 from tests.helpers.feedback import Walked
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from core.feedback import AnalysedStride, Cue, split
-from core.feedback.summary import TOLERANCE_S
+from sagittal.core.feedback import AnalysedStride, Cue, split
+from sagittal.core.feedback.summary import TOLERANCE_S
 from tests.helpers.feedback import prescription, train
 
 BLOCKS = {"kind": "every", "probe_every": 10, "probe_strides": 5}

@@ -6,8 +6,8 @@ from statistics import fmean, stdev
 
 import pytest
 
-from core.feedback.cue import Summary
-from core.feedback.tally import RunningStatistics
+from sagittal.core.feedback.cue import Summary
+from sagittal.core.feedback.tally import RunningStatistics
 
 
 def test_without_strides_nothing_is_known() -> None:

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.feedback.prescription import LEVELS, Towards
-from core.feedback.zones import BASE_HZ, LOUDEST_SD, Zones
+from sagittal.core.feedback.prescription import LEVELS, Towards
+from sagittal.core.feedback.zones import BASE_HZ, LOUDEST_SD, Zones
 
 levels = st.integers(0, LEVELS)
 values = st.floats(-50.0, 50.0)

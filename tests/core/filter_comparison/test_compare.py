@@ -8,14 +8,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.errors import EstimationError, FormatError, ParameterError
-from core.filter_comparison import FilterComparison, FilterRequest, compare_filters
-from core.filter_comparison.reference import fit_frames
-from core.filter_comparison.spread import choose_samples
-from core.formats.orientation_table import OrientationTable
-from core.frames import Floats
-from core.rotation import about, angle_between, exp, multiply, normalise
-from core.simulate import WalkTruth
+from sagittal.core.errors import EstimationError, FormatError, ParameterError
+from sagittal.core.filter_comparison import FilterComparison, FilterRequest, compare_filters
+from sagittal.core.filter_comparison.reference import fit_frames
+from sagittal.core.filter_comparison.spread import choose_samples
+from sagittal.core.formats.orientation_table import OrientationTable
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import about, angle_between, exp, multiply, normalise
+from sagittal.core.simulate import WalkTruth
 from tests.helpers.walks import analysed, simulated
 
 pytestmark = pytest.mark.slow
@@ -121,7 +121,7 @@ def test_what_is_no_filter_is_refused(filters: tuple[str, ...], code: str) -> No
 
 
 def test_a_diverging_filter_is_told_and_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    from core.filter_comparison import run
+    from sagittal.core.filter_comparison import run
 
     whole = run._orient_by_published
 

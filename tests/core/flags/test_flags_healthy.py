@@ -7,10 +7,10 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from core.flags import judge_flags
-from core.frames import SIDES
-from core.parameters.result import CycleCurves
-from core.standing_angles import NAMES
+from sagittal.core.flags import judge_flags
+from sagittal.core.frames import SIDES
+from sagittal.core.parameters.result import CycleCurves
+from sagittal.core.standing_angles import NAMES
 from tests.helpers.wbds import people
 
 OFTEN = {"knee_hyperextension": 0.15}

@@ -7,16 +7,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.angles import JointAngles
-from core.body.feet import FootTracks
-from core.events.result import Stride, Strides
-from core.flags import Flag, judge_flags
-from core.frames import FOOT, SIDES
-from core.fusion.orientations import Orientations
-from core.norms.controls import ControlSession, control_group
-from core.norms.lookup import Norms
-from core.parameters import cycle_curves, take_figures
-from core.parameters.result import CycleCurves, Parameter
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.flags import Flag, judge_flags
+from sagittal.core.frames import FOOT, SIDES
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.norms.controls import ControlSession, control_group
+from sagittal.core.norms.lookup import Norms
+from sagittal.core.parameters import cycle_curves, take_figures
+from sagittal.core.parameters.result import CycleCurves, Parameter
 from tests.helpers.walks import simulated
 
 STRAIGHT = np.radians(10.0)

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from core.flags import RULES, Flag, classify_ambulation, judge_flags
-from core.frames import SIDES, Floats, Side
-from core.norms.controls import ControlSession, control_group
-from core.norms.tables import WBDS
-from core.parameters.result import CycleCurves, Parameter
+from sagittal.core.flags import RULES, Flag, classify_ambulation, judge_flags
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.norms.controls import ControlSession, control_group
+from sagittal.core.norms.tables import WBDS
+from sagittal.core.parameters.result import CycleCurves, Parameter
 
 
 def curves(values: Mapping[str, tuple[float, float]], strides: int = 10) -> CycleCurves:

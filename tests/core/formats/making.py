@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from core.formats import SourceFile
-from core.formats.draft import signal_digest
-from core.frames import Floats, Segment
-from core.recording import ImuStream, Recording
+from sagittal.core.formats import SourceFile
+from sagittal.core.formats.draft import signal_digest
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.recording import ImuStream, Recording
 
 HEAD = "// Start Time: Unknown\n// Update Rate: {rate:.1f}Hz\n// Filter Profile: human (46.1)\n"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.errors import FormatError
-from core.formats import apdm
+from sagittal.core.errors import FormatError
+from sagittal.core.formats import apdm
 from tests.core.formats import vendor_files as made
 from tests.core.formats.vendor_reading import code_of, only, read
 

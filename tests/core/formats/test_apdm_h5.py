@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.errors import FormatError
-from core.formats import apdm_h5
-from core.formats.source_spec import SourceSpec
+from sagittal.core.errors import FormatError
+from sagittal.core.formats import apdm_h5
+from sagittal.core.formats.source_spec import SourceSpec
 from tests.core.formats import vendor_files as made
 from tests.core.formats.vendor_reading import read
 

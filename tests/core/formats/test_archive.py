@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from core.errors import ArchiveError
-from core.formats import ArchiveLimits, SourceFile, expand, read_recording
+from sagittal.core.errors import ArchiveError
+from sagittal.core.formats import ArchiveLimits, SourceFile, expand, read_recording
 from tests.core.formats.making import mt_file, zipped
 
 

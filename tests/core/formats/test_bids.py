@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from core.errors import FormatError
-from core.formats import bids
+from sagittal.core.errors import FormatError
+from sagittal.core.formats import bids
 from tests.core.formats import vendor_files as made
 from tests.core.formats.vendor_reading import read_parts
 from tests.data import data_folder

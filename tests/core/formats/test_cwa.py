@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core.errors import FormatError
-from core.formats import SourceFile, cwa, read_recording
-from core.frames import GRAVITY
+from sagittal.core.errors import FormatError
+from sagittal.core.formats import SourceFile, cwa, read_recording
+from sagittal.core.frames import GRAVITY
 from tests.data import data_folder
 
 START = dt.datetime(2026, 3, 4, 22, 30)  # noqa: DTZ001 - the device's own clock

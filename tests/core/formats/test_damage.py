@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.errors import SagittalError
-from core.formats import Manifest, SourceFile, manifest_of, read_recording, write_recording
-from core.quality import assess, describe
-from core.timeline import synchronise
+from sagittal.core.errors import SagittalError
+from sagittal.core.formats import Manifest, SourceFile, manifest_of, read_recording, write_recording
+from sagittal.core.quality import assess, describe
+from sagittal.core.timeline import synchronise
 from tests.core.formats.making import mt_file, mt_text, signals, zipped
 
 ACC, GYR = signals(600, still=200)

@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from core.errors import FormatError
-from core.formats import SourceFile, device_motion, parse_manifest, read_recording
-from core.formats.source_spec import SourceSpec
+from sagittal.core.errors import FormatError
+from sagittal.core.formats import SourceFile, device_motion, parse_manifest, read_recording
+from sagittal.core.formats.source_spec import SourceSpec
 from tests.core.formats import vendor_files as made
 from tests.core.formats.vendor_reading import only, read
 

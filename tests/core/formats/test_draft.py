@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.formats.draft import has_whole_row, signal_digest
-from core.held_samples import AT_A_TIME
+from sagittal.core.formats.draft import has_whole_row, signal_digest
+from sagittal.core.held_samples import AT_A_TIME
 
 
 @settings(max_examples=60, deadline=None)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.formats.live_clock import SETTLING_US, LiveClock, sample_times_us
-from core.formats.live_hello import Clock, Hello, SensorInfo, StreamInfo
-from core.formats.live_log import SampleBatch
+from sagittal.core.formats.live_clock import SETTLING_US, LiveClock, sample_times_us
+from sagittal.core.formats.live_hello import Clock, Hello, SensorInfo, StreamInfo
+from sagittal.core.formats.live_log import SampleBatch
 
 
 def hello(*clocks: Clock) -> Hello:

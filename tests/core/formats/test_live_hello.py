@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from core.errors import InputError
-from core.formats.live_log import (
+from sagittal.core.errors import InputError
+from sagittal.core.formats.live_log import (
     Finish,
     SensorInfo,
     StreamInfo,

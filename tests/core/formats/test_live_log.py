@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core.errors import InputError
-from core.formats.live_log import (
+from sagittal.core.errors import InputError
+from sagittal.core.formats.live_log import (
     FILE_MARK,
     MOST_FRAME_BYTES,
     SampleBatch,

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.errors import FormatError, Notice, SagittalError
-from core.formats import SourceFile, read_recording
-from core.formats.live_log import (
+from sagittal.core.errors import FormatError, Notice, SagittalError
+from sagittal.core.formats import SourceFile, read_recording
+from sagittal.core.formats.live_log import (
     FILE_MARK,
     SensorInfo,
     StreamInfo,
@@ -21,9 +21,9 @@ from core.formats.live_log import (
     record,
     scan,
 )
-from core.formats.live_reader import read_live_log
-from core.recording import Recording
-from core.timeline import synchronise
+from sagittal.core.formats.live_reader import read_live_log
+from sagittal.core.recording import Recording
+from sagittal.core.timeline import synchronise
 from tests.helpers.live import SMALL_HELLO, LiveTake, send, shared, small, small_batch
 from tests.helpers.walks import neura_recording
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.errors import ManifestError, SignalError
-from core.formats import SourceFile, manifest_of, read_recording, reader, table, write_recording
-from core.quality import describe
-from core.recording import Recording
-from core.sample_blocks import LongStream
-from core.simulate.daily import DailyItem, record_daily_life, simulate_daily_life
-from core.timeline import synchronise
+from sagittal.core.errors import ManifestError, SignalError
+from sagittal.core.formats import SourceFile, manifest_of, read_recording, reader, table, write_recording
+from sagittal.core.quality import describe
+from sagittal.core.recording import Recording
+from sagittal.core.sample_blocks import LongStream
+from sagittal.core.simulate.daily import DailyItem, record_daily_life, simulate_daily_life
+from sagittal.core.timeline import synchronise
 
 SPEC = {
     "file": "*.csv", "time_column": "t", "time_unit": "ms", "acc_unit": "g",

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.errors import ManifestError
-from core.formats.aliases import segment_in, segment_named
-from core.formats.manifest import manifest_of, parse_manifest
-from core.formats.source_spec import Channels
-from core.shoe import Shoe
+from sagittal.core.errors import ManifestError
+from sagittal.core.formats.aliases import segment_in, segment_named
+from sagittal.core.formats.manifest import manifest_of, parse_manifest
+from sagittal.core.formats.source_spec import Channels
+from sagittal.core.shoe import Shoe
 
 SOURCE = {"file": "a.csv", "acc_unit": "g", "columns": {"foot_l": {"acc": ["x", "y", "z"]}}}
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from core.errors import FormatError
-from core.formats.mapping_xml import looks_like, read
+from sagittal.core.errors import FormatError
+from sagittal.core.formats.mapping_xml import looks_like, read
 
 
 def mapping(*sensors: tuple[str, str], head: str = "") -> bytes:

@@ -7,9 +7,9 @@ import re
 import numpy as np
 import pytest
 
-from core.errors import FormatError
-from core.formats import mvnx
-from core.formats.source_spec import SourceSpec
+from sagittal.core.errors import FormatError
+from sagittal.core.formats import mvnx
+from sagittal.core.formats.source_spec import SourceSpec
 from tests.core.formats import vendor_files as made
 from tests.core.formats.vendor_reading import code_of, only, read
 

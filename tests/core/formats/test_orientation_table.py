@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.errors import FormatError
-from core.formats.orientation_table import read_orientation_table
-from core.frames import Floats
-from core.rotation import about
+from sagittal.core.errors import FormatError
+from sagittal.core.formats.orientation_table import read_orientation_table
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import about
 
 Q = about(2, np.linspace(0.0, 1.0, 20))
 T: Floats = np.arange(20.0) * 0.01

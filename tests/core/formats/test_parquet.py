@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.errors import FormatError, Notice
-from core.formats import SourceFile, read_recording, write_recording
-from core.formats.manifest import manifest_of
-from core.quality import describe
-from core.recording import ImuStream, Recording, Subject
-from core.shoe import Shoe
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.formats import SourceFile, read_recording, write_recording
+from sagittal.core.formats.manifest import manifest_of
+from sagittal.core.quality import describe
+from sagittal.core.recording import ImuStream, Recording, Subject
+from sagittal.core.shoe import Shoe
 from tests.core.formats.making import mt_file, signals, source, stream
 
 

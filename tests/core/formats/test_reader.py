@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from core.errors import ArchiveError, FormatError, ManifestError
-from core.formats import SourceFile, manifest_of, read_recording, write_recording
-from core.formats.reader import is_too_long
+from sagittal.core.errors import ArchiveError, FormatError, ManifestError
+from sagittal.core.formats import SourceFile, manifest_of, read_recording, write_recording
+from sagittal.core.formats.reader import is_too_long
 from tests.core.formats.making import mt_file, source, zipped
 
 MAPPING = """<?xml version="1.0"?><OpenSimDocument><XsensDataReaderSettings><ExperimentalSensors>

@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from core import rotation
-from core.errors import FormatError, InputError
-from core.formats import SourceFile, parse_manifest, read_recording, write_recording
-from core.recording import Recording
+from sagittal.core import rotation
+from sagittal.core.errors import FormatError, InputError
+from sagittal.core.formats import SourceFile, parse_manifest, read_recording, write_recording
+from sagittal.core.recording import Recording
 from tests.data import data_folder
 from tests.helpers.ipol import ipol_recording
 

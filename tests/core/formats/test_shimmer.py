@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.errors import FormatError
-from core.formats import shimmer
-from core.formats.source_spec import SourceSpec
-from core.frames import GRAVITY
+from sagittal.core.errors import FormatError
+from sagittal.core.formats import shimmer
+from sagittal.core.formats.source_spec import SourceSpec
+from sagittal.core.frames import GRAVITY
 from tests.core.formats import vendor_files as made
 from tests.core.formats.vendor_reading import code_of, only, read
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from core.formats import SourceFile, manifest_of, read_recording
-from core.formats.table_guess import PIECE, TableLook, look_into_table, make_entry, read_sample
-from core.frames import GRAVITY
+from sagittal.core.formats import SourceFile, manifest_of, read_recording
+from sagittal.core.formats.table_guess import PIECE, TableLook, look_into_table, make_entry, read_sample
+from sagittal.core.frames import GRAVITY
 from tests.core.formats.making import signals
 from tests.data import data_folder
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from core.formats.takes import find_takes
+from sagittal.core.formats.takes import find_takes
 from tests.core.formats import vendor_files as made
 from tests.core.formats.making import mt_text, signals, zipped
 

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from core import rotation
-from core.errors import FormatError
-from core.formats import _sniff, text
-from core.formats.vendors import VENDOR_FORMATS, find_vendor
-from core.frames import GRAVITY
+from sagittal.core import rotation
+from sagittal.core.errors import FormatError
+from sagittal.core.formats import _sniff, text
+from sagittal.core.formats.vendors import VENDOR_FORMATS, find_vendor
+from sagittal.core.frames import GRAVITY
 from tests.core.formats import making
 from tests.core.formats import vendor_files as made
 from tests.core.formats.vendor_files import VENDOR_SAMPLES

@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from core import rotation
-from core.frames import GRAVITY, Floats
+from sagittal.core import rotation
+from sagittal.core.frames import GRAVITY, Floats
 
 N: Final = 200
 RATE: Final = 100.0

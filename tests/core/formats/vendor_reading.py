@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from core.errors import InputError
-from core.formats import SourceFile, read_recording
-from core.recording import ImuStream, Recording
+from sagittal.core.errors import InputError
+from sagittal.core.formats import SourceFile, read_recording
+from sagittal.core.recording import ImuStream, Recording
 
 
 def read(data: bytes, name: str = "x.bin") -> Recording:

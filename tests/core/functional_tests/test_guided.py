@@ -9,17 +9,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.events.result import GaitEvent
-from core.frames import GRAVITY, SIDES, Protocol, Segment
-from core.functional_tests.chair import measure_chair_rises
-from core.functional_tests.guided import GuidedTest
-from core.functional_tests.result import FunctionalTest, GuidedTestView
-from core.functional_tests.sway import measure_sway
-from core.functional_tests.trunk import follow_trunk
-from core.functional_tests.tug import measure_tug
-from core.parameters.live_stride import LiveStride
-from core.recording import GivenLimits, UniformRecording
-from core.timeline.live import UniformBlock
+from sagittal.core.events.result import GaitEvent
+from sagittal.core.frames import GRAVITY, SIDES, Protocol, Segment
+from sagittal.core.functional_tests.chair import measure_chair_rises
+from sagittal.core.functional_tests.guided import GuidedTest
+from sagittal.core.functional_tests.result import FunctionalTest, GuidedTestView
+from sagittal.core.functional_tests.sway import measure_sway
+from sagittal.core.functional_tests.trunk import follow_trunk
+from sagittal.core.functional_tests.tug import measure_tug
+from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.recording import GivenLimits, UniformRecording
+from sagittal.core.timeline.live import UniformBlock
 from tests.core.functional_tests.test_timed_tests import rises, tug, wear
 
 RATE = 100.0

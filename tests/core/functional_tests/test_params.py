@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import fields
 
-from core.functional_tests.params import FunctionalTestParams
-from core.functional_tests.rising import RisingParams
-from core.functional_tests.sway import SwayParams
-from core.functional_tests.walks import WalkTestParams
-from core.pipeline.config import PipelineConfig
+from sagittal.core.functional_tests.params import FunctionalTestParams
+from sagittal.core.functional_tests.rising import RisingParams
+from sagittal.core.functional_tests.sway import SwayParams
+from sagittal.core.functional_tests.walks import WalkTestParams
+from sagittal.core.pipeline.config import PipelineConfig
 
 
 def test_every_part_has_its_own_published_parameters() -> None:

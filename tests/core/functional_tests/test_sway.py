@@ -7,14 +7,14 @@ from math import pi
 
 import pytest
 
-from core.frames import Segment
-from core.functional_tests.result import FunctionalTest
-from core.functional_tests.sway import measure_sway
-from core.recording import GivenLimits
-from core.simulate import RecordingSetup
-from core.simulate.mems import MEMS
-from core.simulate.standing import Sway, SwaySimulation, simulate_sway
-from core.timeline import synchronise
+from sagittal.core.frames import Segment
+from sagittal.core.functional_tests.result import FunctionalTest
+from sagittal.core.functional_tests.sway import measure_sway
+from sagittal.core.recording import GivenLimits
+from sagittal.core.simulate import RecordingSetup
+from sagittal.core.simulate.mems import MEMS
+from sagittal.core.simulate.standing import Sway, SwaySimulation, simulate_sway
+from sagittal.core.timeline import synchronise
 
 QUIET = RecordingSetup(noise=None)
 

@@ -8,19 +8,19 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.errors import EstimationError, ParameterError
-from core.events.turns import find_turns
-from core.frames import Segment
-from core.functional_tests.chair import measure_chair_rises
-from core.functional_tests.result import FunctionalTest
-from core.functional_tests.rising import find_changes
-from core.functional_tests.trunk import TrunkMotion, follow_trunk
-from core.functional_tests.tug import measure_tug
-from core.recording import GivenLimits, Recording, UniformRecording
-from core.simulate import PostureHold, simulate_day
-from core.simulate.scripts import ON_SKIN
-from core.simulate.tug import ChairTruth, simulate_chair_rises, simulate_tug
-from core.timeline import synchronise
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.events.turns import find_turns
+from sagittal.core.frames import Segment
+from sagittal.core.functional_tests.chair import measure_chair_rises
+from sagittal.core.functional_tests.result import FunctionalTest
+from sagittal.core.functional_tests.rising import find_changes
+from sagittal.core.functional_tests.trunk import TrunkMotion, follow_trunk
+from sagittal.core.functional_tests.tug import measure_tug
+from sagittal.core.recording import GivenLimits, Recording, UniformRecording
+from sagittal.core.simulate import PostureHold, simulate_day
+from sagittal.core.simulate.scripts import ON_SKIN
+from sagittal.core.simulate.tug import ChairTruth, simulate_chair_rises, simulate_tug
+from sagittal.core.timeline import synchronise
 from tests.helpers.kept import keep
 
 WORN: tuple[Segment, ...] = ("pelvis", "chest")

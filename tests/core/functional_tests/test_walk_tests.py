@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from core.events.bouts import Bout
-from core.events.result import GaitEvents, Stride, Strides
-from core.events.turns import Turn
-from core.frames import SIDES
-from core.functional_tests.result import FunctionalTest
-from core.functional_tests.walks import measure_six_minutes, measure_ten_metres
-from core.measure import MeasuredGait
-from core.recording import GivenLimits
+from sagittal.core.events.bouts import Bout
+from sagittal.core.events.result import GaitEvents, Stride, Strides
+from sagittal.core.events.turns import Turn
+from sagittal.core.frames import SIDES
+from sagittal.core.functional_tests.result import FunctionalTest
+from sagittal.core.functional_tests.walks import measure_six_minutes, measure_ten_metres
+from sagittal.core.measure import MeasuredGait
+from sagittal.core.recording import GivenLimits
 
 
 def walk(

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.errors import EstimationError, ParameterError
-from core.frames import GRAVITY, Bools, Floats
-from core.fusion.attitude import AttitudeParams, AttitudeState, advance, estimate_orientation
-from core.rotation import about, angle_between, conjugate, exp, multiply, rotate
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.frames import GRAVITY, Bools, Floats
+from sagittal.core.fusion.attitude import AttitudeParams, AttitudeState, advance, estimate_orientation
+from sagittal.core.rotation import about, angle_between, conjugate, exp, multiply, rotate
 
 RATE = 100.0
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])

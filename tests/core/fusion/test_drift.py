@@ -8,10 +8,10 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.calibration import calibrate
-from core.frames import Segment
-from core.fusion.drift import DriftParams, remove_relative_drift
-from core.rotation import about, exp, multiply
+from sagittal.core.calibration import calibrate
+from sagittal.core.frames import Segment
+from sagittal.core.fusion.drift import DriftParams, remove_relative_drift
+from sagittal.core.rotation import about, exp, multiply
 from tests.helpers.walks import simulated
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.body.still import FOOT_STILL
-from core.frames import Floats
-from core.fusion.live_drift import HeadingHold
-from core.rotation import about, yaw
+from sagittal.core.body.still import FOOT_STILL
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.live_drift import HeadingHold
+from sagittal.core.rotation import about, yaw
 
 RATE = 100.0
 MOVING = FOOT_STILL.gyr_limit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.fusion.live_rest import RESTED_S, RestLooks
+from sagittal.core.fusion.live_rest import RESTED_S, RestLooks
 
 RATE = 100.0
 

@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.angles.measure import measure_angles
-from core.calibration import calibrate
-from core.calibration.result import CalibratedRecording
-from core.errors import EstimationError
-from core.frames import R_NEUTRAL, Floats, Segment
-from core.fusion.attitude import attitude_kernel, compile_attitude_kernel
-from core.fusion.drift import DriftParams
-from core.fusion.mahony import MahonyParams, estimate_orientations
-from core.rest import index_window
-from core.rotation import about, angle_between, from_matrix, mean, multiply, normalise, rotate, yaw
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.errors import EstimationError
+from sagittal.core.frames import R_NEUTRAL, Floats, Segment
+from sagittal.core.fusion.attitude import attitude_kernel, compile_attitude_kernel
+from sagittal.core.fusion.drift import DriftParams
+from sagittal.core.fusion.mahony import MahonyParams, estimate_orientations
+from sagittal.core.rest import index_window
+from sagittal.core.rotation import about, angle_between, from_matrix, mean, multiply, normalise, rotate, yaw
 from tests.helpers.walks import lost, only, rms_deg, simulated, turned
 
 NO_DRIFT = MahonyParams(drift=DriftParams(reference_s=1e9))

@@ -7,15 +7,15 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from core.frames import GRAVITY, SIDES
-from core.norms import (
+from sagittal.core.frames import GRAVITY, SIDES
+from sagittal.core.norms import (
     adult_kinematics,
     adult_reference,
     adult_reference_at_speed,
     angle_values,
     look_up_norms,
 )
-from core.norms.at_speed import (
+from sagittal.core.norms.at_speed import (
     ASKED,
     angle_values_at_speed,
     bands_at_speed,
@@ -23,10 +23,10 @@ from core.norms.at_speed import (
     is_matched,
     walkway_values_at_speed,
 )
-from core.norms.profile import NINE, SAGITTAL
-from core.norms.speed import COMFORTABLE, NORM_LEG_M, SLOWEST, walking_speed
-from core.norms.tables import read_rows
-from core.scores import score_curves
+from sagittal.core.norms.profile import NINE, SAGITTAL
+from sagittal.core.norms.speed import COMFORTABLE, NORM_LEG_M, SLOWEST, walking_speed
+from sagittal.core.norms.tables import read_rows
+from sagittal.core.scores import score_curves
 from tests.core.test_scores import session
 
 FIGURES = {

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.frames import SIDES, Floats, Side
-from core.norms.controls import ControlSession, control_group, mean_curves
-from core.norms.profile import NINE
-from core.norms.values import Sex
-from core.parameters.kinematic import MEAN_ZERO
-from core.parameters.result import CycleCurves, Parameter
-from core.scores import score_curves
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.norms.controls import ControlSession, control_group, mean_curves
+from sagittal.core.norms.profile import NINE
+from sagittal.core.norms.values import Sex
+from sagittal.core.parameters.kinematic import MEAN_ZERO
+from sagittal.core.parameters.result import CycleCurves, Parameter
+from sagittal.core.scores import score_curves
 from tests.helpers.wbds import people
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from core.norms.functional import (
+from sagittal.core.norms.functional import (
     COMFORTABLE_SPEEDS,
     find_comfortable_speed,
     find_six_minute_norm,
     find_test_norm,
 )
-from server.report.functional import NO_AGE, NO_SEX, OTHER_AGE, norm_words
+from sagittal.server.report.functional import NO_AGE, NO_SEX, OTHER_AGE, norm_words
 
 
 @pytest.mark.parametrize(

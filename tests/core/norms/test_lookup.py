@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.frames import GRAVITY
-from core.norms import NormValue, look_up_norms, predict_at_speed
-from core.norms.place import percentile_of_sample, percentile_of_z, place_difference, place_value
-from core.norms.speed import walking_speed
-from core.norms.values import pace_of
+from sagittal.core.frames import GRAVITY
+from sagittal.core.norms import NormValue, look_up_norms, predict_at_speed
+from sagittal.core.norms.place import percentile_of_sample, percentile_of_z, place_difference, place_value
+from sagittal.core.norms.speed import walking_speed
+from sagittal.core.norms.values import pace_of
 
 REFERENCE = NormValue("x", mean=60.0, sd=4.0, n=42, group="g", source="s")
 

@@ -9,11 +9,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from core.frames import SIDES, Floats
-from core.norms import adult_kinematics, angle_values, look_up_norms, predict_at_speed, temporal_values
-from core.norms.tables import read_rows
-from core.norms.values import COARSE_S
-from core.parameters.catalogue import CATALOGUE, list_curve_figures
+from sagittal.core.frames import SIDES, Floats
+from sagittal.core.norms import (
+    adult_kinematics,
+    angle_values,
+    look_up_norms,
+    predict_at_speed,
+    temporal_values,
+)
+from sagittal.core.norms.tables import read_rows
+from sagittal.core.norms.values import COARSE_S
+from sagittal.core.parameters.catalogue import CATALOGUE, list_curve_figures
 from tests.data import data_folder
 from tests.helpers.wbds import people
 
@@ -33,14 +39,14 @@ BY_SPEED = (
 @pytest.mark.parametrize("name", [*TABLES, *(f"speed/{name}" for name in BY_SPEED)])
 def test_every_table_is_shipped_as_prepared_and_its_origin_written_down(name: str) -> None:
     own = name.removeprefix("speed/")
-    shipped = files("core.norms").joinpath("data", f"{own}.csv").read_bytes()
-    sources = files("core.norms").joinpath("data", "SOURCES.md").read_text(encoding="utf-8")
+    shipped = files("sagittal.core.norms").joinpath("data", f"{own}.csv").read_bytes()
+    sources = files("sagittal.core.norms").joinpath("data", "SOURCES.md").read_text(encoding="utf-8")
     assert f"| {own}.csv |" in sources
     assert shipped == (data_folder("norms") / f"{name}.csv").read_bytes()
 
 
 def test_nothing_else_is_shipped() -> None:
-    shipped = {p.name for p in files("core.norms").joinpath("data").iterdir()}
+    shipped = {p.name for p in files("sagittal.core.norms").joinpath("data").iterdir()}
     own = {"gps_sagittal_wbds.csv", "SOURCES.md"}
     assert shipped == {f"{name}.csv" for name in (*TABLES, *BY_SPEED)} | own
 

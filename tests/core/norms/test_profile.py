@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.frames import SIDES, Floats, Side
-from core.norms import adult_reference
-from core.norms.profile import (
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.norms import adult_reference
+from sagittal.core.norms.profile import (
     MODES,
     NINE,
     PROFILES,
@@ -17,7 +17,7 @@ from core.norms.profile import (
     overall_profile,
     side_profile,
 )
-from core.norms.tables import read_rows
+from sagittal.core.norms.tables import read_rows
 from tests.helpers.wbds import people
 
 

@@ -9,22 +9,22 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body import nominal_body
-from core.body.apart import lean_legs_apart
-from core.body.choice import WHOLE
-from core.body.erkf.headings import align_forward_axes
-from core.body.erkf.params import ErkfParams
-from core.calibration import calibrate
-from core.calibration.live_attempt import WornSensors
-from core.frames import Segment
-from core.fusion.mahony import estimate_orientations
-from core.online.calibrated import LiveCalibration
-from core.online.calibrating import LiveCalibrator
-from core.online.frame import CalibrationView, Stage
-from core.recording import Subject, UniformRecording
-from core.rotation import conjugate, exp, multiply, rotate
-from core.simulate import Arc, Pivot, Stand, Straight
-from core.timeline.live import UniformBlock
+from sagittal.core.body import nominal_body
+from sagittal.core.body.apart import lean_legs_apart
+from sagittal.core.body.choice import WHOLE
+from sagittal.core.body.erkf.headings import align_forward_axes
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.live_attempt import WornSensors
+from sagittal.core.frames import Segment
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.online.calibrated import LiveCalibration
+from sagittal.core.online.calibrating import LiveCalibrator
+from sagittal.core.online.frame import CalibrationView, Stage
+from sagittal.core.recording import Subject, UniformRecording
+from sagittal.core.rotation import conjugate, exp, multiply, rotate
+from sagittal.core.simulate import Arc, Pivot, Stand, Straight
+from sagittal.core.timeline.live import UniformBlock
 from tests.helpers.walks import TOGETHER, cut, lost, neura_walk, only, scripted, simulated
 
 Seen = tuple[int, Stage, CalibrationView]

@@ -9,19 +9,19 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.angles import JointAngles, compute_headings
-from core.body.feet import FootTracks
-from core.body.tree import PRESETS
-from core.events.foot_contact import FootContactParams
-from core.events.result import GaitEvent, GaitEvents
-from core.formats.live_log import FILE_MARK, decode_batch, encode_batch, record, scan
-from core.frames import FOOT, SIDES, Segment
-from core.fusion.orientations import Orientations
-from core.measure import MeasuredGait, Tracks, measure_gait
-from core.online import LiveFrame, LiveStride, OnlineSession
-from core.online.chain import COURSES
-from core.parameters.live_stride import NOT_YET
-from core.recording import UniformRecording
+from sagittal.core.angles import JointAngles, compute_headings
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.events.foot_contact import FootContactParams
+from sagittal.core.events.result import GaitEvent, GaitEvents
+from sagittal.core.formats.live_log import FILE_MARK, decode_batch, encode_batch, record, scan
+from sagittal.core.frames import FOOT, SIDES, Segment
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.measure import MeasuredGait, Tracks, measure_gait
+from sagittal.core.online import LiveFrame, LiveStride, OnlineSession
+from sagittal.core.online.chain import COURSES
+from sagittal.core.parameters.live_stride import NOT_YET
+from sagittal.core.recording import UniformRecording
 from tests.helpers.live_walks import Run, batches, hello_of, live, recorded
 from tests.helpers.marks import sweep_after
 from tests.helpers.walks import cut, lost, neura_walk, only, simulated

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.formats.live_log import Hello, SampleBatch, SensorInfo, StreamInfo
-from core.online.frame import SensorHealth
-from core.online.health import OVER_S, SensorHealthMonitor
+from sagittal.core.formats.live_log import Hello, SampleBatch, SensorInfo, StreamInfo
+from sagittal.core.online.frame import SensorHealth
+from sagittal.core.online.health import OVER_S, SensorHealthMonitor
 
 STEP_US, SIZE = 10_000, 50
 

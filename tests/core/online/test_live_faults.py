@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from core.frames import FOOT, SIDES, Segment
-from core.online import LiveStride
-from core.recording import UniformRecording
-from core.simulate.script import Arc, Script, Stand, Straight
+from sagittal.core.frames import FOOT, SIDES, Segment
+from sagittal.core.online import LiveStride
+from sagittal.core.recording import UniformRecording
+from sagittal.core.simulate.script import Arc, Script, Stand, Straight
 from tests.helpers.live_walks import live
 from tests.helpers.walks import cut, only, scripted, simulated
 

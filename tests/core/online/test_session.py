@@ -8,14 +8,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from core.body.erkf.live_figure import LinkedBody
-from core.body.tree import PRESETS
-from core.errors import Notice, ParameterError
-from core.frames import SIDES, Segment
-from core.online import LiveFrame, LiveStride
-from core.online.session import OnlineSession
-from core.parameters.spatial import NAMES as SPATIAL
-from core.recording import SensorSignals, UniformRecording
+from sagittal.core.body.erkf.live_figure import LinkedBody
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.errors import Notice, ParameterError
+from sagittal.core.frames import SIDES, Segment
+from sagittal.core.online import LiveFrame, LiveStride
+from sagittal.core.online.session import OnlineSession
+from sagittal.core.parameters.spatial import NAMES as SPATIAL
+from sagittal.core.recording import SensorSignals, UniformRecording
 from tests.helpers.live_walks import batches, hello_of, live, recorded
 from tests.helpers.perturbations import delay_sensor
 from tests.helpers.walks import cut, lost, only, simulated

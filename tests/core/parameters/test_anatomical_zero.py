@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.frames import SIDES, Floats, Side
-from core.parameters.anatomical_zero import anatomical_curves, anatomical_parameters, anatomical_variables
-from core.parameters.result import CycleCurves
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.parameters.anatomical_zero import (
+    anatomical_curves,
+    anatomical_parameters,
+    anatomical_variables,
+)
+from sagittal.core.parameters.result import CycleCurves
 
 
 def curves(**values: float) -> CycleCurves:

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.activity.parameters import MEASURES as DAILY
-from core.events.result import Stride
-from core.functional_tests import chair, sway, tug, walks
-from core.measure import measure_gait
-from core.norms.values import angle_values, temporal_values
-from core.parameters.catalogue import (
+from sagittal.core.activity.parameters import MEASURES as DAILY
+from sagittal.core.events.result import Stride
+from sagittal.core.functional_tests import chair, sway, tug, walks
+from sagittal.core.measure import measure_gait
+from sagittal.core.norms.values import angle_values, temporal_values
+from sagittal.core.parameters.catalogue import (
     CATALOGUE,
     LIMIT_FIGURES,
     ParameterEntry,
@@ -21,22 +21,22 @@ from core.parameters.catalogue import (
     index_entries,
     require_entries,
 )
-from core.parameters.catalogue.angles import ENTRIES as ANGLES
-from core.parameters.catalogue.daily import ENTRIES as OF_DAYS
-from core.parameters.catalogue.distances import ENTRIES as DISTANCES
-from core.parameters.catalogue.errors import ANKLE_RANGE, HIP_RANGE, KNEE_RANGE, LEVELS
-from core.parameters.catalogue.functional import ENTRIES as OF_TESTS
-from core.parameters.catalogue.limit_figures import ENTRIES as LIMITED
-from core.parameters.catalogue.phases import ENTRIES as PHASES
-from core.parameters.catalogue.squat import ENTRIES as SQUATS
-from core.parameters.catalogue.support import ENTRIES as SUPPORT
-from core.parameters.catalogue.times import ENTRIES as TIMES
-from core.parameters.catalogue.trunk import ENTRIES as OF_TRUNK
-from core.parameters.catalogue.walking import ENTRIES as WALKS
-from core.parameters.temporal import stride_values
-from core.simulate import simulate_scenario
-from core.squat.measures import MEASURES
-from server.report.wording import REASONS
+from sagittal.core.parameters.catalogue.angles import ENTRIES as ANGLES
+from sagittal.core.parameters.catalogue.daily import ENTRIES as OF_DAYS
+from sagittal.core.parameters.catalogue.distances import ENTRIES as DISTANCES
+from sagittal.core.parameters.catalogue.errors import ANKLE_RANGE, HIP_RANGE, KNEE_RANGE, LEVELS
+from sagittal.core.parameters.catalogue.functional import ENTRIES as OF_TESTS
+from sagittal.core.parameters.catalogue.limit_figures import ENTRIES as LIMITED
+from sagittal.core.parameters.catalogue.phases import ENTRIES as PHASES
+from sagittal.core.parameters.catalogue.squat import ENTRIES as SQUATS
+from sagittal.core.parameters.catalogue.support import ENTRIES as SUPPORT
+from sagittal.core.parameters.catalogue.times import ENTRIES as TIMES
+from sagittal.core.parameters.catalogue.trunk import ENTRIES as OF_TRUNK
+from sagittal.core.parameters.catalogue.walking import ENTRIES as WALKS
+from sagittal.core.parameters.temporal import stride_values
+from sagittal.core.simulate import simulate_scenario
+from sagittal.core.squat.measures import MEASURES
+from sagittal.server.report.wording import REASONS
 from tests.helpers.parameter_page import PAGE, render_page
 from tests.helpers.true_walks import true_tracks
 

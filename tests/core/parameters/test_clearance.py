@@ -7,15 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.body.feet import FootTracks
-from core.body.kinematics import nominal_body
-from core.body.model import BodyModel
-from core.frames import FOOT, R_NEUTRAL, SIDES, Floats, Side
-from core.measure import measure_gait
-from core.parameters.clearance import SoleHeights, lay_out, measure_floor_heights, sole_heights, toe_clearance
-from core.rotation import about, from_matrix, multiply, rotate
-from core.shoe import Shoe
-from core.simulate import simulate_scenario
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.body.kinematics import nominal_body
+from sagittal.core.body.model import BodyModel
+from sagittal.core.frames import FOOT, R_NEUTRAL, SIDES, Floats, Side
+from sagittal.core.measure import measure_gait
+from sagittal.core.parameters.clearance import (
+    SoleHeights,
+    lay_out,
+    measure_floor_heights,
+    sole_heights,
+    toe_clearance,
+)
+from sagittal.core.rotation import about, from_matrix, multiply, rotate
+from sagittal.core.shoe import Shoe
+from sagittal.core.simulate import simulate_scenario
 from tests.helpers.true_walks import true_tracks
 
 ANKLE = 0.08

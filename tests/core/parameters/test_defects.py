@@ -8,18 +8,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from core.body.feet import FootTracks
-from core.body.model import BodyModel
-from core.events.result import Stride, Strides
-from core.frames import SIDES, Floats, Side
-from core.measure import measure_gait
-from core.parameters import stride_values, summarise_times
-from core.parameters.catalogue import unit_of
-from core.parameters.result import Parameter
-from core.parameters.rows import read_row
-from core.parameters.spatial import measure_distances
-from core.parameters.symmetry import compare_sides
-from core.simulate import simulate_scenario
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.body.model import BodyModel
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.measure import measure_gait
+from sagittal.core.parameters import stride_values, summarise_times
+from sagittal.core.parameters.catalogue import unit_of
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.rows import read_row
+from sagittal.core.parameters.spatial import measure_distances
+from sagittal.core.parameters.symmetry import compare_sides
+from sagittal.core.simulate import simulate_scenario
 from tests.helpers.true_walks import true_tracks
 
 STRIDE = Stride("left", 1.0, 1.7, 2.2, 1.15, 1.55)

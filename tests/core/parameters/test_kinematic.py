@@ -10,15 +10,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.angles import JointAngles, compute_headings
-from core.events.result import Stride, Strides
-from core.frames import SIDES, Bools, Floats, Side
-from core.fusion.orientations import Orientations
-from core.norms import adult_kinematics
-from core.parameters import cycle_curves, foot_pitch, gait_parameters, mean_curve, summarise_angles
-from core.parameters.catalogue import list_curve_figures
-from core.parameters.kinematic import measure_cycles, per_stride_figures, stride_figures
-from core.parameters.result import CycleCurves
+from sagittal.core.angles import JointAngles, compute_headings
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.frames import SIDES, Bools, Floats, Side
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.norms import adult_kinematics
+from sagittal.core.parameters import cycle_curves, foot_pitch, gait_parameters, mean_curve, summarise_angles
+from sagittal.core.parameters.catalogue import list_curve_figures
+from sagittal.core.parameters.kinematic import measure_cycles, per_stride_figures, stride_figures
+from sagittal.core.parameters.result import CycleCurves
 from tests.core.events.foot_signal import orientations
 from tests.data import data_folder
 from tests.helpers.walks import simulated
@@ -196,7 +196,7 @@ FIGURES_AND_OTHERS = (
 @pytest.mark.recorded
 def test_our_figures_are_those_of_the_reference_table() -> None:
     """On the 84 reference strides our windows give the published means, and the spread of a single side."""
-    from core.norms import angle_values
+    from sagittal.core.norms import angle_values
 
     path = data_folder("norms") / "wbds_strides_42subjects.csv.gz"
     people: dict[str, dict[str, list[Floats]]] = {}

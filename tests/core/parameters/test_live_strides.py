@@ -9,19 +9,19 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.angles import JointAngles, compute_headings
-from core.events.live_contacts import KnownContact
-from core.events.result import GaitEvent
-from core.frames import SIDES, Segment, Side
-from core.fusion.orientations import Orientations
-from core.measure import MeasuredGait, Tracks, measure_gait
-from core.parameters.live_history import SampleHistory
-from core.parameters.live_stride import NOT_YET, LiveStride
-from core.parameters.live_strides import HistoryColumns, LiveStrides
-from core.parameters.spatial import NAMES as SPATIAL
-from core.parameters.spatial import Surface
-from core.simulate import Walker, WalkTruth, simulate
-from core.simulate.script import Stand, Straight
+from sagittal.core.angles import JointAngles, compute_headings
+from sagittal.core.events.live_contacts import KnownContact
+from sagittal.core.events.result import GaitEvent
+from sagittal.core.frames import SIDES, Segment, Side
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.measure import MeasuredGait, Tracks, measure_gait
+from sagittal.core.parameters.live_history import SampleHistory
+from sagittal.core.parameters.live_stride import NOT_YET, LiveStride
+from sagittal.core.parameters.live_strides import HistoryColumns, LiveStrides
+from sagittal.core.parameters.spatial import NAMES as SPATIAL
+from sagittal.core.parameters.spatial import Surface
+from sagittal.core.simulate import Walker, WalkTruth, simulate
+from sagittal.core.simulate.script import Stand, Straight
 from tests.helpers.true_walks import true_tracks
 
 RATE, BLOCK = 100.0, 10

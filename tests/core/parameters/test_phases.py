@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.angles import JointAngles
-from core.body.feet import FootTracks
-from core.body.model import BodyModel
-from core.events.result import Stride, Strides
-from core.frames import SIDES, Floats, Segment, Side
-from core.measure import measure_gait
-from core.parameters.phases import NAMES, measure_phases
-from core.parameters.rows import Row, read_row, side_parameters
-from core.parameters.stance import find_stances
-from core.simulate import simulate_scenario
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.body.model import BodyModel
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.frames import SIDES, Floats, Segment, Side
+from sagittal.core.measure import measure_gait
+from sagittal.core.parameters.phases import NAMES, measure_phases
+from sagittal.core.parameters.rows import Row, read_row, side_parameters
+from sagittal.core.parameters.stance import find_stances
+from sagittal.core.simulate import simulate_scenario
 from tests.helpers.true_walks import true_tracks
 
 T = np.arange(0.0, 8.0, 0.01)

@@ -6,8 +6,8 @@ from math import degrees, inf, nan, nextafter
 
 import pytest
 
-from core.parameters.catalogue import CATALOGUE
-from core.parameters.plausible import LEAST_KNEE, is_impossible
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.plausible import LEAST_KNEE, is_impossible
 
 
 @pytest.mark.parametrize(

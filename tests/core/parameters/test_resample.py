@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.parameters.resample import first_crossing, last_crossing, resample
+from sagittal.core.parameters.resample import first_crossing, last_crossing, resample
 
 T = np.arange(500) / 100.0
 SIGNALS = np.stack((np.sin(3.0 * T), T**2))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.frames import Floats
-from core.parameters.smoothness import spectral_arc_length, stride_smoothness
+from sagittal.core.frames import Floats
+from sagittal.core.parameters.smoothness import spectral_arc_length, stride_smoothness
 
 STEP = np.array([0.01])
 

@@ -9,21 +9,21 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from core.body.feet import FootTracks
-from core.body.model import BodyModel
-from core.events.result import Stride, Strides
-from core.frames import FOOT, R_NEUTRAL, SIDES, Bools, Floats, Side
-from core.parameters.result import Parameter
-from core.parameters.rows import figure_columns
-from core.parameters.spatial import (
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.body.model import BodyModel
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.frames import FOOT, R_NEUTRAL, SIDES, Bools, Floats, Side
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.rows import figure_columns
+from sagittal.core.parameters.spatial import (
     NAMES,
     Surface,
     in_place,
     measure_distances,
     summarise_distances,
 )
-from core.rotation import about, from_matrix, multiply
-from core.simulate import WalkTruth
+from sagittal.core.rotation import about, from_matrix, multiply
+from sagittal.core.simulate import WalkTruth
 from tests.helpers.walks import simulated
 
 RATE = 100.0

@@ -9,12 +9,12 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.events.result import Stride, Strides
-from core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
-from core.parameters.rows import side_parameters
-from core.parameters.stance import FLAT_RAD, NAMES, Stances, find_stances, foot_pitches
-from core.rotation import about, from_matrix, multiply
-from core.simulate import simulate_scenario
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
+from sagittal.core.parameters.rows import side_parameters
+from sagittal.core.parameters.stance import FLAT_RAD, NAMES, Stances, find_stances, foot_pitches
+from sagittal.core.rotation import about, from_matrix, multiply
+from sagittal.core.simulate import simulate_scenario
 from tests.helpers.true_walks import true_tracks
 
 T = np.arange(0.0, 12.0, 0.01)

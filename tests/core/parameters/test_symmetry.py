@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.events.result import Stride, Strides
-from core.frames import Side
-from core.parameters.result import Parameter
-from core.parameters.symmetry import angle_pct, compare_sides, index_pct, phase_coordination, ratio
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.frames import Side
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.symmetry import angle_pct, compare_sides, index_pct, phase_coordination, ratio
 
 
 def of(

@@ -7,17 +7,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.events.result import Strides
-from core.events.strides import stride_list
-from core.frames import SIDES
-from core.measure import Tracks
-from core.parameters.spatial import NAMES as SPATIAL
-from core.parameters.spatial import Surface
-from core.parameters.stance import NAMES as STANCE
-from core.parameters.take import TakeFigures, gait_parameters, take_figures
-from core.parameters.trunk import NAMES as TRUNK
-from core.simulate import Walker, simulate
-from core.simulate.script import Stand, Straight
+from sagittal.core.events.result import Strides
+from sagittal.core.events.strides import stride_list
+from sagittal.core.frames import SIDES
+from sagittal.core.measure import Tracks
+from sagittal.core.parameters.spatial import NAMES as SPATIAL
+from sagittal.core.parameters.spatial import Surface
+from sagittal.core.parameters.stance import NAMES as STANCE
+from sagittal.core.parameters.take import TakeFigures, gait_parameters, take_figures
+from sagittal.core.parameters.trunk import NAMES as TRUNK
+from sagittal.core.simulate import Walker, simulate
+from sagittal.core.simulate.script import Stand, Straight
 from tests.helpers.true_walks import true_tracks
 
 STEP_S = 0.54

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.parameters.result import Parameter
-from core.parameters.takes import join_takes
+from sagittal.core.errors import ParameterError
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.takes import join_takes
 
 
 def take(values: list[float] | np.ndarray, **changed: object) -> Parameter:

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.events.result import Stride, Strides
-from core.parameters import per_stride, stride_values, summarise_times
-from core.parameters.catalogue import CATALOGUE
-from core.parameters.catalogue.entry import PHASES, SUPPORT, TIMING
-from core.parameters.result import Parameter
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.parameters import per_stride, stride_values, summarise_times
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.catalogue.entry import PHASES, SUPPORT, TIMING
+from sagittal.core.parameters.result import Parameter
 
 # start, leaves 0.6 s later, other foot leaves at 0.1 and lands at 0.5 s
 RIGHT = Stride("right", 2.0, 2.65, 3.0, 2.1, 2.52)

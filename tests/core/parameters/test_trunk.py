@@ -8,15 +8,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.events.bouts import Bout
-from core.events.result import Stride, Strides
-from core.events.steps import Step, Steps
-from core.frames import Floats
-from core.measure import measure_gait
-from core.parameters.result import Parameter
-from core.parameters.trunk import NAMES, choose_foot, harmonic_ratios, trunk_regularity
-from core.parameters.walking import step_strides
-from core.simulate import simulate_scenario
+from sagittal.core.events.bouts import Bout
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.events.steps import Step, Steps
+from sagittal.core.frames import Floats
+from sagittal.core.measure import measure_gait
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.trunk import NAMES, choose_foot, harmonic_ratios, trunk_regularity
+from sagittal.core.parameters.walking import step_strides
+from sagittal.core.simulate import simulate_scenario
 from tests.helpers.true_walks import true_tracks
 
 RATE = 100.0

@@ -8,17 +8,23 @@ from math import hypot, sqrt
 import numpy as np
 import pytest
 
-from core.change import parameter_changes
-from core.events.result import EventKind, GaitEvent, GaitEvents, Stride, Strides
-from core.frames import SIDES, Side
-from core.norms.place import place_value
-from core.norms.values import NormValue
-from core.parameters.catalogue import CATALOGUE
-from core.parameters.result import Parameter
-from core.parameters.symmetry import compare_sides
-from core.parameters.temporal import summarise_times
-from core.parameters.uncertainty import PITCH_RULE, REFINED, TYPICAL_S, ContactErrors, state_uncertainty
-from core.parameters.variability import summarise_values
+from sagittal.core.change import parameter_changes
+from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents, Stride, Strides
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.norms.place import place_value
+from sagittal.core.norms.values import NormValue
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.symmetry import compare_sides
+from sagittal.core.parameters.temporal import summarise_times
+from sagittal.core.parameters.uncertainty import (
+    PITCH_RULE,
+    REFINED,
+    TYPICAL_S,
+    ContactErrors,
+    state_uncertainty,
+)
+from sagittal.core.parameters.variability import summarise_values
 
 STRIDE_S, STANCE_S = 1.1, 0.69
 KINDS: tuple[EventKind, EventKind] = ("ic", "tc")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.events.result import Stride, Strides
-from core.parameters import summarise_times
-from core.parameters.variability import cv_pct, mean_and_sd, summarise_values, t_quantile
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.parameters import summarise_times
+from sagittal.core.parameters.variability import cv_pct, mean_and_sd, summarise_values, t_quantile
 
 
 def test_the_interval_of_the_mean_is_students() -> None:

@@ -6,12 +6,12 @@ from math import pi
 
 import pytest
 
-from core.errors import Notice
-from core.events.bouts import Bout, walking_bouts
-from core.events.steps import Step, Steps
-from core.events.turns import Turn
-from core.parameters.result import Parameter
-from core.parameters.walking import bout_parameters, step_parameters, turn_parameters
+from sagittal.core.errors import Notice
+from sagittal.core.events.bouts import Bout, walking_bouts
+from sagittal.core.events.steps import Step, Steps
+from sagittal.core.events.turns import Turn
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.walking import bout_parameters, step_parameters, turn_parameters
 
 
 def named(parameters: tuple[Parameter, ...]) -> dict[str, Parameter]:

@@ -8,14 +8,14 @@ from typing import Final, get_args
 
 import numpy as np
 
-from core.body.pose_params import PoseParams
-from core.estimators import Requested
-from core.frames import Bools, Floats, Protocol, Segment
-from core.pipeline import PipelineConfig
-from core.pipeline.config import Detector
-from core.recording import ImuStream, Recording, Subject
-from core.rest import find_runs
-from core.simulate import (
+from sagittal.core.body.pose_params import PoseParams
+from sagittal.core.estimators import Requested
+from sagittal.core.frames import Bools, Floats, Protocol, Segment
+from sagittal.core.pipeline import PipelineConfig
+from sagittal.core.pipeline.config import Detector
+from sagittal.core.recording import ImuStream, Recording, Subject
+from sagittal.core.rest import find_runs
+from sagittal.core.simulate import (
     RecordingSetup,
     Walker,
     simulate,
@@ -25,9 +25,9 @@ from core.simulate import (
     simulate_sway,
     simulate_tug,
 )
-from core.simulate.chest import PostureHold
-from core.simulate.script import Stand, Straight
-from core.squat.params import SquatParams
+from sagittal.core.simulate.chest import PostureHold
+from sagittal.core.simulate.script import Stand, Straight
+from sagittal.core.squat.params import SquatParams
 from tests.helpers.kept import keep
 
 LEGS: Final[tuple[Segment, ...]] = ("thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r")

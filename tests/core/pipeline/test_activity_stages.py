@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.activity.result import ActivityKind, ActivityResult, ActivitySpan
-from core.errors import Notice, SignalError
-from core.frames import Segment
-from core.pipeline.activity_stages import find_trunk_stream, judge_activity, list_doubts, share_known
-from core.pipeline.analysis import TakeAnalysis
-from core.pipeline.config import PipelineConfig
-from core.recording import ImuStream, Recording
+from sagittal.core.activity.result import ActivityKind, ActivityResult, ActivitySpan
+from sagittal.core.errors import Notice, SignalError
+from sagittal.core.frames import Segment
+from sagittal.core.pipeline.activity_stages import find_trunk_stream, judge_activity, list_doubts, share_known
+from sagittal.core.pipeline.analysis import TakeAnalysis
+from sagittal.core.pipeline.config import PipelineConfig
+from sagittal.core.recording import ImuStream, Recording
 from tests.core.formats.making import signals, stream
 
 ACC, GYR = signals(200)

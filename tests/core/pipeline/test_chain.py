@@ -8,17 +8,17 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from core import calibration
-from core.body.erkf.headings import turn_forward_axes
-from core.calibration import CalibrationParams, calibrate
-from core.calibration.result import CalibratedRecording
-from core.fusion.mahony import estimate_orientations
-from core.parameters.smoothness import NAME as SPARC
-from core.parameters.trunk import NAMES as TRUNK_NAMES
-from core.pipeline import TakeAnalysis, analyse
-from core.recording import UniformRecording
-from core.rotation import to_matrix
-from core.simulate import simulate_scenario, simulate_tug
+from sagittal.core import calibration
+from sagittal.core.body.erkf.headings import turn_forward_axes
+from sagittal.core.calibration import CalibrationParams, calibrate
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.parameters.smoothness import NAME as SPARC
+from sagittal.core.parameters.trunk import NAMES as TRUNK_NAMES
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rotation import to_matrix
+from sagittal.core.simulate import simulate_scenario, simulate_tug
 from tests.helpers.walks import analysed
 
 OFF_DEG = 20.0

@@ -10,16 +10,16 @@ from collections.abc import Iterator
 
 import pytest
 
-import core
-from core.errors import ParameterError
-from core.events.consensus import ConsensusParams
-from core.pipeline import SQUAT, TRUNK_ONLY, WALK, PipelineConfig
-from core.pipeline.config import REMOVED, override_config
-from core.pipeline.recipes import ACTIVITY, BY_TRUNK
+from sagittal import core
+from sagittal.core.errors import ParameterError
+from sagittal.core.events.consensus import ConsensusParams
+from sagittal.core.pipeline import SQUAT, TRUNK_ONLY, WALK, PipelineConfig
+from sagittal.core.pipeline.config import REMOVED, override_config
+from sagittal.core.pipeline.recipes import ACTIVITY, BY_TRUNK
 from tests.helpers.parameter_changes import list_parameters, replace_value
 from tests.helpers.parameter_table import read_rows
 
-ELSEWHERE = ("core.online", "core.simulate", "core.fusion.self_calibrating")
+ELSEWHERE = ("sagittal.core.online", "sagittal.core.simulate", "sagittal.core.fusion.self_calibrating")
 """Samples as they come have a configuration of their own (`OnlineParams`), so have a simulation and a filter
 that no stage runs."""
 
@@ -29,7 +29,7 @@ LIVE = "Live"
 
 def declared() -> Iterator[type]:
     """Every dataclass of parameters that a module of core defines."""
-    for module in pkgutil.walk_packages(core.__path__, "core."):
+    for module in pkgutil.walk_packages(core.__path__, "sagittal.core."):
         if module.name.startswith(ELSEWHERE):
             continue
         found = importlib.import_module(module.name)

@@ -7,19 +7,19 @@ from dataclasses import replace
 
 import pytest
 
-from core.formats import parse_manifest
-from core.frames import Protocol
-from core.pipeline import PipelineConfig, TakeAnalysis, analyse, resume
-from core.pipeline.functional_stages import measure_trunk_test, measure_walk_test
-from core.pipeline.recipes import BY_TRUNK, choose_recipe
-from core.recording import GivenLimits
-from core.simulate.scripts import ON_SKIN
-from core.simulate.standing import Sway, simulate_sway
-from core.simulate.tug import simulate_tug
-from core.timeline import synchronise
-from server.report.bundle import load_bundle
-from server.report.exports import analysis_files
-from server.report.model import report_model
+from sagittal.core.formats import parse_manifest
+from sagittal.core.frames import Protocol
+from sagittal.core.pipeline import PipelineConfig, TakeAnalysis, analyse, resume
+from sagittal.core.pipeline.functional_stages import measure_trunk_test, measure_walk_test
+from sagittal.core.pipeline.recipes import BY_TRUNK, choose_recipe
+from sagittal.core.recording import GivenLimits
+from sagittal.core.simulate.scripts import ON_SKIN
+from sagittal.core.simulate.standing import Sway, simulate_sway
+from sagittal.core.simulate.tug import simulate_tug
+from sagittal.core.timeline import synchronise
+from sagittal.server.report.bundle import load_bundle
+from sagittal.server.report.exports import analysis_files
+from sagittal.server.report.model import report_model
 from tests.helpers.kept import keep
 
 

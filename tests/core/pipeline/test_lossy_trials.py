@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.angles.measure import measure_angles
-from core.errors import SagittalError
-from core.fusion.orientations import Orientations
-from core.pipeline import analyse
-from core.recording import Subject
-from server.report.exports import analysis_files
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.errors import SagittalError
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.pipeline import analyse
+from sagittal.core.recording import Subject
+from sagittal.server.report.exports import analysis_files
 from tests.core.pipeline.lossy_trials import LossyTrial, draw_trial, keep_segments, lose_samples, walk
 
 EVERYDAY = range(24)

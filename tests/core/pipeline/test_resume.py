@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.events.flags import StrideParams
-from core.frames import Segment
-from core.pipeline import TRUNK_ONLY, WALK, PipelineConfig, TakeAnalysis, analyse, resume
-from core.recording import Recording
-from core.simulate import simulate_scenario
+from sagittal.core.errors import ParameterError
+from sagittal.core.events.flags import StrideParams
+from sagittal.core.frames import Segment
+from sagittal.core.pipeline import TRUNK_ONLY, WALK, PipelineConfig, TakeAnalysis, analyse, resume
+from sagittal.core.recording import Recording
+from sagittal.core.simulate import simulate_scenario
 
 OTHER = PipelineConfig(strides=StrideParams(edge_strides=2))
 

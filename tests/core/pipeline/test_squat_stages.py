@@ -10,20 +10,20 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.parameters.symmetry import compare_sides
-from core.pipeline import SQUAT, PipelineConfig, TakeAnalysis, analyse, resume
-from core.pipeline.recipes import choose_recipe
-from core.pipeline.squat_stages import AGREED, NO_HEIGHT
-from core.recording import Subject, UniformRecording
-from core.simulate import SquatSimulation, simulate_movement
-from core.squat.measures import MEASURES
-from core.squat.params import SquatParams
-from core.squat.side import find_squat_sides
-from core.timeline import synchronise
-from server.report.bundle import load_bundle
-from server.report.exports import analysis_files
-from server.report.model import report_model
+from sagittal.core.errors import ParameterError
+from sagittal.core.parameters.symmetry import compare_sides
+from sagittal.core.pipeline import SQUAT, PipelineConfig, TakeAnalysis, analyse, resume
+from sagittal.core.pipeline.recipes import choose_recipe
+from sagittal.core.pipeline.squat_stages import AGREED, NO_HEIGHT
+from sagittal.core.recording import Subject, UniformRecording
+from sagittal.core.simulate import SquatSimulation, simulate_movement
+from sagittal.core.squat.measures import MEASURES
+from sagittal.core.squat.params import SquatParams
+from sagittal.core.squat.side import find_squat_sides
+from sagittal.core.timeline import synchronise
+from sagittal.server.report.bundle import load_bundle
+from sagittal.server.report.exports import analysis_files
+from sagittal.server.report.model import report_model
 from tests.core.body.chain.squats import squat_on
 from tests.core.calibration.test_table_top import RATE
 from tests.helpers.table_top import from_table
@@ -177,7 +177,7 @@ def test_what_legs_need_is_said() -> None:
 
 
 def refusal(recording: UniformRecording) -> str:
-    from core.errors import EstimationError
+    from sagittal.core.errors import EstimationError
 
     with pytest.raises(EstimationError) as caught:
         find_squat_sides(recording)

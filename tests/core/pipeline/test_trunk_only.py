@@ -7,17 +7,17 @@ from functools import cache
 
 import pytest
 
-from core.calibration import CalibrationParams
-from core.calibration.sensor_in_walk import WalkRungParams
-from core.frames import Segment
-from core.measure import measure_gait
-from core.parameters.result import Parameter
-from core.pipeline import TakeAnalysis, analyse
-from core.pipeline.config import PipelineConfig
-from core.simulate import simulate_scenario
-from server.report.bundle import load_bundle
-from server.report.exports import analysis_files
-from server.report.tracks import NAME, read_tracks
+from sagittal.core.calibration import CalibrationParams
+from sagittal.core.calibration.sensor_in_walk import WalkRungParams
+from sagittal.core.frames import Segment
+from sagittal.core.measure import measure_gait
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.pipeline.config import PipelineConfig
+from sagittal.core.simulate import simulate_scenario
+from sagittal.server.report.bundle import load_bundle
+from sagittal.server.report.exports import analysis_files
+from sagittal.server.report.tracks import NAME, read_tracks
 from tests.helpers.mobgap import TRIALS, recording
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from core.formats import SourceFile, manifest_of, read_recording
-from core.recording import Recording
+from sagittal.core.formats import SourceFile, manifest_of, read_recording
+from sagittal.core.recording import Recording
 from tests.core.quality.nine_sensors import NINE
 from tests.data import data_folder
 

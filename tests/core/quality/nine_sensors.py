@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from core.frames import Segment
+from sagittal.core.frames import Segment
 
 NINE: dict[str, Segment | None] = {
     "00B40B91": "pelvis", "00B40C45": "thigh_l", "00B40C3C": "thigh_r", "00B40BA5": "shank_l",

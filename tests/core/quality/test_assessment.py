@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.formats import SourceFile, manifest_of, read_recording
-from core.frames import GRAVITY, Floats
-from core.quality.assessment import QualityReport, assess, concern_paths_alone
-from core.recording import Recording
-from core.rotation import about
-from core.timeline import synchronise
+from sagittal.core.formats import SourceFile, manifest_of, read_recording
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.quality.assessment import QualityReport, assess, concern_paths_alone
+from sagittal.core.recording import Recording
+from sagittal.core.rotation import about
+from sagittal.core.timeline import synchronise
 from tests.core.formats.making import signals, stream, take
 from tests.core.formats.test_samples import gaitmap
 

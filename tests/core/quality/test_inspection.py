@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.quality.inspection import LOOKED_AT_S, describe, measure_losses
-from core.quality.suggestion import Suggestion
-from core.recording import Recording
-from core.sample_blocks import LongStream, SampleBlock
-from core.simulate import simulate_scenario
+from sagittal.core.quality.inspection import LOOKED_AT_S, describe, measure_losses
+from sagittal.core.quality.suggestion import Suggestion
+from sagittal.core.recording import Recording
+from sagittal.core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.simulate import simulate_scenario
 from tests.core.formats.making import signals, stream
 
 ACC, GYR = signals(600, still=300)

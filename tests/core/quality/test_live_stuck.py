@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.errors import Notice
-from core.frames import GRAVITY, Bools, Floats, Segment
-from core.quality.live_stuck import StuckSensors
-from core.timeline.live import UniformBlock
+from sagittal.core.errors import Notice
+from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
+from sagittal.core.quality.live_stuck import StuckSensors
+from sagittal.core.timeline.live import UniformBlock
 
 RATE, FROZEN_AT = 100.0, 425
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.frames import GRAVITY, Floats
-from core.quality.sides import find_left_leg, smooth
-from core.rotation import about, conjugate, rotate
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.quality.sides import find_left_leg, smooth
+from sagittal.core.rotation import about, conjugate, rotate
 
 RATE, STRIDE_HZ, ONSET_S = 50.0, 0.9, 4.0
 

@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from core.frames import GRAVITY
-from core.quality.signals import magnetic_share, measure_signal, measure_stream, saturation
+from sagittal.core.frames import GRAVITY
+from sagittal.core.quality.signals import magnetic_share, measure_signal, measure_stream, saturation
 from tests.core.formats.making import signals, stream
 from tests.data import ROOT
 
@@ -76,7 +76,7 @@ def test_infinite_samples_are_no_plateau() -> None:
 @pytest.mark.slow
 def test_a_table_is_judged_without_a_compiler() -> None:
     """The web process does: numba would cost it seconds and memory."""
-    code = "import sys, numpy as np; from core.quality.signals import measure_signal; "
+    code = "import sys, numpy as np; from sagittal.core.quality.signals import measure_signal; "
     code += "measure_signal(np.ones((200, 3)), np.zeros((200, 3)), 100.0); sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
 

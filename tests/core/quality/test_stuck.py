@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from core.errors import Notice
-from core.formats import SourceFile, read_recording
-from core.frames import GRAVITY, Floats, Segment
-from core.pipeline import TakeAnalysis, analyse
-from core.quality.stuck import CODES, StuckWatch, drop_stuck_sensors, mark_stuck
-from core.recording import ImuStream, Recording, SensorSignals, Subject, UniformRecording
-from core.simulate import SCRIPTS, simulate_scenario
-from core.timeline import synchronise
+from sagittal.core.errors import Notice
+from sagittal.core.formats import SourceFile, read_recording
+from sagittal.core.frames import GRAVITY, Floats, Segment
+from sagittal.core.pipeline import TakeAnalysis, analyse
+from sagittal.core.quality.stuck import CODES, StuckWatch, drop_stuck_sensors, mark_stuck
+from sagittal.core.recording import ImuStream, Recording, SensorSignals, Subject, UniformRecording
+from sagittal.core.simulate import SCRIPTS, simulate_scenario
+from sagittal.core.timeline import synchronise
 from tests.core.formats.making import stream, take
 from tests.data import data_folder
 from tests.helpers import gaitmap, mobgap

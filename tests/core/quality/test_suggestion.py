@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from core.frames import Segment
-from core.quality.suggestion import Suggestion, suggest, suggest_segments
-from core.recording import ImuStream, Recording
-from core.simulate import simulate_scenario
+from sagittal.core.frames import Segment
+from sagittal.core.quality.suggestion import Suggestion, suggest, suggest_segments
+from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.simulate import simulate_scenario
 from tests.core.formats.making import signals, stream
 from tests.core.quality.nine_sensors import NINE
 

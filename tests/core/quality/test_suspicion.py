@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.frames import GRAVITY, Floats
-from core.quality.signals import Facts
-from core.quality.suspicion import list_suspicions
-from core.rotation import about
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.quality.signals import Facts
+from sagittal.core.quality.suspicion import list_suspicions
+from sagittal.core.rotation import about
 
 STANDS = Facts(True, GRAVITY, 0.02, slice(0, 100), GRAVITY, 2.0, 5.0)
 """Somebody who stood, then walked."""

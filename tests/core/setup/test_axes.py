@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.frames import GRAVITY, Floats
-from core.recording import SensorSignals
-from core.rotation import about, conjugate, log, multiply, rotate
-from core.setup.axes import CHOICES, REVERSED, fit_axes, refuses_choice
-from core.setup.params import SetupParams
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.recording import SensorSignals
+from sagittal.core.rotation import about, conjugate, log, multiply, rotate
+from sagittal.core.setup.axes import CHOICES, REVERSED, fit_axes, refuses_choice
+from sagittal.core.setup.params import SetupParams
 
 RATE, PARAMS = 100.0, SetupParams()
 

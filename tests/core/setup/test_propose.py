@@ -8,12 +8,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.correction import SensorCorrection
-from core.frames import GRAVITY, Segment
-from core.pipeline import PipelineConfig, analyse
-from core.recording import Recording
-from core.setup import SetupParams, SetupRepair
-from core.simulate import simulate_scenario
+from sagittal.core.correction import SensorCorrection
+from sagittal.core.frames import GRAVITY, Segment
+from sagittal.core.pipeline import PipelineConfig, analyse
+from sagittal.core.recording import Recording
+from sagittal.core.setup import SetupParams, SetupRepair
+from sagittal.core.simulate import simulate_scenario
 from tests.helpers.setup_mistakes import TURNS, apply_repair, change_axes, exchange_labels, look_at
 
 LEFT_HANDED = np.diag([-1.0, 1.0, 1.0])

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from core.simulate import (
+from sagittal.core.simulate import (
     STEADY,
     Arc,
     Pivot,
@@ -19,8 +19,8 @@ from core.simulate import (
     simulate,
     simulate_scenario,
 )
-from core.simulate.human import Motion, move
-from core.simulate.script import plan
+from sagittal.core.simulate.human import Motion, move
+from sagittal.core.simulate.script import plan
 
 MIXED = (
     Stand(4.0),

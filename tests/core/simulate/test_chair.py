@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.simulate.chair import (
+from sagittal.core.simulate.chair import (
     BACK,
     DROP,
     LEAN,

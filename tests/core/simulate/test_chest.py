@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.rotation import rotate
-from core.simulate import ChestSimulation, PostureHold, RecordingSetup, simulate_day
-from core.simulate.walker import REFERENCE_HEIGHT_M
+from sagittal.core.errors import ParameterError
+from sagittal.core.rotation import rotate
+from sagittal.core.simulate import ChestSimulation, PostureHold, RecordingSetup, simulate_day
+from sagittal.core.simulate.walker import REFERENCE_HEIGHT_M
 
 EXACT = RecordingSetup(noise=None, mount_spread_rad=0.0)
 

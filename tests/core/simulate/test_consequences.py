@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.agreement.params import AgreementParams, LagParams
-from core.pipeline import PipelineConfig, TakeAnalysis, analyse
-from core.simulate import Dipole, Lag, RecordingSetup, Simulation, Stand, Straight, Walker, simulate
+from sagittal.core.agreement.params import AgreementParams, LagParams
+from sagittal.core.pipeline import PipelineConfig, TakeAnalysis, analyse
+from sagittal.core.simulate import Dipole, Lag, RecordingSetup, Simulation, Stand, Straight, Walker, simulate
 
 SCRIPT = (Stand(5.0), Straight(16.0, 0.68, 0.5), Stand(4.0))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.simulate.curves import (
+from sagittal.core.simulate.curves import (
     ANKLE_DORSIFLEXION,
     FOOT_PITCH,
     HIP_ADDUCTION,

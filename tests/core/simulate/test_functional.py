@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from core.errors import ParameterError
-from core.frames import FOOT, SHANK, THIGH
-from core.rotation import rotate
-from core.simulate.functional import FunctionalTruth, SwingsAndBows, simulate_swings_and_bows
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import FOOT, SHANK, THIGH
+from sagittal.core.rotation import rotate
+from sagittal.core.simulate.functional import FunctionalTruth, SwingsAndBows, simulate_swings_and_bows
 
 SHORT = SwingsAndBows(swings=2, bows=1, sides=("left", "right"), lead_s=1.0, rest_s=0.5)
 HEIGHT_M = 1.8

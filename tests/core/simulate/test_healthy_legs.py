@@ -15,19 +15,19 @@ from typing import Final
 import numpy as np
 import pytest
 
-from core.angles import JointAngles
-from core.events.result import GaitEvent, GaitEvents
-from core.frames import SIDES, Side
-from core.measure import measure_gait
-from core.norms.at_speed import angle_values_at_speed, walkway_values_at_speed
-from core.norms.speed import WalkingSpeed, walking_speed
-from core.norms.values import list_norm_keys
-from core.parameters.catalogue import LIMIT_FIGURES
-from core.simulate import SCRIPTS, STEADY
-from core.simulate.human import move
-from core.simulate.script import plan
-from core.simulate.truth import WalkTruth, truth_of
-from core.simulate.walker import REFERENCE_HEIGHT_M
+from sagittal.core.angles import JointAngles
+from sagittal.core.events.result import GaitEvent, GaitEvents
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.measure import measure_gait
+from sagittal.core.norms.at_speed import angle_values_at_speed, walkway_values_at_speed
+from sagittal.core.norms.speed import WalkingSpeed, walking_speed
+from sagittal.core.norms.values import list_norm_keys
+from sagittal.core.parameters.catalogue import LIMIT_FIGURES
+from sagittal.core.simulate import SCRIPTS, STEADY
+from sagittal.core.simulate.human import move
+from sagittal.core.simulate.script import plan
+from sagittal.core.simulate.truth import WalkTruth, truth_of
+from sagittal.core.simulate.walker import REFERENCE_HEIGHT_M
 from tests.helpers.true_walks import true_tracks
 
 MOST_SD = 1.5

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.frames import FOOT, GRAVITY, SIDES, Floats, Segment
-from core.simulate import Pivot, RecordingSetup, Simulation, Stand, Straight, Walker, simulate
-from core.simulate.human import Motion
-from core.simulate.impacts import SHAKES, Impact, draw_impacts, shake_sensor
-from core.simulate.sensors import PLACES, SensorPath, draw_mounts, ideal_signals, place_sensor
+from sagittal.core.frames import FOOT, GRAVITY, SIDES, Floats, Segment
+from sagittal.core.simulate import Pivot, RecordingSetup, Simulation, Stand, Straight, Walker, simulate
+from sagittal.core.simulate.human import Motion
+from sagittal.core.simulate.impacts import SHAKES, Impact, draw_impacts, shake_sensor
+from sagittal.core.simulate.sensors import PLACES, SensorPath, draw_mounts, ideal_signals, place_sensor
 
 SCRIPT = (Stand(3.0), Straight(12.8, 0.64, 0.54), Stand(3.0))
 BARE = RecordingSetup(noise=None)

@@ -3,11 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.frames import Floats, Segment
-from core.rotation import multiply, rotate
-from core.simulate import Dipole, RecordingSetup, SensorNoise, Simulation, Stand, Straight, simulate
-from core.simulate.magnetics import FIELD_DIP, IRON_SIZE_M, earth_field, field_at
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.rotation import multiply, rotate
+from sagittal.core.simulate import Dipole, RecordingSetup, SensorNoise, Simulation, Stand, Straight, simulate
+from sagittal.core.simulate.magnetics import FIELD_DIP, IRON_SIZE_M, earth_field, field_at
 
 SCRIPT = (Stand(3.0), Straight(6.4, 0.64, 0.54), Stand(2.0))
 BESIDE = Dipole((3.0, 0.6, 0.4), (0.0, 0.05, 0.0))

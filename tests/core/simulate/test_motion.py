@@ -7,13 +7,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.frames import FOOT, SIDES, SUFFIX, Floats, Side
-from core.rotation import rotate
-from core.simulate import STEADY, Stand, Straight, Walker
-from core.simulate.human import Motion, move
-from core.simulate.script import plan
-from core.simulate.truth import joint_angles
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import FOOT, SIDES, SUFFIX, Floats, Side
+from sagittal.core.rotation import rotate
+from sagittal.core.simulate import STEADY, Stand, Straight, Walker
+from sagittal.core.simulate.human import Motion, move
+from sagittal.core.simulate.script import plan
+from sagittal.core.simulate.truth import joint_angles
 from tests.data import data_folder
 from tests.helpers.walks import joint_gap
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.simulate.chest import ChestSimulation
-from core.simulate.movements import MOVEMENTS, ChairTest, simulate_movement
-from core.simulate.patients import PATIENTS
-from core.simulate.squat import Squats, SquatSimulation
-from core.simulate.squat_chain import place_as_agreed
-from core.simulate.tug import ChairSimulation
+from sagittal.core.errors import ParameterError
+from sagittal.core.simulate.chest import ChestSimulation
+from sagittal.core.simulate.movements import MOVEMENTS, ChairTest, simulate_movement
+from sagittal.core.simulate.patients import PATIENTS
+from sagittal.core.simulate.squat import Squats, SquatSimulation
+from sagittal.core.simulate.squat_chain import place_as_agreed
+from sagittal.core.simulate.tug import ChairSimulation
 
 
 def test_a_name_that_is_none_is_refused_with_those_that_are() -> None:

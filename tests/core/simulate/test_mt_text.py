@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.formats import xsens
-from core.formats.draft import finish
-from core.simulate import RecordingSetup, Simulation, Stand, Straight, mt_files, mt_text, simulate
+from sagittal.core.formats import xsens
+from sagittal.core.formats.draft import finish
+from sagittal.core.simulate import RecordingSetup, Simulation, Stand, Straight, mt_files, mt_text, simulate
 
 
 @pytest.fixture(scope="module")

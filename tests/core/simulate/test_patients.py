@@ -10,15 +10,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import calibration, events
-from core.events import FootPitchParams
-from core.events.foot_pitch import pitch_signal
-from core.events.result import GaitEvents
-from core.frames import SIDES, SUFFIX
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.rotation import angle_between
-from core.simulate import (
+from sagittal.core import calibration, events
+from sagittal.core.events import FootPitchParams
+from sagittal.core.events.foot_pitch import pitch_signal
+from sagittal.core.events.result import GaitEvents
+from sagittal.core.frames import SIDES, SUFFIX
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import angle_between
+from sagittal.core.simulate import (
     PATIENTS,
     SCRIPTS,
     Arc,
@@ -30,11 +30,11 @@ from core.simulate import (
     WalkTruth,
     simulate_scenario,
 )
-from core.simulate.human import move
-from core.simulate.script import Script, plan
-from core.simulate.truth import truth_of
-from core.simulate.walker import REFERENCE_HEIGHT_M
-from core.timeline import synchronise
+from sagittal.core.simulate.human import move
+from sagittal.core.simulate.script import Script, plan
+from sagittal.core.simulate.truth import truth_of
+from sagittal.core.simulate.walker import REFERENCE_HEIGHT_M
+from sagittal.core.timeline import synchronise
 from tests.helpers.event_scoring import match
 from tests.helpers.gait_features import Features, features
 from tests.helpers.marks import sweep_after

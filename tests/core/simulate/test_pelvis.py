@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.frames import SIDES, Floats, Side
-from core.rotation import rotate
-from core.simulate.curves import PELVIS_TILT
-from core.simulate.pelvis import (
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.rotation import rotate
+from sagittal.core.simulate.curves import PELVIS_TILT
+from sagittal.core.simulate.pelvis import (
     compute_pelvis_height,
     floor_path,
     guard,
@@ -16,9 +16,9 @@ from core.simulate.pelvis import (
     load_share,
     orient_pelvis,
 )
-from core.simulate.script import Stand, Straight, plan
-from core.simulate.timing import amplitude, body_phase, foot_timing
-from core.simulate.walker import STEADY, SideGait, Walker, leg_reach
+from sagittal.core.simulate.script import Stand, Straight, plan
+from sagittal.core.simulate.timing import amplitude, body_phase, foot_timing
+from sagittal.core.simulate.walker import STEADY, SideGait, Walker, leg_reach
 
 RATE = 100.0
 WALKER = Walker(variability=STEADY)

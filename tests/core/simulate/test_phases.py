@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from core.simulate.phases import Phase, phase_table
+from sagittal.core.simulate.phases import Phase, phase_table
 
 
 def test_phases_are_columns_in_their_order() -> None:

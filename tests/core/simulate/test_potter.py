@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.frames import GRAVITY, SIDES
-from core.rotation import angle_between, exp, multiply, rotate
-from core.simulate.potter import ACC_SD, GYR_SD, LEG, STRIDE_M, PotterWalk, potter_walk
+from sagittal.core.frames import GRAVITY, SIDES
+from sagittal.core.rotation import angle_between, exp, multiply, rotate
+from sagittal.core.simulate.potter import ACC_SD, GYR_SD, LEG, STRIDE_M, PotterWalk, potter_walk
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.frames import Floats, Segment
-from core.simulate import Dropout, Lag, RecordingSetup, Simulation, Stand, Straight, simulate
-from core.timeline import synchronise
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.simulate import Dropout, Lag, RecordingSetup, Simulation, Stand, Straight, simulate
+from sagittal.core.timeline import synchronise
 
 SCRIPT = (Stand(3.0), Straight(6.4, 0.64, 0.54), Stand(2.0))
 EXACT = RecordingSetup(noise=None, mount_spread_rad=0.0)

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.simulate import STEADY, Arc, Pivot, Script, Stand, Straight, Walker
-from core.simulate.script import plan, scale_script
+from sagittal.core.errors import ParameterError
+from sagittal.core.simulate import STEADY, Arc, Pivot, Script, Stand, Straight, Walker
+from sagittal.core.simulate.script import plan, scale_script
 
 
 def _plan(script: Script) -> tuple[list[float], list[float]]:

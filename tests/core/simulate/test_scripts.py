@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from core.errors import ParameterError
-from core.frames import SIDES
-from core.simulate import simulate_scenario
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import SIDES
+from sagittal.core.simulate import simulate_scenario
 
 SHORT = ["comfortable", "slow", "fast_with_turns", "figure_of_eight", "lost_sensor"]
 

@@ -5,10 +5,10 @@ import hashlib
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.frames import FOOT, GRAVITY, SIDES, Floats, Segment
-from core.rotation import angle_between, conjugate, exp, multiply, rotate
-from core.simulate import (
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import FOOT, GRAVITY, SIDES, Floats, Segment
+from sagittal.core.rotation import angle_between, conjugate, exp, multiply, rotate
+from sagittal.core.simulate import (
     Dropout,
     Pivot,
     RecordingSetup,
@@ -20,9 +20,9 @@ from core.simulate import (
     Walker,
     simulate,
 )
-from core.simulate.mems import add_sensor_errors
-from core.simulate.sensors import SimulatedSignals
-from core.simulate.soft_tissue import SoftTissue
+from sagittal.core.simulate.mems import add_sensor_errors
+from sagittal.core.simulate.sensors import SimulatedSignals
+from sagittal.core.simulate.soft_tissue import SoftTissue
 
 SHORT: Script = (Stand(3.0), Straight(5.0, 0.6, 0.54), Stand(2.0))
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.frames import GRAVITY
-from core.simulate.script import Stand, Straight
-from core.simulate.setup import RecordingSetup
-from core.simulate.simulation import Simulation, simulate
-from core.simulate.walker import Walker
+from sagittal.core.frames import GRAVITY
+from sagittal.core.simulate.script import Stand, Straight
+from sagittal.core.simulate.setup import RecordingSetup
+from sagittal.core.simulate.simulation import Simulation, simulate
+from sagittal.core.simulate.walker import Walker
 
 SCRIPT = (Stand(1.0), Straight(1.8, 0.6, 0.5), Stand(1.0))
 

@@ -5,11 +5,11 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.frames import Segment
-from core.rotation import angle_between
-from core.simulate import RecordingSetup, SoftTissue, Stand, Straight, simulate
-from core.simulate.human import Motion
-from core.simulate.soft_tissue import skin_motion
+from sagittal.core.frames import Segment
+from sagittal.core.rotation import angle_between
+from sagittal.core.simulate import RecordingSetup, SoftTissue, Stand, Straight, simulate
+from sagittal.core.simulate.human import Motion
+from sagittal.core.simulate.soft_tissue import skin_motion
 
 STIFF = np.array([1.0, 0.0, 0.0, 0.0])
 

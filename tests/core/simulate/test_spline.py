@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.rotation import about, multiply
-from core.simulate.spline import differentiate_pose, sign_continuous
+from sagittal.core.rotation import about, multiply
+from sagittal.core.simulate.spline import differentiate_pose, sign_continuous
 
 
 def test_a_turning_body_on_a_circle_has_the_textbook_signals() -> None:

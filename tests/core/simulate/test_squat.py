@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.frames import FOOT, GRAVITY, SHANK, SIDES, THIGH, Segment
-from core.rotation import rotate
-from core.simulate import RecordingSetup, SoftTissue, Squats, SquatSimulation, simulate_squats
-from core.simulate.walker import REFERENCE_HEIGHT_M, Anatomy
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import FOOT, GRAVITY, SHANK, SIDES, THIGH, Segment
+from sagittal.core.rotation import rotate
+from sagittal.core.simulate import RecordingSetup, SoftTissue, Squats, SquatSimulation, simulate_squats
+from sagittal.core.simulate.walker import REFERENCE_HEIGHT_M, Anatomy
 
 EXACT = RecordingSetup(noise=None, mount_spread_rad=0.0)
 EQUAL = Squats(spread=0.0)

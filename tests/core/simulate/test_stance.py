@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.frames import SIDES, Floats
-from core.rotation import rotate
-from core.simulate.curves import FOOT_PITCH
-from core.simulate.script import Stand, Straight, plan
-from core.simulate.stance import Q_NEUTRAL, Sole, StanceFoot, foot_orientation
-from core.simulate.timing import foot_timing
-from core.simulate.walker import STEADY, SideGait, Walker
+from sagittal.core.frames import SIDES, Floats
+from sagittal.core.rotation import rotate
+from sagittal.core.simulate.curves import FOOT_PITCH
+from sagittal.core.simulate.script import Stand, Straight, plan
+from sagittal.core.simulate.stance import Q_NEUTRAL, Sole, StanceFoot, foot_orientation
+from sagittal.core.simulate.timing import foot_timing
+from sagittal.core.simulate.walker import STEADY, SideGait, Walker
 
 RATE = 200.0
 WALKER = Walker(variability=STEADY)

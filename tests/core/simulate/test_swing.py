@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.frames import SIDES
-from core.rotation import rotate
-from core.simulate.human import Motion, move
-from core.simulate.pelvis import hip_offset
-from core.simulate.script import Stand, Straight, plan
-from core.simulate.shapes import bump
-from core.simulate.stance import StanceFoot, foot_orientation
-from core.simulate.swing import MOST_LIFT, ROLL, FootMotion, foot_motion
-from core.simulate.walker import STEADY, SideGait, Walker, leg_reach
+from sagittal.core.frames import SIDES
+from sagittal.core.rotation import rotate
+from sagittal.core.simulate.human import Motion, move
+from sagittal.core.simulate.pelvis import hip_offset
+from sagittal.core.simulate.script import Stand, Straight, plan
+from sagittal.core.simulate.shapes import bump
+from sagittal.core.simulate.stance import StanceFoot, foot_orientation
+from sagittal.core.simulate.swing import MOST_LIFT, ROLL, FootMotion, foot_motion
+from sagittal.core.simulate.walker import STEADY, SideGait, Walker, leg_reach
 
 RATE = 200.0
 WALKER = Walker(variability=STEADY)

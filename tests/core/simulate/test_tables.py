@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.frames import SIDES
-from core.simulate.script import Stand, Straight
-from core.simulate.simulation import simulate
-from core.simulate.tables import angle_table, event_table, stride_table
+from sagittal.core.frames import SIDES
+from sagittal.core.simulate.script import Stand, Straight
+from sagittal.core.simulate.simulation import simulate
+from sagittal.core.simulate.tables import angle_table, event_table, stride_table
 
 TRUTH = simulate((Stand(2.0), Straight(3.0, 0.6, 0.5), Stand(1.0)), seed=1).truth
 

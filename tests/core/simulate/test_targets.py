@@ -7,10 +7,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from core.frames import Floats
-from core.simulate.curves import ANKLE_DORSIFLEXION, HIP_ADDUCTION, HIP_FLEXION, KNEE_FLEXION
-from core.simulate.targets import DEGREE, ankle_dorsiflexion, hip_adduction, hip_flexion, knee_flexion
-from core.simulate.walker import SideGait
+from sagittal.core.frames import Floats
+from sagittal.core.simulate.curves import ANKLE_DORSIFLEXION, HIP_ADDUCTION, HIP_FLEXION, KNEE_FLEXION
+from sagittal.core.simulate.targets import (
+    DEGREE,
+    ankle_dorsiflexion,
+    hip_adduction,
+    hip_flexion,
+    knee_flexion,
+)
+from sagittal.core.simulate.walker import SideGait
 
 PHASE = np.arange(100) / 100.0
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.frames import SIDES, Side
-from core.simulate.script import Footprint, Plan, Script, Stand, Straight, plan
-from core.simulate.timing import (
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.simulate.script import Footprint, Plan, Script, Stand, Straight, plan
+from sagittal.core.simulate.timing import (
     RELEASE_PHASE,
     STANDING_PHASE,
     amplitude,
@@ -16,7 +16,7 @@ from core.simulate.timing import (
     gait_phase,
     size_window,
 )
-from core.simulate.walker import STEADY, SideGait, Walker
+from sagittal.core.simulate.walker import STEADY, SideGait, Walker
 
 STEP_S, RATE = 0.5, 100.0
 WALKER = Walker(variability=STEADY)

@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.angles.measure import measure_angles
-from core.frames import SIDES, SUFFIX
-from core.fusion.orientations import Orientations
-from core.simulate import Simulation, angle_table, event_table, stride_table
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.frames import SIDES, SUFFIX
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.simulate import Simulation, angle_table, event_table, stride_table
 
 
 @pytest.mark.slow

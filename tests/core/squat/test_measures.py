@@ -9,22 +9,22 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.angles import JointAngles
-from core.angles.measure import measure_angles
-from core.body.chain.leg import LegMotion, estimate_leg
-from core.calibration.fixed_offset import make_fixed_mounts
-from core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
-from core.calibration.result import CalibratedRecording
-from core.errors import ParameterError
-from core.frames import Floats, Side
-from core.parameters.symmetry import compare_sides
-from core.simulate import SquatSimulation
-from core.simulate.mems import MEMS
-from core.simulate.squat_chain import measure_leg
-from core.squat.curves import CURVES, VALGUS
-from core.squat.measures import MEASURES, SquatSide, measure_squats
-from core.squat.repetitions import RepetitionParams, find_repetitions
-from core.timeline import synchronise
+from sagittal.core.angles import JointAngles
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body.chain.leg import LegMotion, estimate_leg
+from sagittal.core.calibration.fixed_offset import make_fixed_mounts
+from sagittal.core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats, Side
+from sagittal.core.parameters.symmetry import compare_sides
+from sagittal.core.simulate import SquatSimulation
+from sagittal.core.simulate.mems import MEMS
+from sagittal.core.simulate.squat_chain import measure_leg
+from sagittal.core.squat.curves import CURVES, VALGUS
+from sagittal.core.squat.measures import MEASURES, SquatSide, measure_squats
+from sagittal.core.squat.repetitions import RepetitionParams, find_repetitions
+from sagittal.core.timeline import synchronise
 from tests.core.body.chain.squats import HEIGHT_M, squat_on
 
 RATE = 100.0

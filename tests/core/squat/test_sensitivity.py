@@ -9,19 +9,19 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.body.chain.leg import estimate_leg
-from core.calibration.fixed_offset import make_fixed_mounts
-from core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
-from core.calibration.result import CalibratedRecording
-from core.errors import EstimationError, ParameterError
-from core.frames import SIDES
-from core.rotation import about, to_matrix
-from core.simulate import RecordingSetup, Squats, simulate_squats
-from core.simulate.mems import MEMS
-from core.simulate.squat_chain import measure_leg, place_as_agreed
-from core.simulate.truth import joint_angles
-from core.squat.joints import JOINTS, name_joint_angles
-from core.squat.sensitivity import (
+from sagittal.core.body.chain.leg import estimate_leg
+from sagittal.core.calibration.fixed_offset import make_fixed_mounts
+from sagittal.core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.frames import SIDES
+from sagittal.core.rotation import about, to_matrix
+from sagittal.core.simulate import RecordingSetup, Squats, simulate_squats
+from sagittal.core.simulate.mems import MEMS
+from sagittal.core.simulate.squat_chain import measure_leg, place_as_agreed
+from sagittal.core.simulate.truth import joint_angles
+from sagittal.core.squat.joints import JOINTS, name_joint_angles
+from sagittal.core.squat.sensitivity import (
     PARAMETERS,
     ReferenceAngles,
     SensitivityTable,
@@ -31,7 +31,7 @@ from core.squat.sensitivity import (
     average_sensitivity,
     make_case,
 )
-from core.timeline import synchronise
+from sagittal.core.timeline import synchronise
 from tests.core.body.chain.squats import HEIGHT_M, squat_on
 
 
@@ -106,7 +106,7 @@ def test_a_change_is_that_of_equation_1() -> None:
 
 
 def analyse_errors(off: SquatCase) -> np.ndarray:
-    from core.squat.sensitivity import _run
+    from sagittal.core.squat.sensitivity import _run
 
     return _run(off, off.geometry, off.mounts, None)
 

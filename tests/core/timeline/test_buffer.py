@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from core.timeline.buffer import SampleBuffer
-from core.timeline.params import TimelineParams
+from sagittal.core.timeline.buffer import SampleBuffer
+from sagittal.core.timeline.params import TimelineParams
 
 RATE = 100.0
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.frames import Segment
-from core.timeline.columns import find_columns, take_columns
+from sagittal.core.frames import Segment
+from sagittal.core.timeline.columns import find_columns, take_columns
 
 THERE: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.frames import Bools, Floats
-from core.timeline.grid import lay_signal
-from core.timeline.params import TimelineParams
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.timeline.grid import lay_signal
+from sagittal.core.timeline.params import TimelineParams
 
 RATE = 100.0
 

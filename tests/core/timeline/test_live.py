@@ -12,13 +12,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from core.errors import Notice, SignalError
-from core.formats import SourceFile, read_recording
-from core.formats.live_log import SampleBatch, SensorInfo, StreamInfo
-from core.frames import Bools, Floats, Segment
-from core.recording import UniformRecording
-from core.timeline import synchronise
-from core.timeline.live import LiveAxis, UniformBlock, compile_axis_kernels
+from sagittal.core.errors import Notice, SignalError
+from sagittal.core.formats import SourceFile, read_recording
+from sagittal.core.formats.live_log import SampleBatch, SensorInfo, StreamInfo
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.recording import UniformRecording
+from sagittal.core.timeline import synchronise
+from sagittal.core.timeline.live import LiveAxis, UniformBlock, compile_axis_kernels
 from tests.helpers.live import Device, LiveTake, Samples, send, shared
 from tests.helpers.walks import cut, neura_recording
 

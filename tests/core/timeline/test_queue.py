@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.formats.live_hello import SensorInfo, StreamInfo
-from core.formats.live_log import SampleBatch
-from core.timeline.queue import LONGEST_SPAN_US, StreamQueue
+from sagittal.core.formats.live_hello import SensorInfo, StreamInfo
+from sagittal.core.formats.live_log import SampleBatch
+from sagittal.core.timeline.queue import LONGEST_SPAN_US, StreamQueue
 
 INFO = StreamInfo(
     4, 100.0, "shared", (SensorInfo("a", "pelvis"), SensorInfo("b", None), SensorInfo("c", "foot_l"))

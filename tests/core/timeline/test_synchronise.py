@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.errors import Notice, SignalError
-from core.formats import SourceFile, read_recording
-from core.frames import Floats, Segment
-from core.recording import ImuStream, SensorSignals
-from core.timeline import TimelineParams, synchronise
+from sagittal.core.errors import Notice, SignalError
+from sagittal.core.formats import SourceFile, read_recording
+from sagittal.core.frames import Floats, Segment
+from sagittal.core.recording import ImuStream, SensorSignals
+from sagittal.core.timeline import TimelineParams, synchronise
 from tests.core.formats.making import signals, stream, take
 from tests.core.formats.test_samples import gaitmap
 from tests.data import data_folder

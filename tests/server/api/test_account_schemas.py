@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from server.api import account_schemas as schemas
-from server.auth.api_tokens import MOST_DAYS
-from server.auth.passwords import MAX_LENGTH, MIN_LENGTH
+from sagittal.server.api import account_schemas as schemas
+from sagittal.server.auth.api_tokens import MOST_DAYS
+from sagittal.server.auth.passwords import MAX_LENGTH, MIN_LENGTH
 
 LONG = "x" * MIN_LENGTH
 

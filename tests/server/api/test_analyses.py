@@ -12,9 +12,9 @@ import httpx
 import pyarrow.parquet as pq
 import pytest
 
-from core.simulate import Stand, Straight, mt_files, simulate
-from server.processes.supervisor import Workers
-from server.services import checks
+from sagittal.core.simulate import Stand, Straight, mt_files, simulate
+from sagittal.server.processes.supervisor import Workers
+from sagittal.server.services import checks
 from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio

@@ -7,7 +7,7 @@ import zipfile
 
 import pytest
 
-from server.services import patients, sessions
+from sagittal.server.services import patients, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from server import audit
+from sagittal.server import audit
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

@@ -12,17 +12,17 @@ from typing import Any
 import pytest
 import websockets
 
-from server import audit
-from server.auth.roles import Action
-from server.auth.routes import list_declared_actions
-from server.auth.tokens import token_hash
-from server.jobs.queue import Claim
-from server.pages.shell import FRAGMENT
-from server.services import patients, reference_files, sessions, signed_reports, tunings, videos
-from server.services.signed_reports import DOCUMENT, PSEUDONYMISED
-from server.storage.field_cipher import make_keys
-from server.storage.tables import job, new_id, tuning
-from server.trail import MOST_REFUSED, QUIET_S, AuditTrail
+from sagittal.server import audit
+from sagittal.server.auth.roles import Action
+from sagittal.server.auth.routes import list_declared_actions
+from sagittal.server.auth.tokens import token_hash
+from sagittal.server.jobs.queue import Claim
+from sagittal.server.pages.shell import FRAGMENT
+from sagittal.server.services import patients, reference_files, sessions, signed_reports, tunings, videos
+from sagittal.server.services.signed_reports import DOCUMENT, PSEUDONYMISED
+from sagittal.server.storage.field_cipher import make_keys
+from sagittal.server.storage.tables import job, new_id, tuning
+from sagittal.server.trail import MOST_REFUSED, QUIET_S, AuditTrail
 from tests.helpers.engines import on_both_engines
 from tests.server import analysed, walk
 from tests.server.clinic import PASSWORD, Clinic, open_clinic

@@ -11,11 +11,11 @@ from typing import Any
 import httpx
 import pytest
 
-from core.simulate import Stand, Straight, mt_files, simulate
-from server.processes.supervisor import Workers
-from server.services import checks
-from server.services.sweep import sweep
-from server.storage.readiness import Readiness
+from sagittal.core.simulate import Stand, Straight, mt_files, simulate
+from sagittal.server.processes.supervisor import Workers
+from sagittal.server.services import checks
+from sagittal.server.services.sweep import sweep
+from sagittal.server.storage.readiness import Readiness
 from tests.helpers.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
 from tests.server.clinic import Clinic, open_clinic
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from server.services import patients, programmes, sessions
-from server.storage.tables import new_id
+from sagittal.server.services import patients, programmes, sessions
+from sagittal.server.storage.tables import new_id
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

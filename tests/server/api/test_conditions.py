@@ -11,9 +11,17 @@ from typing import Any
 
 import pytest
 
-from core.condition import USUAL
-from core.feedback import Cue
-from server.services import controls, live, live_training, patients, prescriptions, programmes, sessions
+from sagittal.core.condition import USUAL
+from sagittal.core.feedback import Cue
+from sagittal.server.services import (
+    controls,
+    live,
+    live_training,
+    patients,
+    prescriptions,
+    programmes,
+    sessions,
+)
 from tests.server import analysed, feedback
 from tests.server.clinic import Clinic
 

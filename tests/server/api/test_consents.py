@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from server.services import patients
-from server.storage.tables import now
+from sagittal.server.services import patients
+from sagittal.server.storage.tables import now
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

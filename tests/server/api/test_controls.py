@@ -8,8 +8,8 @@ from typing import Any
 import httpx
 import pytest
 
-from core.simulate import Stand, Straight, mt_files, simulate
-from server.processes.supervisor import Workers
+from sagittal.core.simulate import Stand, Straight, mt_files, simulate
+from sagittal.server.processes.supervisor import Workers
 from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = [pytest.mark.anyio, pytest.mark.slow]

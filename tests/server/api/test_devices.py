@@ -9,10 +9,10 @@ import io
 import numpy as np
 import pytest
 
-from core.frames import GRAVITY
-from core.quality.devices import DeviceCheck
-from server.api.devices import COLUMNS
-from server.services import devices, patients, recordings, sessions
+from sagittal.core.frames import GRAVITY
+from sagittal.core.quality.devices import DeviceCheck
+from sagittal.server.api.devices import COLUMNS
+from sagittal.server.services import devices, patients, recordings, sessions
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

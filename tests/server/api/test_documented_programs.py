@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from core.simulate import Stand, Straight, mt_files, simulate
-from server.processes.supervisor import Workers
+from sagittal.core.simulate import Stand, Straight, mt_files, simulate
+from sagittal.server.processes.supervisor import Workers
 from tests.data import ROOT
 from tests.server.clinic import PASSWORD, open_clinic
 from tests.server.serving import serve

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from server.api.documents import openapi
+from sagittal.server.api.documents import openapi
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

@@ -6,7 +6,7 @@ from urllib.parse import unquote
 
 import pytest
 
-from server.api.downloads import attachment, write_disposition
+from sagittal.server.api.downloads import attachment, write_disposition
 
 
 @pytest.mark.parametrize(

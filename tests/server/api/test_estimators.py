@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from core.estimators import BY_NAME, ESTIMATORS
+from sagittal.core.estimators import BY_NAME, ESTIMATORS
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

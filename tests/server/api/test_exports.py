@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from core.formats.source import SourceFile
-from server.commands.export import export
-from server.jobs.queue import EXPORT
-from server.main import main
-from server.services import analyses, exports
+from sagittal.core.formats.source import SourceFile
+from sagittal.server.commands.export import export
+from sagittal.server.jobs.queue import EXPORT
+from sagittal.server.main import main
+from sagittal.server.services import analyses, exports
 from tests.helpers.engines import on_both_engines
 from tests.server import analysed
 from tests.server.clinic import Clinic

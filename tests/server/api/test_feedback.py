@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from core.feedback import Baseline, Cue, FeedbackEngine, Prescription
-from server.services import analyses, edit_log, prescriptions
+from sagittal.core.feedback import Baseline, Cue, FeedbackEngine, Prescription
+from sagittal.server.services import analyses, edit_log, prescriptions
 from tests.helpers.feedback import Walked
 from tests.server import feedback
 from tests.server.clinic import Clinic

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from core.feedback import Prescription
-from server.api.feedback_schemas import Feedback, PrescriptionNew, TargetNew
+from sagittal.core.feedback import Prescription
+from sagittal.server.api.feedback_schemas import Feedback, PrescriptionNew, TargetNew
 
 WRITTEN = {"parameter": "stance_pct", "side": "left", "target": {"source": "manual", "mean": 62.0, "sd": 2.0}}
 

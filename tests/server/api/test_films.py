@@ -12,9 +12,9 @@ from typing import Any
 import httpx
 import pytest
 
-from server.live.client import stream
-from server.services import films, live, sweep
-from server.storage import segments
+from sagittal.server.live.client import stream
+from sagittal.server.services import films, live, sweep
+from sagittal.server.storage import segments
 from tests.helpers.live_clinic import Visit, visit
 from tests.helpers.live_takes import HELLO, frame
 from tests.server.clinic import Clinic, open_clinic

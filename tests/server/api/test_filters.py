@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from server.jobs.queue import COMPARE_FILTERS
-from server.report.filter_list import FILTERS
-from server.services import filter_runs, patients, sessions
+from sagittal.server.jobs.queue import COMPARE_FILTERS
+from sagittal.server.report.filter_list import FILTERS
+from sagittal.server.services import filter_runs, patients, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from server.storage.readiness import Readiness
+from sagittal.server.storage.readiness import Readiness
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from server.auth import api_tokens
-from server.auth.api_tokens import Scope
-from server.services import signed_reports
-from server.services.signed_reports import DOCUMENT, PSEUDONYMISED
-from server.storage.field_cipher import make_keys
-from server.storage.tables import session
+from sagittal.server.auth import api_tokens
+from sagittal.server.auth.api_tokens import Scope
+from sagittal.server.services import signed_reports
+from sagittal.server.services.signed_reports import DOCUMENT, PSEUDONYMISED
+from sagittal.server.storage.field_cipher import make_keys
+from sagittal.server.storage.tables import session
 from tests.server import analysed, crowd
 from tests.server.clinic import Clinic, open_clinic
 

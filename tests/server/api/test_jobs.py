@@ -7,10 +7,10 @@ from collections.abc import AsyncIterator
 import httpx
 import pytest
 
-from server.api.jobs import _events
-from server.auth import access
-from server.jobs.feed import JobFeed
-from server.jobs.queue import Claim, JobView
+from sagittal.server.api.jobs import _events
+from sagittal.server.auth import access
+from sagittal.server.jobs.feed import JobFeed
+from sagittal.server.jobs.queue import Claim, JobView
 from tests.helpers.engines import on_both_engines
 from tests.server.clinic import Clinic
 from tests.server.serving import serve

@@ -14,11 +14,11 @@ import websockets
 from sqlalchemy import select, update
 from sqlalchemy.exc import IntegrityError
 
-from server.auth.throttle import MAX_PER_PAIR, Throttle
-from server.services import patients, sessions
-from server.services.live import ALPHABET
-from server.storage.live_tables import live_event, live_take
-from server.storage.tables import now, prescription, recording
+from sagittal.server.auth.throttle import MAX_PER_PAIR, Throttle
+from sagittal.server.services import patients, sessions
+from sagittal.server.services.live import ALPHABET
+from sagittal.server.storage.live_tables import live_event, live_take
+from sagittal.server.storage.tables import now, prescription, recording
 from tests.helpers.live_clinic import closed, heard, new_session, open_code, visit
 from tests.helpers.live_takes import finish_text, frame
 from tests.server.clinic import Clinic, open_clinic
@@ -227,7 +227,7 @@ async def test_commands_are_checked_kept_and_shown(clinic: Clinic, port: int) ->
 async def test_ending_the_sign_in_ends_the_feed(
     clinic: Clinic, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.auth.access.CHECK_EVERY_S", 0.05)
+    monkeypatch.setattr("sagittal.server.auth.access.CHECK_EVERY_S", 0.05)
     async with visit(clinic, port) as v:
         token = clinic.token("clinician")
         url = f"ws://127.0.0.1:{port}/sessions/{v.session}/live/feed"
@@ -242,7 +242,7 @@ async def test_ending_the_sign_in_ends_the_feed(
 async def test_leaving_the_care_team_ends_the_feed_and_says_so(
     clinic: Clinic, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.auth.access.CHECK_EVERY_S", 0.05)
+    monkeypatch.setattr("sagittal.server.auth.access.CHECK_EVERY_S", 0.05)
     async with visit(clinic, port) as v, clinic.client("admin") as admin:
         url = f"ws://127.0.0.1:{port}/sessions/{v.session}/live/feed"
         cookie = {"Cookie": f"sid={clinic.token('clinician')}"}

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator
 import pytest
 import websockets
 
-from server.api.live_feed import GONE
+from sagittal.server.api.live_feed import GONE
 from tests.helpers.live_clinic import closed, heard, visit
 from tests.server.clinic import Clinic
 from tests.server.serving import serve

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from server.api.live_schemas import FilmBeginning, LiveCommand, LiveSensor, PairingCode
-from server.live.sensors import sensor_rows
+from sagittal.server.api.live_schemas import FilmBeginning, LiveCommand, LiveSensor, PairingCode
+from sagittal.server.live.sensors import sensor_rows
 from tests.helpers.live_takes import HELLO
 
 

@@ -9,8 +9,8 @@ import re
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from server.services import backup_schedule
-from server.services.backup_schedule import BackupState, Outcome
+from sagittal.server.services import backup_schedule
+from sagittal.server.services.backup_schedule import BackupState, Outcome
 from tests.data import ROOT
 from tests.server.clinic import PASSWORD, Clinic
 

@@ -6,11 +6,11 @@ import datetime as dt
 
 import pytest
 
-from server.auth import accounts
-from server.auth.identity import Identity
-from server.auth.roles import Role
-from server.services import notes, patients
-from server.storage.tables import now
+from sagittal.server.auth import accounts
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Role
+from sagittal.server.services import notes, patients
+from sagittal.server.storage.tables import now
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

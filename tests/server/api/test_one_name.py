@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import pytest
 
-from server.pages.shell import FRAGMENT
-from server.report.exports import angles_parquet
-from server.services import patients, sessions
-from server.storage.tables import new_id
+from sagittal.server.pages.shell import FRAGMENT
+from sagittal.server.report.exports import angles_parquet
+from sagittal.server.services import patients, sessions
+from sagittal.server.storage.tables import new_id
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic
 

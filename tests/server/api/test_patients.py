@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from server import audit
-from server.api.documents import openapi
+from sagittal.server import audit
+from sagittal.server.api.documents import openapi
 from tests.helpers.engines import on_both_engines
 from tests.server.clinic import Clinic
 

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from core.feedback import Baseline, FeedbackEngine, Prescription
-from core.parameters.result import Parameter
-from server.services import prescriptions
-from server.services.histories import list_analysed
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.tables import audit
+from sagittal.core.feedback import Baseline, FeedbackEngine, Prescription
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.services import prescriptions
+from sagittal.server.services.histories import list_analysed
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.tables import audit
 from tests.helpers.engines import on_both_engines
 from tests.helpers.feedback import prescription, train
 from tests.server import feedback

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
-from core.errors import SagittalError, SignalError
-from server.auth.access import require
-from server.auth.roles import Action
-from server.http.problems import Problem, as_problem
-from server.services.errors import NotFound
-from server.storage import sqlite_file
+from sagittal.core.errors import SagittalError, SignalError
+from sagittal.server.auth.access import require
+from sagittal.server.auth.roles import Action
+from sagittal.server.http.problems import Problem, as_problem
+from sagittal.server.services.errors import NotFound
+from sagittal.server.storage import sqlite_file
 from tests.helpers.marks import sqlite_only
 from tests.server.clinic import Clinic, open_clinic
 

@@ -6,8 +6,8 @@ import datetime as dt
 
 import pytest
 
-from server.services import patients, sessions
-from server.storage.tables import now
+from sagittal.server.services import patients, sessions
+from sagittal.server.storage.tables import now
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

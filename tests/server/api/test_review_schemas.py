@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from server.api.review_schemas import EditAnswer, EditNew
+from sagittal.server.api.review_schemas import EditAnswer, EditNew
 
 MOVE = {"kind": "move_event", "side": "left", "event": "ic", "time_s": 1.5, "to_s": 1.52}
 

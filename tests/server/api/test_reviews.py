@@ -10,10 +10,10 @@ from typing import Any
 import httpx
 import pytest
 
-from server.report.exports import analysis_files
-from server.report.tracks import NAME, tracks_parquet
-from server.services import patients, sessions
-from server.storage.tables import new_id
+from sagittal.server.report.exports import analysis_files
+from sagittal.server.report.tracks import NAME, tracks_parquet
+from sagittal.server.services import patients, sessions
+from sagittal.server.storage.tables import new_id
 from tests.helpers.engines import on_both_engines
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic

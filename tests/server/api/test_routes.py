@@ -6,9 +6,9 @@ import pytest
 from fastapi import APIRouter, FastAPI
 from starlette.routing import Match
 
-from server.api.routes import BESIDE, build_api
-from server.auth.roles import Action
-from server.auth.routes import list_declared_actions
+from sagittal.server.api.routes import BESIDE, build_api
+from sagittal.server.auth.roles import Action
+from sagittal.server.auth.routes import list_declared_actions
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

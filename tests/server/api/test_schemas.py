@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from server.api import schemas
-from server.services.signed_reports import ASSESSMENT_CHARACTERS
-from server.storage.tables import now
+from sagittal.server.api import schemas
+from sagittal.server.services.signed_reports import ASSESSMENT_CHARACTERS
+from sagittal.server.storage.tables import now
 
 LINE: TypeAdapter[str] = TypeAdapter(schemas.Line)
 CODE: TypeAdapter[str] = TypeAdapter(schemas.Code)

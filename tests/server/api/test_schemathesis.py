@@ -11,10 +11,10 @@ import pytest
 import schemathesis
 from schemathesis.python import asgi
 
-from server.api.documents import openapi
-from server.app import create_app
-from server.services import patients, recordings, sessions
-from server.settings import Settings
+from sagittal.server.api.documents import openapi
+from sagittal.server.app import create_app
+from sagittal.server.services import patients, recordings, sessions
+from sagittal.server.settings import Settings
 from tests.helpers.databases import write_database
 from tests.helpers.marks import sweep_after
 from tests.server.clinic import Clinic

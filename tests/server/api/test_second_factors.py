@@ -5,7 +5,7 @@ from __future__ import annotations
 import pyotp
 import pytest
 
-from server.auth.throttle import Throttle
+from sagittal.server.auth.throttle import Throttle
 from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio

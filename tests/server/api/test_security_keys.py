@@ -6,8 +6,8 @@ import httpx
 import pyotp
 import pytest
 
-from server.auth import second_factor
-from server.auth.throttle import Throttle
+from sagittal.server.auth import second_factor
+from sagittal.server.auth.throttle import Throttle
 from tests.server.auth.soft_key import SoftKey
 from tests.server.clinic import PASSWORD, Clinic
 

@@ -8,16 +8,16 @@ from typing import Any
 
 import pytest
 
-from core.angles import JointAngles
-from core.formats import write_recording
-from core.formats.source import SourceFile
-from core.pipeline import analyse
-from core.simulate import RecordingSetup, Squats, SquatSimulation, simulate_squats
-from core.simulate.mems import MEMS
-from core.simulate.squat_chain import place_as_agreed
-from server.jobs.queue import SENSITIVITY
-from server.report.exports import analysis_files, angles_parquet
-from server.services import sensitivities, sessions
+from sagittal.core.angles import JointAngles
+from sagittal.core.formats import write_recording
+from sagittal.core.formats.source import SourceFile
+from sagittal.core.pipeline import analyse
+from sagittal.core.simulate import RecordingSetup, Squats, SquatSimulation, simulate_squats
+from sagittal.core.simulate.mems import MEMS
+from sagittal.core.simulate.squat_chain import place_as_agreed
+from sagittal.server.jobs.queue import SENSITIVITY
+from sagittal.server.report.exports import analysis_files, angles_parquet
+from sagittal.server.services import sensitivities, sessions
 from tests.core.body.chain.squats import HEIGHT_M
 from tests.server import analysed
 from tests.server.clinic import Clinic

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from server.services import patients, sessions
+from sagittal.server.services import patients, sessions
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

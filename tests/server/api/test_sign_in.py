@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from server.auth import accounts, one_time
-from server.auth.roles import POLICY, Role
-from server.auth.throttle import MAX_PER_PAIR, Throttle
-from server.storage.tables import one_time_token
+from sagittal.server.auth import accounts, one_time
+from sagittal.server.auth.roles import POLICY, Role
+from sagittal.server.auth.throttle import MAX_PER_PAIR, Throttle
+from sagittal.server.storage.tables import one_time_token
 from tests.helpers.engines import on_both_engines
 from tests.server.clinic import PASSWORD, Clinic, open_clinic
 

@@ -6,10 +6,10 @@ import datetime as dt
 
 import pytest
 
-from server.services import patients, sessions, signed_reports
-from server.services.report_links import USUAL_DAYS
-from server.services.signed_reports import ASSESSMENT_CHARACTERS, DOCUMENT, PSEUDONYMISED
-from server.storage.tables import new_id
+from sagittal.server.services import patients, sessions, signed_reports
+from sagittal.server.services.report_links import USUAL_DAYS
+from sagittal.server.services.signed_reports import ASSESSMENT_CHARACTERS, DOCUMENT, PSEUDONYMISED
+from sagittal.server.storage.tables import new_id
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

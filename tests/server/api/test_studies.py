@@ -12,7 +12,7 @@ import httpx
 import pyarrow.parquet as pq
 import pytest
 
-from server.services import study_maker
+from sagittal.server.services import study_maker
 from tests.server.api.test_exports import API, visit
 from tests.server.clinic import PASSWORD, Clinic
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.formats import SourceFile, manifest_of, read_recording
-from core.frames import GRAVITY
+from sagittal.core.formats import SourceFile, manifest_of, read_recording
+from sagittal.core.frames import GRAVITY
 from tests.core.formats.making import signals
 from tests.server.api.test_files import API, new_session
 from tests.server.clinic import Clinic

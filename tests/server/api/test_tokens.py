@@ -6,7 +6,7 @@ import datetime as dt
 
 import pytest
 
-from server.auth.throttle import Throttle
+from sagittal.server.auth.throttle import Throttle
 from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio

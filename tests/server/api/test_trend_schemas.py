@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from core.change import Change
-from core.condition import USUAL, WalkingCondition
-from server.api import trend_schemas as schemas
-from server.api.schemas import make_answer
-from server.report.trends import TrendSeries, TrendValue
+from sagittal.core.change import Change
+from sagittal.core.condition import USUAL, WalkingCondition
+from sagittal.server.api import trend_schemas as schemas
+from sagittal.server.api.schemas import make_answer
+from sagittal.server.report.trends import TrendSeries, TrendValue
 
 
 def names(kind: type[Any]) -> set[str]:

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from core.frames import Protocol
-from server.services import patients, sessions
-from server.storage.tables import new_id
+from sagittal.core.frames import Protocol
+from sagittal.server.services import patients, sessions
+from sagittal.server.storage.tables import new_id
 from tests.helpers.engines import on_both_engines
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic

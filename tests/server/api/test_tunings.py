@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from core.formats.source import SourceFile
-from server.jobs.attempt import Attempt
-from server.jobs.queue import TUNE
-from server.services import analyses, tunings
-from server.services.recordings import ANALYSE
+from sagittal.core.formats.source import SourceFile
+from sagittal.server.jobs.attempt import Attempt
+from sagittal.server.jobs.queue import TUNE
+from sagittal.server.services import analyses, tunings
+from sagittal.server.services.recordings import ANALYSE
 from tests.core.fusion.algorithms.motion import trial_bytes
 from tests.server.clinic import Clinic
 

@@ -12,7 +12,7 @@ import httpx
 import numpy as np
 import pytest
 
-from server.services import erasure, sweep, uploads
+from sagittal.server.services import erasure, sweep, uploads
 from tests.helpers.engines import on_both_engines
 from tests.server.api.test_files import API, blobs, new_session, stored_names
 from tests.server.clinic import Clinic, open_clinic

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from sqlalchemy import func, select
 
-from server.auth import accounts
-from server.auth.roles import Role
-from server.storage.tables import login_session
+from sagittal.server.auth import accounts
+from sagittal.server.auth.roles import Role
+from sagittal.server.storage.tables import login_session
 from tests.helpers.engines import on_both_engines
 from tests.server.clinic import PASSWORD, Clinic, open_clinic
 

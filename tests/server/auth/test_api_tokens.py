@@ -10,10 +10,10 @@ import httpx
 import pytest
 from sqlalchemy import select, update
 
-from server.auth.api_tokens import SCOPES, Scope
-from server.auth.roles import POLICY, Action
-from server.storage.person_tables import api_token
-from server.storage.tables import audit, now
+from sagittal.server.auth.api_tokens import SCOPES, Scope
+from sagittal.server.auth.roles import POLICY, Action
+from sagittal.server.storage.person_tables import api_token
+from sagittal.server.storage.tables import audit, now
 from tests.helpers.marks import sqlite_only
 from tests.server.clinic import PASSWORD, Clinic
 

@@ -13,16 +13,16 @@ from sqlalchemy import insert, update
 from sqlalchemy.exc import OperationalError
 from starlette.requests import HTTPConnection
 
-from server.auth import api_tokens
-from server.auth.access import find_end, wait_for_end
-from server.auth.api_tokens import SCOPES, Scope
-from server.auth.roles import POLICY, PUBLIC, Action, Role
-from server.auth.routes import list_declared_actions
-from server.auth.throttle import MAX_PER_PAIR
-from server.auth.tokens import new_token, token_hash
-from server.storage.care_tables import emergency_access
-from server.storage.person_tables import api_token, second_factor, security_key
-from server.storage.tables import login_session, metadata, new_id, user
+from sagittal.server.auth import api_tokens
+from sagittal.server.auth.access import find_end, wait_for_end
+from sagittal.server.auth.api_tokens import SCOPES, Scope
+from sagittal.server.auth.roles import POLICY, PUBLIC, Action, Role
+from sagittal.server.auth.routes import list_declared_actions
+from sagittal.server.auth.throttle import MAX_PER_PAIR
+from sagittal.server.auth.tokens import new_token, token_hash
+from sagittal.server.storage.care_tables import emergency_access
+from sagittal.server.storage.person_tables import api_token, second_factor, security_key
+from sagittal.server.storage.tables import login_session, metadata, new_id, user
 from tests.helpers.engines import on_both_engines
 from tests.server.belongings import OF_NOBODY, add_belongings, fill_address
 from tests.server.clinic import ORIGIN, PASSWORD, Clinic, open_clinic
@@ -412,7 +412,7 @@ async def test_an_open_line_ends_with_the_access(guarded: Ward) -> None:
 
 
 async def test_an_open_line_outlasts_a_database_that_is_away(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.auth.access.CHECK_EVERY_S", 0.0)
+    monkeypatch.setattr("sagittal.server.auth.access.CHECK_EVERY_S", 0.0)
     answers: list[Exception | str | None] = [OperationalError("", {}, Exception()), None, "not_found"]
 
     def find() -> str | None:

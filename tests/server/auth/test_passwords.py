@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from sqlalchemy import Connection, Engine, event
 
-from server.auth import passwords
-from server.auth.passwords import MAX_LENGTH, hash_password, verify_password
-from server.auth.throttle import (
+from sagittal.server.auth import passwords
+from sagittal.server.auth.passwords import MAX_LENGTH, hash_password, verify_password
+from sagittal.server.auth.throttle import (
     MAX_PER_ACCOUNT,
     MAX_PER_ADDRESS,
     MAX_PER_PAIR,
@@ -21,8 +21,8 @@ from server.auth.throttle import (
     SharedFailures,
     Throttle,
 )
-from server.http.problems import Problem
-from server.storage.db import Database
+from sagittal.server.http.problems import Problem
+from sagittal.server.storage.db import Database
 from tests.helpers.databases import write_database
 from tests.server.clinic import PASSWORD
 

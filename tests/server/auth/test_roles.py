@@ -8,9 +8,9 @@ from fastapi import APIRouter, Depends, FastAPI, WebSocket
 from starlette.applications import Starlette
 from starlette.routing import Mount
 
-from server.auth.access import require
-from server.auth.roles import POLICY, PUBLIC, Action, Role, is_permitted
-from server.auth.routes import UndeclaredRouteError, list_declared_actions
+from sagittal.server.auth.access import require
+from sagittal.server.auth.roles import POLICY, PUBLIC, Action, Role, is_permitted
+from sagittal.server.auth.routes import UndeclaredRouteError, list_declared_actions
 from tests.helpers.engines import on_both_engines
 from tests.server.clinic import Clinic
 from tests.server.sockets import ask_websocket

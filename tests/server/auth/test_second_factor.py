@@ -9,11 +9,11 @@ import pyotp
 import pytest
 from sqlalchemy import select
 
-from server.auth import second_factor
-from server.auth.throttle import Throttle
-from server.commands import user as user_command
-from server.storage.archive import make_key
-from server.storage.person_tables import second_factor as table
+from sagittal.server.auth import second_factor
+from sagittal.server.auth.throttle import Throttle
+from sagittal.server.commands import user as user_command
+from sagittal.server.storage.archive import make_key
+from sagittal.server.storage.person_tables import second_factor as table
 from tests.helpers.engines import tell_commands
 from tests.server.clinic import PASSWORD, Clinic
 

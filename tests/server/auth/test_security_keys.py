@@ -12,9 +12,9 @@ import pyotp
 import pytest
 from sqlalchemy import select, update
 
-from server.auth import second_factor
-from server.auth.throttle import Throttle
-from server.storage.person_tables import security_key, security_key_challenge
+from sagittal.server.auth import second_factor
+from sagittal.server.auth.throttle import Throttle
+from sagittal.server.storage.person_tables import security_key, security_key_challenge
 from tests.server.auth.soft_key import SoftKey
 from tests.server.clinic import PASSWORD, Clinic
 

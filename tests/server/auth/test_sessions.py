@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
-from server.auth import accounts
-from server.auth.roles import Role
-from server.auth.sessions import Logins
-from server.auth.tokens import token_hash
-from server.storage import sqlite_file
-from server.storage.db import Database
-from server.storage.tables import login_session, metadata
+from sagittal.server.auth import accounts
+from sagittal.server.auth.roles import Role
+from sagittal.server.auth.sessions import Logins
+from sagittal.server.auth.tokens import token_hash
+from sagittal.server.storage import sqlite_file
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import login_session, metadata
 from tests.helpers.databases import write_database
 from tests.helpers.engines import on_both_engines
 from tests.server.clinic import PASSWORD, Clinic

@@ -7,12 +7,12 @@ import datetime as dt
 import pytest
 from sqlalchemy import select, update
 
-from server.auth import sight
-from server.auth.identity import Identity
-from server.auth.roles import Role
-from server.services import care_teams, patients, sessions
-from server.storage.care_tables import emergency_access
-from server.storage.tables import now, patient
+from sagittal.server.auth import sight
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Role
+from sagittal.server.services import care_teams, patients, sessions
+from sagittal.server.storage.care_tables import emergency_access
+from sagittal.server.storage.tables import now, patient
 from tests.helpers.engines import on_both_engines
 from tests.server.clinic import Clinic
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
-from server.commands.accept import accept
-from server.services import custody
-from server.storage.high_water import explain_lost_rows, set_mark
-from server.storage.tables import audit
+from sagittal.server.commands.accept import accept
+from sagittal.server.services import custody
+from sagittal.server.storage.high_water import explain_lost_rows, set_mark
+from sagittal.server.storage.tables import audit
 from tests.faults.clinic import Clinic
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from core.formats.live_log import FILE_MARK, hello_json, record
-from server.commands.adopt import adopt
-from server.services import jobs, live_recordings, recordings
+from sagittal.core.formats.live_log import FILE_MARK, hello_json, record
+from sagittal.server.commands.adopt import adopt
+from sagittal.server.services import jobs, live_recordings, recordings
 from tests.faults.clinic import Clinic
 from tests.helpers.live_takes import HELLO, frame
 

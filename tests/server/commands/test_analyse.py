@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from server.main import main
+from sagittal.server.main import main
 
 
 def test_a_folder_for_results_is_made_before_the_work(

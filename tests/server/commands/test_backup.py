@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from server.commands.backup import backup
-from server.services import identities
-from server.services.backups import list_backups
-from server.storage.archive import make_key
-from server.storage.high_water import read_newest
+from sagittal.server.commands.backup import backup
+from sagittal.server.services import identities
+from sagittal.server.services.backups import list_backups
+from sagittal.server.storage.archive import make_key
+from sagittal.server.storage.high_water import read_newest
 from tests.faults.clinic import Clinic
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from server.main import main
+from sagittal.server.main import main
 from tests.core.fusion.algorithms.motion import trial_bytes
 
 

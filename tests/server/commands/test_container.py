@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from server.main import _parser, main
-from server.storage.compile_cache import VARIABLE
+from sagittal.server.main import _parser, main
+from sagittal.server.storage.compile_cache import VARIABLE
 from tests.test_packaging import last
 
 IMAGE = dict(part.split("=", 1) for part in shlex.split(last("ENV")))

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from server.commands.demo import _wait_for_live
-from server.services import live, patients, sessions
+from sagittal.server.commands.demo import _wait_for_live
+from sagittal.server.services import live, patients, sessions
 from tests.server.clinic import open_clinic
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from server.commands.keygen import keygen
-from server.main import main
-from server.storage.archive import read_key
+from sagittal.server.commands.keygen import keygen
+from sagittal.server.main import main
+from sagittal.server.storage.archive import read_key
 
 
 def test_the_new_key_is_said_with_its_public_half_which_alone_is_shown(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from server.commands.migrate import migrate
+from sagittal.server.commands.migrate import migrate
 from tests.faults.clinic import Clinic
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from server.commands.move_blobs import move_blobs
-from server.settings import SettingsError
-from server.storage import fs
+from sagittal.server.commands.move_blobs import move_blobs
+from sagittal.server.settings import SettingsError
+from sagittal.server.storage import fs
 from tests.faults.clinic import Clinic
 
 

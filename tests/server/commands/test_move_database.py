@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from server.commands.move_database import move_database
-from server.storage import fs
+from sagittal.server.commands.move_database import move_database
+from sagittal.server.storage import fs
 from tests.faults.clinic import Clinic
 
 NOWHERE = "postgresql://nobody@127.0.0.1:9/clinic"

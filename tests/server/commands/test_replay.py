@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from server.commands.replay import _heard, _summary, replay
-from server.live.client import StreamReport
-from server.live.playback import DueBatch
-from server.main import main
+from sagittal.server.commands.replay import _heard, _summary, replay
+from sagittal.server.live.client import StreamReport
+from sagittal.server.live.playback import DueBatch
+from sagittal.server.main import main
 
 NOBODY = "http://127.0.0.1:9"
 

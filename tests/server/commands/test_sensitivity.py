@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from core.angles import JointAngles
-from core.formats import write_recording
-from core.simulate.mems import MEMS
-from server.main import main
-from server.report.exports import angles_parquet
+from sagittal.core.angles import JointAngles
+from sagittal.core.formats import write_recording
+from sagittal.core.simulate.mems import MEMS
+from sagittal.server.main import main
+from sagittal.server.report.exports import angles_parquet
 from tests.core.body.chain.squats import squat_on
 
 

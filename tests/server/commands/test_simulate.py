@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from core.formats import SourceFile, read_recording
-from core.simulate import MOVEMENTS, SCRIPTS
-from server.commands.simulate import simulate
+from sagittal.core.formats import SourceFile, read_recording
+from sagittal.core.simulate import MOVEMENTS, SCRIPTS
+from sagittal.server.commands.simulate import simulate
 
 
 def _rows(file: Path) -> list[dict[str, str]]:

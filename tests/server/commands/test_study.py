@@ -9,9 +9,9 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from core.formats import write_recording
-from core.simulate import simulate_scenario
-from server.main import main
+from sagittal.core.formats import write_recording
+from sagittal.core.simulate import simulate_scenario
+from sagittal.server.main import main
 from tests.core.formats import vendor_files as made
 
 pytestmark = pytest.mark.sweep

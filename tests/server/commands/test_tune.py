@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from core.fusion.algorithms.tuning import GainTuner
-from server.main import main
+from sagittal.core.fusion.algorithms.tuning import GainTuner
+from sagittal.server.main import main
 from tests.core.fusion.algorithms.motion import trial_bytes
 
 SMALL = ["--particles", "3", "--iterations", "2", "--rounds", "2", "--random-rounds", "1"]

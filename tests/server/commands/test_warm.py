@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from server.main import main
-from server.storage.compile_cache import VARIABLE, has_compiled_filters
+from sagittal.server.main import main
+from sagittal.server.storage.compile_cache import VARIABLE, has_compiled_filters
 
 
 @pytest.mark.sweep

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from server.commands.worker import worker
-from server.storage import fs
+from sagittal.server.commands.worker import worker
+from sagittal.server.storage import fs
 from tests.faults.clinic import Clinic
 
 

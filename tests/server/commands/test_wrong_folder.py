@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from server.main import main
+from sagittal.server.main import main
 
 COMMANDS = (
     ["check"],

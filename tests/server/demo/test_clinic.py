@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from core.condition import is_comparable
-from core.pipeline import analyse
-from server.demo.clinic import STROKE, VISITS, VOLUNTEER, fill, record
-from server.services import patients, prescriptions, sessions
-from server.settings import Settings
-from server.storage.db import Database
-from server.storage.migrate import upgrade
+from sagittal.core.condition import is_comparable
+from sagittal.core.pipeline import analyse
+from sagittal.server.demo.clinic import STROKE, VISITS, VOLUNTEER, fill, record
+from sagittal.server.services import patients, prescriptions, sessions
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.migrate import upgrade
 
 
 @pytest.mark.sweep

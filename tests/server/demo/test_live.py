@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from core.condition import USUAL
-from core.feedback import Cue
-from server.demo.clinic import PRESCRIBED
-from server.demo.live import open_take, plan_training, stream_walk
-from server.services import live, patients, prescriptions, sessions
-from server.storage.tables import session
+from sagittal.core.condition import USUAL
+from sagittal.core.feedback import Cue
+from sagittal.server.demo.clinic import PRESCRIBED
+from sagittal.server.demo.live import open_take, plan_training, stream_walk
+from sagittal.server.services import live, patients, prescriptions, sessions
+from sagittal.server.storage.tables import session
 from tests.server.clinic import open_clinic
 from tests.server.serving import serve
 

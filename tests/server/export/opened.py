@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from core.events.edits import Edit
-from server.export.content import ExportContent, VisitFacts, open_content
+from sagittal.core.events.edits import Edit
+from sagittal.server.export.content import ExportContent, VisitFacts, open_content
 from tests.server import analysed
 
 FACTS = VisitFacts("s1", "=HYPERLINK(1)", "v1", "2026-03-02", sex="female", age_years=60, height_m=1.7)

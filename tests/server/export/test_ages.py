@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from server.export.ages import coarsen_age
+from sagittal.server.export.ages import coarsen_age
 
 
 @pytest.mark.parametrize(("age", "told"), [(None, None), (0, 0), (88, 88), (89, 89), (90, 89), (104, 89)])

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.errors import FormatError
-from core.events.edits import Edit
-from server.export.bids import write_bids
-from server.export.content import ExportContent, VisitFacts
-from server.report import signals
-from server.report.columns import floats_of
+from sagittal.core.errors import FormatError
+from sagittal.core.events.edits import Edit
+from sagittal.server.export.bids import write_bids
+from sagittal.server.export.content import ExportContent, VisitFacts
+from sagittal.server.report import signals
+from sagittal.server.report.columns import floats_of
 from tests.server import analysed
 from tests.server.export.opened import open_walk
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.errors import FormatError
-from core.events.edits import Edit
-from core.events.result import GaitEvents
-from server.export import c3d
-from server.export.content import ExportContent
+from sagittal.core.errors import FormatError
+from sagittal.core.events.edits import Edit
+from sagittal.core.events.result import GaitEvents
+from sagittal.server.export import c3d
+from sagittal.server.export.content import ExportContent
 from tests.server import walk
 from tests.server.export.opened import open_walk
 

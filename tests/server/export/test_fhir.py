@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from core.parameters.catalogue import CATALOGUE
-from core.parameters.result import Parameter
-from server.export.content import ExportContent, SignedForm
-from server.export.fhir import CODES, EARLIER, LOINC, UCUM, write_fhir
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.export.content import ExportContent, SignedForm
+from sagittal.server.export.fhir import CODES, EARLIER, LOINC, UCUM, write_fhir
 from tests.server.export.opened import open_walk
 
 models = pytest.importorskip("fhir.resources.R4B.bundle")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from core.errors import FormatError, InputError
-from server.export.kinds import write_export
+from sagittal.core.errors import FormatError, InputError
+from sagittal.server.export.kinds import write_export
 from tests.server import analysed
 from tests.server.export.opened import open_walk
 from tests.server.export.test_sheets import left_out, tables

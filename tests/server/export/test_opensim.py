@@ -9,14 +9,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from core.angles import SIGNS, JointAngles, list_leg_joints
-from core.angles.cardan import cardan_zxy, compute_headings, pelvis_angles
-from core.errors import FormatError
-from core.formats.orientation_table import read_orientation_table
-from core.frames import R_NEUTRAL, SIDES, SUFFIX, Floats, Segment
-from core.rotation import about, angle_between, conjugate, exp, from_matrix, multiply
-from server.export.kinds import write_export
-from server.export.opensim import IMU_NAMES, write_motion, write_orientations
+from sagittal.core.angles import SIGNS, JointAngles, list_leg_joints
+from sagittal.core.angles.cardan import cardan_zxy, compute_headings, pelvis_angles
+from sagittal.core.errors import FormatError
+from sagittal.core.formats.orientation_table import read_orientation_table
+from sagittal.core.frames import R_NEUTRAL, SIDES, SUFFIX, Floats, Segment
+from sagittal.core.rotation import about, angle_between, conjugate, exp, from_matrix, multiply
+from sagittal.server.export.kinds import write_export
+from sagittal.server.export.opensim import IMU_NAMES, write_motion, write_orientations
 from tests.server import analysed, walk
 from tests.server.export.opened import open_walk
 

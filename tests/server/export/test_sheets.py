@@ -9,12 +9,12 @@ import zipfile
 from dataclasses import replace
 from functools import cache
 
-from core.events.edits import Edit
-from core.parameters.catalogue import CATALOGUE
-from server.export.content import ExportContent
-from server.export.kinds import write_export
-from server.export.sheets import list_curves, list_cycles, list_events, list_notices
-from server.report.numbers import numbers_of
+from sagittal.core.events.edits import Edit
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.export.content import ExportContent
+from sagittal.server.export.kinds import write_export
+from sagittal.server.export.sheets import list_curves, list_cycles, list_events, list_notices
+from sagittal.server.report.numbers import numbers_of
 from tests.server.export.opened import open_walk
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import zipfile
 
-from server.export.tidy import write_tidy
-from server.export.zipping import EARLIEST
+from sagittal.server.export.tidy import write_tidy
+from sagittal.server.export.zipping import EARLIEST
 from tests.server.export.opened import open_walk
 
 

@@ -10,7 +10,7 @@ import openpyxl
 import pytest
 from defusedxml.ElementTree import fromstring
 
-from server.export.workbook import WIDEST, write_workbook
+from sagittal.server.export.workbook import WIDEST, write_workbook
 from tests.server.export.opened import open_walk
 from tests.server.export.test_sheets import left_out, tables
 

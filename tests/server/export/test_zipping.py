@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 
-from server.export.zipping import EARLIEST, ZipSink, zip_files
+from sagittal.server.export.zipping import EARLIEST, ZipSink, zip_files
 
 FILES = {"b/two.csv": b"1,2\n" * 1000, "a.txt": "Übung".encode()}
 

@@ -10,8 +10,8 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse
 from starlette.types import Receive, Scope, Send
 
-from server.http.body_limit import MAX_BODY_BYTES, BodyLimit
-from server.http.problems import Problem, problem_response
+from sagittal.server.http.body_limit import MAX_BODY_BYTES, BodyLimit
+from sagittal.server.http.problems import Problem, problem_response
 
 pytestmark = pytest.mark.anyio
 SESSION = "/api/v1/sessions/1"

@@ -11,7 +11,7 @@ from starlette.websockets import WebSocket
 from websockets.asyncio.client import connect
 from websockets.asyncio.server import ServerConnection, serve
 
-from server.http.carrying import Message, carry_messages
+from sagittal.server.http.carrying import Message, carry_messages
 
 pytestmark = pytest.mark.anyio
 

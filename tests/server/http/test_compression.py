@@ -13,8 +13,8 @@ import httpx
 import pytest
 from starlette.types import Receive, Scope, Send
 
-from server.http.compression import LONG_BYTES, Compression, accepts
-from server.services import analyses, patients, recordings, sessions
+from sagittal.server.http.compression import LONG_BYTES, Compression, accepts
+from sagittal.server.services import analyses, patients, recordings, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve

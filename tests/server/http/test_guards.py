@@ -8,11 +8,11 @@ import pytest
 import websockets
 from starlette.types import Receive, Scope, Send
 
-from server.auth.roles import PUBLIC
-from server.auth.routes import list_declared_actions
-from server.http.cross_site import CrossSiteGuard
-from server.http.headers import SecurityHeaders
-from server.http.hosts import HostGuard
+from sagittal.server.auth.roles import PUBLIC
+from sagittal.server.auth.routes import list_declared_actions
+from sagittal.server.http.cross_site import CrossSiteGuard
+from sagittal.server.http.headers import SecurityHeaders
+from sagittal.server.http.hosts import HostGuard
 from tests.server.clinic import Clinic
 from tests.server.serving import serve
 

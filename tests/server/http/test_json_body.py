@@ -8,7 +8,7 @@ import httpx
 import pytest
 from fastapi import APIRouter, Body, FastAPI
 
-from server.http.json_body import StrictJsonRoute
+from sagittal.server.http.json_body import StrictJsonRoute
 
 pytestmark = pytest.mark.anyio
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from server.http.local_path import local_path
+from sagittal.server.http.local_path import local_path
 
 
 @pytest.mark.parametrize("path", ["/", "/patients", "/jobs?state=done#last", "/patients/a//b", "/Prüfung"])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from starlette.responses import Response, StreamingResponse
 
-from server.http import ranges
-from server.http.ranges import answer_range
+from sagittal.server.http import ranges
+from sagittal.server.http.ranges import answer_range
 
 pytestmark = pytest.mark.anyio
 CONTENT = bytes(range(256)) * 10

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from server.log import JsonLines, request_id, start_log
-from server.settings import Settings, SettingsError
+from sagittal.server.log import JsonLines, request_id, start_log
+from sagittal.server.settings import Settings, SettingsError
 from tests.server.clinic import open_clinic
 
 pytestmark = pytest.mark.anyio
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.anyio
 async def test_each_request_is_one_object_with_its_id_and_no_name(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    caplog.set_level(logging.INFO, "server.http.requests")
+    caplog.set_level(logging.INFO, "sagittal.server.http.requests")
     async with open_clinic(tmp_path, log_format="json") as clinic, clinic.client("admin") as client:
         answer = await client.get("/api/v1/patients?search=Kanari")
     record = caplog.records[-1]

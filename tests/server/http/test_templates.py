@@ -9,8 +9,8 @@ import pytest
 from jinja2 import Environment, compiler
 from jinja2.bccache import bc_magic
 
-from server.http import templates
-from server.storage.compile_cache import VARIABLE
+from sagittal.server.http import templates
+from sagittal.server.storage.compile_cache import VARIABLE
 
 PAGE = "account.html"
 

@@ -9,11 +9,11 @@ from contextlib import closing
 
 import pytest
 
-from server.jobs import delivered
-from server.jobs.opening import open_queue
-from server.jobs.queue import Claim, Wait
-from server.jobs.table import TableQueue
-from server.storage.db import Database
+from sagittal.server.jobs import delivered
+from sagittal.server.jobs.opening import open_queue
+from sagittal.server.jobs.queue import Claim, Wait
+from sagittal.server.jobs.table import TableQueue
+from sagittal.server.storage.db import Database
 from tests.helpers.postgres import run_sql
 
 pytestmark = pytest.mark.postgres

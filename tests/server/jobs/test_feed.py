@@ -6,11 +6,11 @@ from collections.abc import Iterator
 import pytest
 from sqlalchemy import delete
 
-from server.jobs.feed import JobFeed
-from server.jobs.queue import JobView
-from server.jobs.table import TableQueue
-from server.storage.db import Database, Source
-from server.storage.tables import job
+from sagittal.server.jobs.feed import JobFeed
+from sagittal.server.jobs.queue import JobView
+from sagittal.server.jobs.table import TableQueue
+from sagittal.server.storage.db import Database, Source
+from sagittal.server.storage.tables import job
 
 
 @pytest.fixture

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 from sqlalchemy import select
 
-from server.jobs.opening import open_queue
-from server.jobs.queue import Claim, JobView, LeaseState, Priority
-from server.jobs.table import MAX_DEATHS
-from server.storage.db import Database, Source
-from server.storage.tables import job
+from sagittal.server.jobs.opening import open_queue
+from sagittal.server.jobs.queue import Claim, JobView, LeaseState, Priority
+from sagittal.server.jobs.table import MAX_DEATHS
+from sagittal.server.storage.db import Database, Source
+from sagittal.server.storage.tables import job
 from tests.helpers.databases import write_database
 
 LEASE_S = 15.0

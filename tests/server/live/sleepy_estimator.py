@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
-from server.live import estimator
-from server.live.follower import Follower
+from sagittal.server.live import estimator
+from sagittal.server.live.follower import Follower
 
 SLEEP_S = 0.6
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import pytest
 
-from core.formats.live_log import Hello
-from server.live import client
-from server.live.client import LiveError, StreamFaults, StreamReport, stream
-from server.services import live, recordings
+from sagittal.core.formats.live_log import Hello
+from sagittal.server.live import client
+from sagittal.server.live.client import LiveError, StreamFaults, StreamReport, stream
+from sagittal.server.services import live, recordings
 from tests.helpers.live_clinic import Visit, visit
 from tests.helpers.live_takes import HELLO, digest, frame, kept_in
 from tests.server.clinic import Clinic

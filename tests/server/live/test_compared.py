@@ -8,13 +8,13 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from core.errors import Notice
-from core.formats.live_log import SampleBatch
-from core.frames import Segment
-from core.online import LiveFrame, OnlineSession
-from core.simulate import simulate_scenario
-from server.live.follower import Follower
-from server.live.messages import FeedItem, FollowTake, Report
+from sagittal.core.errors import Notice
+from sagittal.core.formats.live_log import SampleBatch
+from sagittal.core.frames import Segment
+from sagittal.core.online import LiveFrame, OnlineSession
+from sagittal.core.simulate import simulate_scenario
+from sagittal.server.live.follower import Follower
+from sagittal.server.live.messages import FeedItem, FollowTake, Report
 from tests.helpers.live import send, shared
 
 FEET: dict[Segment | None, Segment] = {"foot_l": "foot_r", "foot_r": "foot_l"}

@@ -11,9 +11,9 @@ import sys
 import numpy as np
 import pytest
 
-from core.formats.live_log import decode_batch, parse_hello, record
-from server.live.protocol import FINAL, CloseCode
-from server.services import live
+from sagittal.core.formats.live_log import decode_batch, parse_hello, record
+from sagittal.server.live.protocol import FINAL, CloseCode
+from sagittal.server.services import live
 from tests.data import ROOT
 from tests.helpers.live_clinic import new_session
 from tests.server.clinic import Clinic

@@ -17,17 +17,25 @@ import pytest
 from sqlalchemy import select
 from websockets.asyncio.client import ClientConnection
 
-from core.feedback import Cue
-from core.formats.live_log import FILE_MARK, hello_json, record
-from server.live.client import StreamReport, stream
-from server.live.estimator import EstimatorWorker
-from server.live.hub import Hub
-from server.live.messages import Command, EstimateFailed, FeedItem, FollowTake, ForgetTake, LogGrown, Picture
-from server.live.messages import Report as Told
-from server.live.take import STEERING
-from server.services import live, prescriptions, recordings, sessions
-from server.services.live_recordings import log_path
-from server.storage.live_tables import live_event
+from sagittal.core.feedback import Cue
+from sagittal.core.formats.live_log import FILE_MARK, hello_json, record
+from sagittal.server.live.client import StreamReport, stream
+from sagittal.server.live.estimator import EstimatorWorker
+from sagittal.server.live.hub import Hub
+from sagittal.server.live.messages import (
+    Command,
+    EstimateFailed,
+    FeedItem,
+    FollowTake,
+    ForgetTake,
+    LogGrown,
+    Picture,
+)
+from sagittal.server.live.messages import Report as Told
+from sagittal.server.live.take import STEERING
+from sagittal.server.services import live, prescriptions, recordings, sessions
+from sagittal.server.services.live_recordings import log_path
+from sagittal.server.storage.live_tables import live_event
 from tests.helpers.live_clinic import Visit, heard, new_session, visit
 from tests.helpers.live_takes import finish_text
 from tests.helpers.live_walk import items, replayed, walk, walk_hello
@@ -322,7 +330,7 @@ async def test_a_server_that_starts_again_waits_for_the_tablet_and_tells_no_cue_
 
 def cue_rows_of(folder: Path, clinic: Clinic, take: str) -> list[dict[str, Any]]:
     """From the database of a clinic that has stopped."""
-    from server.storage.db import Database
+    from sagittal.server.storage.db import Database
 
     db = Database(clinic.settings.database_source)
     try:
@@ -344,10 +352,10 @@ async def test_a_crash_while_the_take_becomes_a_recording_is_repaired_at_the_nex
         raise RuntimeError("the power is gone")
 
     frames = [due.frame for due in walk()[:20]]
-    monkeypatch.setattr("server.live.hub.GRACE_S", 0.1)
+    monkeypatch.setattr("sagittal.server.live.hub.GRACE_S", 0.1)
     async with open_clinic(tmp_path, live_workers=0) as clinic, serve(clinic.app) as port:
         with monkeypatch.context() as patch:
-            patch.setattr(f"server.services.live_recordings._{broken}", dies)
+            patch.setattr(f"sagittal.server.services.live_recordings._{broken}", dies)
             async with visit(clinic, port) as v, v.tablet(v.hello(walk_hello(v.take))) as ws:
                 await heard(ws, "welcome")
                 for one in frames:
@@ -418,8 +426,8 @@ async def test_an_estimator_ends_with_a_killed_server(tmp_path: Path) -> None:
     script = f"""
 import asyncio, sys, time
 from pathlib import Path
-from server.live.pool import EstimatorPool
-from server.settings import Settings
+from sagittal.server.live.pool import EstimatorPool
+from sagittal.server.settings import Settings
 async def main():
     settings = Settings(data_dir=Path({str(tmp_path)!r}))
     pool = EstimatorPool(settings, lambda r: None, lambda t: None, lambda t: None)

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 from sqlalchemy import delete, select
 
-from server.live.journal import Journal
-from server.services import live, patients, sessions
-from server.storage import sqlite_file
-from server.storage.db import Database
-from server.storage.disk_log import DiskLog
-from server.storage.live_tables import live_event, live_take
+from sagittal.server.live.journal import Journal
+from sagittal.server.services import live, patients, sessions
+from sagittal.server.storage import sqlite_file
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.disk_log import DiskLog
+from sagittal.server.storage.live_tables import live_event, live_take
 from tests.helpers.databases import write_database
 
 CUE = {

@@ -10,8 +10,8 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from server.live.client import stream
-from server.live.protocol import ack
+from sagittal.server.live.client import stream
+from sagittal.server.live.protocol import ack
 from tests.helpers.live_clinic import Visit, heard, visit
 from tests.helpers.live_takes import finish_text, frame
 from tests.server.clinic import Clinic

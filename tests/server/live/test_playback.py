@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.errors import InputError
-from core.formats.live_log import FILE_MARK, decode_batch, hello_json, parse_hello, record
-from core.formats.live_reader import read_live_log
-from core.frames import Floats
-from core.recording import ImuStream, Recording
-from core.simulate import simulate_scenario
-from core.timeline import synchronise
-from server.live.playback import DueBatch, cut, hello_of, pace_batches
+from sagittal.core.errors import InputError
+from sagittal.core.formats.live_log import FILE_MARK, decode_batch, hello_json, parse_hello, record
+from sagittal.core.formats.live_reader import read_live_log
+from sagittal.core.frames import Floats
+from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.simulate import simulate_scenario
+from sagittal.core.timeline import synchronise
+from sagittal.server.live.playback import DueBatch, cut, hello_of, pace_batches
 from tests.helpers.walks import neura_recording
 
 

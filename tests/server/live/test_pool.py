@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from server.live.messages import (
+from sagittal.server.live.messages import (
     Command,
     EstimatorReady,
     FollowTake,
@@ -24,10 +24,10 @@ from server.live.messages import (
     decode_order,
     encode,
 )
-from server.live.pool import EstimatorPool
-from server.processes import kept_process
-from server.processes.channel import frame, read_message
-from server.settings import Settings
+from sagittal.server.live.pool import EstimatorPool
+from sagittal.server.processes import kept_process
+from sagittal.server.processes.channel import frame, read_message
+from sagittal.server.settings import Settings
 
 pytestmark = pytest.mark.anyio
 

@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.formats.live_log import Finish, Hello, decode_batch, hello_json
-from server.live import protocol
-from server.live.intake import MISMATCH, Intake, IntakeAnswer
-from server.live.protocol import FINAL, MAX_UNACKED, MOST_UNACKED, CloseCode, ProtocolError, parse
+from sagittal.core.formats.live_log import Finish, Hello, decode_batch, hello_json
+from sagittal.server.live import protocol
+from sagittal.server.live.intake import MISMATCH, Intake, IntakeAnswer
+from sagittal.server.live.protocol import FINAL, MAX_UNACKED, MOST_UNACKED, CloseCode, ProtocolError, parse
 from tests.helpers.live_takes import HELLO, digest, finish_text, frame
 
 JSON = st.recursive(

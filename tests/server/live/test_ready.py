@@ -13,11 +13,19 @@ from typing import Any
 import pytest
 from websockets.asyncio.client import ClientConnection
 
-from server.live import ending, estimator
-from server.live.hub import Hub
-from server.live.messages import EstimateFailed, FollowTake, ForgetTake, LogGrown, decode_report, encode
-from server.processes.channel import Channel
-from server.services.live_recordings import log_path
+from sagittal.server.live import ending, estimator
+from sagittal.server.live.hub import Hub
+from sagittal.server.live.messages import (
+    EstimateFailed,
+    FollowTake,
+    ForgetTake,
+    LogGrown,
+    decode_report,
+    encode,
+)
+from sagittal.server.live.pool import MODULE
+from sagittal.server.processes.channel import Channel
+from sagittal.server.services.live_recordings import log_path
 from tests.data import ROOT
 from tests.helpers.live_clinic import heard, visit
 from tests.helpers.live_takes import finish_text
@@ -58,9 +66,7 @@ async def unready(
     start = subprocess.Popen
 
     def other(words: list[str], *args: Any, **options: Any) -> Any:
-        changed = [
-            "tests.server.live.unready_estimator" if w == "server.live.estimator" else w for w in words
-        ]
+        changed = ["tests.server.live.unready_estimator" if w == MODULE else w for w in words]
         if changed != words:
             options["env"] = {**options["env"], "PYTHONPATH": str(ROOT)}
         return start(changed, *args, **options)

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import pytest
 
-from core.errors import InputError
-from server.live.committer import Committer
-from server.live.protocol import MAX_UNACKED, MOST_UNACKED, CloseCode, ProtocolError
-from server.live.recorder import Recorder, open_recorder
-from server.storage import fs
+from sagittal.core.errors import InputError
+from sagittal.server.live.committer import Committer
+from sagittal.server.live.protocol import MAX_UNACKED, MOST_UNACKED, CloseCode, ProtocolError
+from sagittal.server.live.recorder import Recorder, open_recorder
+from sagittal.server.storage import fs
 from tests.faults.failing import FailingSystem
 from tests.helpers.live_takes import HELLO, Heard, digest, finish_text, frame, stored
 

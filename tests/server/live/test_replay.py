@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from core.simulate import mt_files, simulate_scenario
-from server.main import main
-from server.services import live
+from sagittal.core.simulate import mt_files, simulate_scenario
+from sagittal.server.main import main
+from sagittal.server.services import live
 from tests.helpers.live_clinic import new_session
 from tests.server.clinic import Clinic
 

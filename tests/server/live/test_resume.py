@@ -17,11 +17,11 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from server.live.committer import Committer
-from server.live.intake import IntakeAnswer, TakeEnd
-from server.live.protocol import MOST_UNACKED, CloseCode, ProtocolError
-from server.live.recorder import Recorder, restore
-from server.storage import fs
+from sagittal.server.live.committer import Committer
+from sagittal.server.live.intake import IntakeAnswer, TakeEnd
+from sagittal.server.live.protocol import MOST_UNACKED, CloseCode, ProtocolError
+from sagittal.server.live.recorder import Recorder, restore
+from sagittal.server.storage import fs
 from tests.helpers.live_takes import HELLO, digest, finish_text, frame, stored
 
 LENGTH = 12

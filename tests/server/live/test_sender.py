@@ -14,7 +14,7 @@ from websockets.asyncio.client import connect
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
-from server.live.sender import LiveError, Sender, StreamFaults, StreamReport
+from sagittal.server.live.sender import LiveError, Sender, StreamFaults, StreamReport
 from tests.helpers.live_takes import digest, frame
 
 pytestmark = pytest.mark.anyio

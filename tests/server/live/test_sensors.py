@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from core.formats.live_log import Hello
-from server.live.messages import BATTERY_WARN_PCT
-from server.live.sensors import sensor_rows
+from sagittal.core.formats.live_log import Hello
+from sagittal.server.live.messages import BATTERY_WARN_PCT
+from sagittal.server.live.sensors import sensor_rows
 from tests.helpers.live_takes import HELLO
 
 

@@ -15,8 +15,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-from core.formats.live_log import PROTOCOL, hello_json
-from server.live.client import stream
+from sagittal.core.formats.live_log import PROTOCOL, hello_json
+from sagittal.server.live.client import stream
 from tests.helpers.live_takes import stored
 from tests.helpers.live_walk import walk, walk_hello
 from tests.helpers.service import new_session, served, wait_for

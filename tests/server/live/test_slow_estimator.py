@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
-from server.live.client import StreamReport, stream
-from server.live.playback import DueBatch, pace_batches
+from sagittal.server.live.client import StreamReport, stream
+from sagittal.server.live.playback import DueBatch, pace_batches
+from sagittal.server.live.pool import MODULE
 from tests.data import ROOT
 from tests.helpers.live_clinic import heard, visit
 from tests.helpers.live_walk import walk, walk_hello
@@ -53,7 +54,7 @@ async def sleepy(
     start = subprocess.Popen
 
     def other(words: list[str], *args: Any, **options: Any) -> Any:
-        changed = ["tests.server.live.sleepy_estimator" if w == "server.live.estimator" else w for w in words]
+        changed = ["tests.server.live.sleepy_estimator" if w == MODULE else w for w in words]
         if changed != words:
             options["env"] = {**options["env"], "PYTHONPATH": str(ROOT)}
         return start(changed, *args, **options)

@@ -14,14 +14,14 @@ import websockets
 from sqlalchemy import select, update
 from websockets.asyncio.client import ClientConnection
 
-from core.formats.live_log import StreamInfo
-from server.live import hub
-from server.live.protocol import CloseCode
-from server.live.recorder import Recorder, open_recorder
-from server.services import recordings
-from server.services.live_recordings import log_path
-from server.storage.live_tables import live_take
-from server.storage.tables import audit, job, now
+from sagittal.core.formats.live_log import StreamInfo
+from sagittal.server.live import hub
+from sagittal.server.live.protocol import CloseCode
+from sagittal.server.live.recorder import Recorder, open_recorder
+from sagittal.server.services import recordings
+from sagittal.server.services.live_recordings import log_path
+from sagittal.server.storage.live_tables import live_take
+from sagittal.server.storage.tables import audit, job, now
 from tests.helpers.live_clinic import closed, heard, visit
 from tests.helpers.live_takes import HELLO, digest, finish_text, frame
 from tests.server.clinic import Clinic
@@ -143,7 +143,7 @@ async def test_a_first_message_that_is_no_hello_is_refused(
 async def test_silence_instead_of_a_hello_is_closed(
     clinic: Clinic, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.live.tablet.HELLO_WITHIN_S", 0.1)
+    monkeypatch.setattr("sagittal.server.live.tablet.HELLO_WITHIN_S", 0.1)
     async with visit(clinic, port) as v, websockets.connect(v.socket) as ws:
         assert await closed(ws) == (CloseCode.NO_HELLO, "no_hello")
 
@@ -269,7 +269,7 @@ async def test_a_session_erased_just_before_its_log_is_there_leaves_no_log(
 async def test_a_full_disk_is_said_and_heals(
     clinic: Clinic, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from server.storage import fs
+    from sagittal.server.storage import fs
 
     async with visit(clinic, port) as v:
         async with v.tablet() as ws:

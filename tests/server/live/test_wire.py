@@ -11,12 +11,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from core.calibration.score import CalibrationCheck, CalibrationScore
-from core.errors import Notice
-from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SegmentCheck, SensorHealth
-from core.parameters.live_stride import LiveStride
-from server.live import wire
-from server.live.room import KEPT, QUEUE, Room
+from sagittal.core.calibration.score import CalibrationCheck, CalibrationScore
+from sagittal.core.errors import Notice
+from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame, SegmentCheck, SensorHealth
+from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.server.live import wire
+from sagittal.server.live.room import KEPT, QUEUE, Room
 
 GOOD = SensorHealth("A1", "pelvis", 99.87, 0.0, 0.0, 0.01, False)
 STRIDE = LiveStride(

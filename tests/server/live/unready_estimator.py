@@ -6,7 +6,7 @@ import os
 import time
 from pathlib import Path
 
-from server.live import estimator
+from sagittal.server.live import estimator
 
 UNTIL = "UNREADY_UNTIL"
 

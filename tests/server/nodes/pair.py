@@ -14,7 +14,7 @@ from pathlib import Path
 
 import httpx
 
-from server.settings import Settings
+from sagittal.server.settings import Settings
 from tests.data import ROOT
 from tests.helpers.service import line_with
 
@@ -71,7 +71,7 @@ def describe(folder: Path, url: str, name: str, port: int) -> Settings:
 def start_process(settings: Settings) -> subprocess.Popen[str]:
     """Start one; it does not answer yet."""
     return subprocess.Popen(
-        [sys.executable, "-m", "server.main", "serve"],
+        [sys.executable, "-m", "sagittal.server.main", "serve"],
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env={**os.environ, **settings.environment(), "OPENBLAS_NUM_THREADS": "1"},
     )  # fmt: skip

@@ -13,12 +13,12 @@ import httpx
 import pytest
 from starlette.types import Receive, Scope, Send
 
-from server.nodes import forwarding
-from server.nodes.forwarding import Forwarding, UnreachableError, open_line
-from server.nodes.passage import ASKED_BY, HEADER
-from server.nodes.pins import Owner
-from server.nodes.registry import WebNode
-from server.storage.tables import now
+from sagittal.server.nodes import forwarding
+from sagittal.server.nodes.forwarding import Forwarding, UnreachableError, open_line
+from sagittal.server.nodes.passage import ASKED_BY, HEADER
+from sagittal.server.nodes.pins import Owner
+from sagittal.server.nodes.registry import WebNode
+from sagittal.server.storage.tables import now
 
 pytestmark = pytest.mark.anyio
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from server.nodes.known import KnownNodes
-from server.nodes.passage import ASKED_BY, HEADER, LIFE_S, write_line
+from sagittal.server.nodes.known import KnownNodes
+from sagittal.server.nodes.passage import ASKED_BY, HEADER, LIFE_S, write_line
 
 pytestmark = pytest.mark.anyio
 

@@ -11,20 +11,20 @@ from pathlib import Path
 import pytest
 from sqlalchemy import update
 
-from server.live.rows import Rows
-from server.nodes.pins import Owner, Pin, find_owner, find_pin
-from server.nodes.registry import FORGOTTEN, Nodes
-from server.services import live, live_recordings, patients, sessions
-from server.services.custody import StrangersError
-from server.services.errors import NodeAway
-from server.services.live_claims import claim_take
-from server.services.reviewed import ReviewedAnalyses
-from server.settings import Settings, SettingsError
-from server.storage.blob_folder import FolderBlobs
-from server.storage.db import Database
-from server.storage.live_tables import live_take
-from server.storage.node_tables import web_node
-from server.storage.tables import new_id, now
+from sagittal.server.live.rows import Rows
+from sagittal.server.nodes.pins import Owner, Pin, find_owner, find_pin
+from sagittal.server.nodes.registry import FORGOTTEN, Nodes
+from sagittal.server.services import live, live_recordings, patients, sessions
+from sagittal.server.services.custody import StrangersError
+from sagittal.server.services.errors import NodeAway
+from sagittal.server.services.live_claims import claim_take
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.settings import Settings, SettingsError
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.live_tables import live_take
+from sagittal.server.storage.node_tables import web_node
+from sagittal.server.storage.tables import new_id, now
 
 ID = "0123456789abcdef" * 2
 URL = "postgresql://sagittal@127.0.0.1/sagittal"

@@ -22,12 +22,12 @@ import viser
 import websockets
 from websockets.asyncio.client import ClientConnection
 
-from core.formats.live_log import PROTOCOL, Hello, hello_json
-from server.live.pairing import pair as pair_tablet
-from server.services import live
-from server.settings import Settings
-from server.storage.db import Database
-from server.storage.high_water import read_mark
+from sagittal.core.formats.live_log import PROTOCOL, Hello, hello_json
+from sagittal.server.live.pairing import pair as pair_tablet
+from sagittal.server.services import live
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import read_mark
 from tests.data import ROOT
 from tests.helpers.live_takes import HELLO, frame, kept_in
 from tests.helpers.service import new_session
@@ -287,7 +287,7 @@ async def test_a_backup_that_is_due_is_made_by_one(pair: NodePair, tmp_path: Pat
     folder.mkdir()
     programs = [
         subprocess.Popen(
-            [sys.executable, "-m", "server.worker.backing_up"],
+            [sys.executable, "-m", "sagittal.server.worker.backing_up"],
             cwd=ROOT, stdin=subprocess.PIPE,
             env={**os.environ, **replace(node.settings, backup_dir=str(folder)).environment()},
         )

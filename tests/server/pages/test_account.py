@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from server.auth import api_tokens
-from server.auth.api_tokens import MOST_DAYS, Scope
-from server.auth.passwords import MIN_LENGTH
-from server.pages.account import SCOPE_WORDS
+from sagittal.server.auth import api_tokens
+from sagittal.server.auth.api_tokens import MOST_DAYS, Scope
+from sagittal.server.auth.passwords import MIN_LENGTH
+from sagittal.server.pages.account import SCOPE_WORDS
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

@@ -6,11 +6,11 @@ import re
 
 import pytest
 
-from server.jobs.queue import COMPARE_FILTERS
-from server.pages.algorithms import FILE_WORDS, list_choices
-from server.report.filter_files import filter_run_files
-from server.report.filter_list import PROPOSED
-from server.services import filter_runs, patients, sessions
+from sagittal.server.jobs.queue import COMPARE_FILTERS
+from sagittal.server.pages.algorithms import FILE_WORDS, list_choices
+from sagittal.server.report.filter_files import filter_run_files
+from sagittal.server.report.filter_list import PROPOSED
+from sagittal.server.services import filter_runs, patients, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from server.auth.roles import PUBLIC
-from server.pages.assets import STATIC, Assets
+from sagittal.server.auth.roles import PUBLIC
+from sagittal.server.pages.assets import STATIC, Assets
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from server import audit
-from server.pages.audit_log import AUDIT_ROWS
+from sagittal.server import audit
+from sagittal.server.pages.audit_log import AUDIT_ROWS
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

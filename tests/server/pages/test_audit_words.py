@@ -6,9 +6,9 @@ import re
 
 import pytest
 
-from server.auth.accounts import Factor
-from server.pages.audit_words import DEEDS, SIGNED_IN_BY, describe_deed
-from server.services.reviews import ACTIONS
+from sagittal.server.auth.accounts import Factor
+from sagittal.server.pages.audit_words import DEEDS, SIGNED_IN_BY, describe_deed
+from sagittal.server.services.reviews import ACTIONS
 from tests.data import ROOT
 from tests.server.clinic import Clinic
 

@@ -7,10 +7,10 @@ from math import degrees
 
 import pytest
 
-from core.calibration import calibrate
-from core.calibration.score import score_calibration
-from core.errors import Notice
-from server.report.calibration_checks import view_calibration_checks
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.score import score_calibration
+from sagittal.core.errors import Notice
+from sagittal.server.report.calibration_checks import view_calibration_checks
 from tests.helpers.walks import simulated
 from tests.server import analysed
 from tests.server.clinic import Clinic

@@ -6,9 +6,9 @@ import re
 
 import pytest
 
-from core.frames import SEGMENTS
-from server.pages.capture import FILM_BITS_PER_S, PLACES
-from server.services.live import ALPHABET, CODE_LENGTH
+from sagittal.core.frames import SEGMENTS
+from sagittal.server.pages.capture import FILM_BITS_PER_S, PLACES
+from sagittal.server.services.live import ALPHABET, CODE_LENGTH
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

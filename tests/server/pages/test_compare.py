@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from server.pages.compare import _pairs, view_comparison
-from server.services import comparisons
+from sagittal.server.pages.compare import _pairs, view_comparison
+from sagittal.server.services import comparisons
 from tests.server import analysed, crowd
 from tests.server.clinic import Clinic
 

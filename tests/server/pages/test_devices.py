@@ -9,11 +9,11 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.frames import GRAVITY
-from core.quality.device_course import SCALE_MOVED, SCALE_OFF, DeviceCourse, follow_device
-from core.quality.devices import DeviceCheck
-from server.pages.devices import _charts, _figures, _find_scale_band, _takes
-from server.services.devices import DatedCheck, KnownDevice
+from sagittal.core.frames import GRAVITY
+from sagittal.core.quality.device_course import SCALE_MOVED, SCALE_OFF, DeviceCourse, follow_device
+from sagittal.core.quality.devices import DeviceCheck
+from sagittal.server.pages.devices import _charts, _figures, _find_scale_band, _takes
+from sagittal.server.services.devices import DatedCheck, KnownDevice
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from core.frames import Side
-from server.pages import figures
-from server.pages.figures import draw_beginning, draw_contact
-from server.report.bundle import read_poses
-from server.services import analyses, histories, patients, reports, sessions
-from server.storage.blobs import Blob
-from server.viewer.client import client_version
-from server.viewer.still import draw_still
+from sagittal.core.frames import Side
+from sagittal.server.pages import figures
+from sagittal.server.pages.figures import draw_beginning, draw_contact
+from sagittal.server.report.bundle import read_poses
+from sagittal.server.services import analyses, histories, patients, reports, sessions
+from sagittal.server.storage.blobs import Blob
+from sagittal.server.viewer.client import client_version
+from sagittal.server.viewer.still import draw_still
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

@@ -13,11 +13,11 @@ from typing import Any
 import pypdfium2
 import pytest
 
-from server.pages import session as session_page
-from server.pages.first_sheet import has_room_for_profile
-from server.report.headline import Headline, HeadlineSentence
-from server.services import comparisons
-from server.services.signed_reports import ASSESSMENT_CHARACTERS
+from sagittal.server.pages import session as session_page
+from sagittal.server.pages.first_sheet import has_room_for_profile
+from sagittal.server.report.headline import Headline, HeadlineSentence
+from sagittal.server.services import comparisons
+from sagittal.server.services.signed_reports import ASSESSMENT_CHARACTERS
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

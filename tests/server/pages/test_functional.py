@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import pytest
 
-from core.pipeline import analyse
-from core.recording import GivenLimits
-from core.simulate.scripts import ON_SKIN
-from core.simulate.tug import simulate_tug
-from server.report.exports import analysis_files
+from sagittal.core.pipeline import analyse
+from sagittal.core.recording import GivenLimits
+from sagittal.core.simulate.scripts import ON_SKIN
+from sagittal.core.simulate.tug import simulate_tug
+from sagittal.server.report.exports import analysis_files
 from tests.helpers.kept import keep
 from tests.server import analysed
 from tests.server.clinic import Clinic

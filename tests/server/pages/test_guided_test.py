@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from core.frames import PROTOCOLS
-from core.parameters.catalogue import CATALOGUE
-from server.pages.guided_test import view_guided_test
-from server.report.functional import norm_words
-from server.report.guided_words import HINTS, TOTAL
-from server.services.patients import Patient
-from server.services.sessions import Session
-from server.storage.tables import now
+from sagittal.core.frames import PROTOCOLS
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.pages.guided_test import view_guided_test
+from sagittal.server.report.functional import norm_words
+from sagittal.server.report.guided_words import HINTS, TOTAL
+from sagittal.server.services.patients import Patient
+from sagittal.server.services.sessions import Session
+from sagittal.server.storage.tables import now
 
 PATIENT = Patient("1", "P-1", "female", 1950, 1.7, None, False, "", now(), 1, None, False)
 SESSION = Session(

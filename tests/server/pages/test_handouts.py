@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from server.pages.handouts import gather_course, gather_leaflet
-from server.services import patients, sessions
-from server.services.errors import Conflict
+from sagittal.server.pages.handouts import gather_course, gather_leaflet
+from sagittal.server.services import patients, sessions
+from sagittal.server.services.errors import Conflict
 from tests.server import analysed, crowd
 from tests.server.clinic import Clinic
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from server.auth.identity import Identity
-from server.auth.roles import Role
-from server.pages.identity import name_on_paper, offers_identity
-from server.services import identities, patients
-from server.storage.field_cipher import make_keys
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Role
+from sagittal.server.pages.identity import name_on_paper, offers_identity
+from sagittal.server.services import identities, patients
+from sagittal.server.storage.field_cipher import make_keys
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from server.jobs.queue import JobView
-from server.pages.job_views import FOLLOWED, find_active_jobs, find_newest_job, follow_few, view_job
-from server.services import filter_runs, patients, recordings, sessions
-from server.storage.tables import now
+from sagittal.server.jobs.queue import JobView
+from sagittal.server.pages.job_views import FOLLOWED, find_active_jobs, find_newest_job, follow_few, view_job
+from sagittal.server.services import filter_runs, patients, recordings, sessions
+from sagittal.server.storage.tables import now
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

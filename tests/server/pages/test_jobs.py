@@ -6,11 +6,11 @@ from typing import get_args
 
 import pytest
 
-from server.auth.identity import Identity
-from server.auth.roles import Role
-from server.jobs.queue import BESIDE, JobState
-from server.pages.jobs import JOB_WORDS, KIND_WORDS, list_jobs
-from server.services import patients, recordings, sessions
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Role
+from sagittal.server.jobs.queue import BESIDE, JobState
+from sagittal.server.pages.jobs import JOB_WORDS, KIND_WORDS, list_jobs
+from sagittal.server.services import patients, recordings, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

@@ -6,10 +6,10 @@ import re
 
 import pytest
 
-from core.condition import USUAL
-from core.frames import PROTOCOLS
-from server.services import patients, programmes
-from server.storage.tables import now
+from sagittal.core.condition import USUAL
+from sagittal.core.frames import PROTOCOLS
+from sagittal.server.services import patients, programmes
+from sagittal.server.storage.tables import now
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

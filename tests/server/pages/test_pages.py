@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from core.body.model import NOMINAL_HEIGHT_M
-from core.online.calibrating import CalibratingParams
-from server.pages.charts import draw_chart
-from server.report.panels import CurvePanel
-from server.services import analyses, recordings
+from sagittal.core.body.model import NOMINAL_HEIGHT_M
+from sagittal.core.online.calibrating import CalibratingParams
+from sagittal.server.pages.charts import draw_chart
+from sagittal.server.report.panels import CurvePanel
+from sagittal.server.services import analyses, recordings
 from tests.data import ROOT
 from tests.server import analysed
 from tests.server.clinic import Clinic
@@ -221,7 +221,7 @@ async def test_a_report_is_drawn_once_until_something_it_shows_changes(
         drawn.append(panel.variable.name)
         return draw_chart(panel, *args, **kwargs)
 
-    monkeypatch.setattr("server.pages.session.draw_chart", draw)
+    monkeypatch.setattr("sagittal.server.pages.session.draw_chart", draw)
     first = await page(clinic, f"/sessions/{session}")
     assert drawn
     drawn.clear()

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from core.parameters.catalogue import CATALOGUE
-from server.services import patients, sessions
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.services import patients, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

@@ -9,12 +9,12 @@ import re
 import pytest
 from sqlalchemy import update
 
-from server.auth.identity import Identity
-from server.auth.roles import Role
-from server.pages.patients import FILTERS, list_patients
-from server.services import live, patients, programmes, recordings, sessions
-from server.storage.live_tables import live_take
-from server.storage.tables import now
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Role
+from sagittal.server.pages.patients import FILTERS, list_patients
+from sagittal.server.services import live, patients, programmes, recordings, sessions
+from sagittal.server.storage.live_tables import live_take
+from sagittal.server.storage.tables import now
 from tests.server import analysed
 from tests.server.clinic import Clinic
 from tests.server.pages.test_patient import API, rows_of, text_of, walked

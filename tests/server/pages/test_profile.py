@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
-from server.pages.profile import view_profile
-from server.report.profile import ProfileBar, ProfileView
+from sagittal.server.pages.profile import view_profile
+from sagittal.server.report.profile import ProfileBar, ProfileView
 
 KNEE = ProfileBar("Knee flexion", {"left": 7.25, "right": 4.0}, 4.0, 7.0)
 SCORE = ProfileBar("Score", {"left": 9.0}, 5.0, 8.25)

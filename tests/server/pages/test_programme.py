@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from server.pages.programme import STATE_WORDS, view_programme
-from server.services import patients, programmes, sessions
-from server.services.programmes import PlannedVisit, Programme
-from server.storage.tables import now
+from sagittal.server.pages.programme import STATE_WORDS, view_programme
+from sagittal.server.services import patients, programmes, sessions
+from sagittal.server.services.programmes import PlannedVisit, Programme
+from sagittal.server.storage.tables import now
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

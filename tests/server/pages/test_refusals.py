@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from sqlalchemy import Connection
 
-from server.auth.roles import Role
-from server.services import consents, notes, patients, report_links, sessions
-from server.services.errors import NotFound, ServiceError
-from server.storage.db import Database
+from sagittal.server.auth.roles import Role
+from sagittal.server.services import consents, notes, patients, report_links, sessions
+from sagittal.server.services.errors import NotFound, ServiceError
+from sagittal.server.storage.db import Database
+from sagittal.web.language import LANGUAGES, SOURCE, load_catalogue, script_texts
 from tests.server.clinic import open_clinic
-from web.language import LANGUAGES, SOURCE, load_catalogue, script_texts
 
 pytestmark = pytest.mark.anyio
 

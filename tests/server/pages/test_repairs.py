@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from server.services.analysing import REPAIRED
+from sagittal.server.services.analysing import REPAIRED
 from tests.server import analysed
 from tests.server.clinic import Clinic, open_clinic
 

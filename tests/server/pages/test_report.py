@@ -18,12 +18,12 @@ import pypdfium2
 import pytest
 import sqlalchemy as sa
 
-from server.http.templates import TEMPLATES
-from server.report.pdf import PdfMissing, render_pdf
-from server.services import report_links
-from server.services.signed_reports import ASSESSMENT_CHARACTERS
-from server.storage.report_tables import report_link
-from server.storage.tables import audit, now
+from sagittal.server.http.templates import TEMPLATES
+from sagittal.server.report.pdf import PdfMissing, render_pdf
+from sagittal.server.services import report_links
+from sagittal.server.services.signed_reports import ASSESSMENT_CHARACTERS
+from sagittal.server.storage.report_tables import report_link
+from sagittal.server.storage.tables import audit, now
 from tests.server import analysed
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.pages.test_pages import page, visit

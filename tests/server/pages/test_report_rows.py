@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
-from server.pages.report_rows import (
+from sagittal.core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
+from sagittal.server.pages.report_rows import (
     FIRST_ROWS,
     MATTERING,
     NOT_ON_PAPER,
@@ -16,7 +16,7 @@ from server.pages.report_rows import (
     select_groups,
     select_others,
 )
-from server.report.table import ParameterRow, TableCell
+from sagittal.server.report.table import ParameterRow, TableCell
 
 
 @dataclass

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from server.pages.sensitivity import list_choices
-from server.services import patients, reference_files, sessions
+from sagittal.server.pages.sensitivity import list_choices
+from sagittal.server.services import patients, reference_files, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

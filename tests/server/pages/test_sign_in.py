@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from server.auth import one_time
-from server.auth.passwords import MIN_LENGTH
+from sagittal.server.auth import one_time
+from sagittal.server.auth.passwords import MIN_LENGTH
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

@@ -7,11 +7,11 @@ import re
 
 import pytest
 
-from core.pipeline import analyse
-from core.simulate import RecordingSetup, Squats, simulate_squats
-from core.simulate.mems import MEMS
-from core.simulate.squat_chain import place_as_agreed
-from server.report.exports import analysis_files
+from sagittal.core.pipeline import analyse
+from sagittal.core.simulate import RecordingSetup, Squats, simulate_squats
+from sagittal.core.simulate.mems import MEMS
+from sagittal.core.simulate.squat_chain import place_as_agreed
+from sagittal.server.report.exports import analysis_files
 from tests.core.body.chain.squats import HEIGHT_M, squat_on
 from tests.server import analysed
 from tests.server.clinic import Clinic

@@ -10,13 +10,13 @@ import pytest
 from fastapi.routing import APIRoute
 from sqlalchemy import insert, select
 
-from core.feedback import Baseline, Cue
-from server.pages.routes import ROUTERS
-from server.pages.shell import FRAGMENT
-from server.services import identities, live, patients, prescriptions, programmes, sessions
-from server.storage.care_tables import care_team_member
-from server.storage.live_tables import live_take
-from server.storage.tables import analysis, new_id, recording
+from sagittal.core.feedback import Baseline, Cue
+from sagittal.server.pages.routes import ROUTERS
+from sagittal.server.pages.shell import FRAGMENT
+from sagittal.server.services import identities, live, patients, prescriptions, programmes, sessions
+from sagittal.server.storage.care_tables import care_team_member
+from sagittal.server.storage.live_tables import live_take
+from sagittal.server.storage.tables import analysis, new_id, recording
 from tests.server import analysed, crowd
 from tests.server.clinic import Clinic, open_clinic
 

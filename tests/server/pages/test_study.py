@@ -6,8 +6,8 @@ import datetime as dt
 
 import pytest
 
-from server.pages import study
-from server.services import patients, sessions
+from sagittal.server.pages import study
+from sagittal.server.services import patients, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from server.pages.system import describe_backups
-from server.services import backup_schedule
-from server.services.backup_schedule import BackupState, Outcome
-from server.services.calendar_days import move_years
-from server.settings import Settings, SettingsError
-from server.storage.readiness import Readiness
-from server.storage.tables import now
+from sagittal.server.pages.system import describe_backups
+from sagittal.server.services import backup_schedule
+from sagittal.server.services.backup_schedule import BackupState, Outcome
+from sagittal.server.services.calendar_days import move_years
+from sagittal.server.settings import Settings, SettingsError
+from sagittal.server.storage.readiness import Readiness
+from sagittal.server.storage.tables import now
 from tests.server.clinic import open_clinic
 
 pytestmark = pytest.mark.anyio

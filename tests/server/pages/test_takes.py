@@ -6,10 +6,10 @@ import datetime as dt
 
 import pytest
 
-from server.pages.report_rows import select_first
-from server.pages.takes import view_takes
-from server.report.change_words import find_term
-from server.services import histories, patients, reports, sessions
+from sagittal.server.pages.report_rows import select_first
+from sagittal.server.pages.takes import view_takes
+from sagittal.server.report.change_words import find_term
+from sagittal.server.services import histories, patients, reports, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from server.http.headers import KEPT
+from sagittal.server.http.headers import KEPT
+from sagittal.web.language import LANGUAGES, SOURCE, script_texts
 from tests.server.clinic import Clinic
-from web.language import LANGUAGES, SOURCE, script_texts
 
 pytestmark = pytest.mark.anyio
 

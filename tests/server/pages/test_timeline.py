@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from server.pages.shell import FRAGMENT
-from server.services import patients, sessions
+from sagittal.server.pages.shell import FRAGMENT
+from sagittal.server.services import patients, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

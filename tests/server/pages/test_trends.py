@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from server.pages.trends import _column, _pick_side, _waiting, list_ahead, view_daily_trend
-from server.report.daily_trend import PerformanceDay
-from server.report.trends import Trend, TrendSeries, TrendValue
-from server.services import patients, sessions
-from server.services.programmes import PlannedVisit
+from sagittal.server.pages.trends import _column, _pick_side, _waiting, list_ahead, view_daily_trend
+from sagittal.server.report.daily_trend import PerformanceDay
+from sagittal.server.report.trends import Trend, TrendSeries, TrendValue
+from sagittal.server.services import patients, sessions
+from sagittal.server.services.programmes import PlannedVisit
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from server.pages.upload import fits_movement, view_inspection
-from server.services.devices import LastPlaces
-from server.services.recordings import StoredRecording
-from web.language import load_catalogue
+from sagittal.server.pages.upload import fits_movement, view_inspection
+from sagittal.server.services.devices import LastPlaces
+from sagittal.server.services.recordings import StoredRecording
+from sagittal.web.language import load_catalogue
 
 
 def device(name: str, part: str | None = None, leg: int | None = None, **more: Any) -> dict[str, Any]:

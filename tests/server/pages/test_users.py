@@ -5,12 +5,12 @@ from __future__ import annotations
 import pyotp
 import pytest
 
-from server.auth import second_factor
-from server.auth.identity import Identity
-from server.auth.passwords import MIN_LENGTH
-from server.auth.roles import Role
-from server.pages.words import ROLE_WORDS
-from server.services import care_teams
+from sagittal.server.auth import second_factor
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.passwords import MIN_LENGTH
+from sagittal.server.auth.roles import Role
+from sagittal.server.pages.words import ROLE_WORDS
+from sagittal.server.services import care_teams
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio

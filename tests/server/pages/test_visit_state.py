@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from server.pages.visit_state import LIVE_STATES, STATES, describe_live, describe_state, judge_visit
-from server.services import analyses, edit_log, live, patients, sessions
-from server.storage.blobs import Blob
+from sagittal.server.pages.visit_state import LIVE_STATES, STATES, describe_live, describe_state, judge_visit
+from sagittal.server.services import analyses, edit_log, live, patients, sessions
+from sagittal.server.storage.blobs import Blob
 from tests.server import analysed
 from tests.server.clinic import Clinic
 

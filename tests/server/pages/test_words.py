@@ -7,12 +7,12 @@ import re
 
 import pytest
 
-from core.pipeline import WALK
-from core.pipeline.recipes import ACTIVITY
-from server.pages.data import FILE_WORDS
-from server.pages.session_context import STAGE_NAMES, STAGES_OF_DAYS
-from server.report import activity_files, exports
-from web.words import day, filesize, moment, number, pattern, seconds
+from sagittal.core.pipeline import WALK
+from sagittal.core.pipeline.recipes import ACTIVITY
+from sagittal.server.pages.data import FILE_WORDS
+from sagittal.server.pages.session_context import STAGE_NAMES, STAGES_OF_DAYS
+from sagittal.server.report import activity_files, exports
+from sagittal.web.words import day, filesize, moment, number, pattern, seconds
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from tests.faults.clinic import alive, until
 START = """
 import sys
 from pathlib import Path
-from server.processes.child import start_child, start_module
-from server.settings import Settings
+from sagittal.server.processes.child import start_child, start_module
+from sagittal.server.settings import Settings
 
 made = {start}("slow_import", Settings(data_dir=Path(sys.argv[1])))
 print(getattr(made, "pid", None) or made[0].pid, flush=True)

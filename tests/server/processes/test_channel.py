@@ -8,7 +8,7 @@ from socket import socketpair
 
 import pytest
 
-from server.processes.channel import Channel, frame, read_message
+from sagittal.server.processes.channel import Channel, frame, read_message
 
 
 def test_messages_of_any_length_arrive_whole_and_in_order() -> None:

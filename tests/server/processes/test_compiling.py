@@ -10,8 +10,8 @@ from threading import Event
 
 import pytest
 
-from server.processes import compiling
-from server.storage.compile_cache import VARIABLE, has_compiled_filters
+from sagittal.server.processes import compiling
+from sagittal.server.storage.compile_cache import VARIABLE, has_compiled_filters
 
 
 def test_of_many_that_ask_at_once_one_compiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from server.processes.errand import MOST_WAITING, ErrandTurn, TooManyErrands
+from sagittal.server.processes.errand import MOST_WAITING, ErrandTurn, TooManyErrands
 
 
 def test_a_few_wait_for_their_turn_and_more_are_refused_at_once() -> None:

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from server.processes import kept_process
-from server.processes.kept_process import KeptProcess
-from server.settings import Settings
+from sagittal.server.processes import kept_process
+from sagittal.server.processes.kept_process import KeptProcess
+from sagittal.server.settings import Settings
 
 pytestmark = pytest.mark.anyio
 

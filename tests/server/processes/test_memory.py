@@ -13,8 +13,8 @@ from tests.data import ROOT
 HOLES = """
 from pathlib import Path
 import numpy as np
-from core.memory import give_memory_back
-from server.processes.memory import share_allocator
+from sagittal.core.memory import give_memory_back
+from sagittal.server.processes.memory import share_allocator
 share_allocator()
 import pyarrow as pa
 assert pa.default_memory_pool().backend_name == "system"

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from core.errors import Notice
-from core.parameters import gait_parameters
-from server.report.bundle import Bundle
+from sagittal.core.errors import Notice
+from sagittal.core.parameters import gait_parameters
+from sagittal.server.report.bundle import Bundle
 from tests.server import walk
 
 MakeBundle = Callable[..., Bundle]

@@ -9,15 +9,15 @@ import json
 import numpy as np
 import pytest
 
-from core.errors import FormatError, SignalError
-from core.formats import SourceFile, write_recording
-from core.pipeline import analyse
-from core.recording import Recording
-from core.simulate.daily import plan_daily_life, record_daily_life, simulate_daily_life
-from server.report import activity_files
-from server.report.activity_files import read_activity, write_activity
-from server.report.bundle import load_bundle
-from server.services import analysing
+from sagittal.core.errors import FormatError, SignalError
+from sagittal.core.formats import SourceFile, write_recording
+from sagittal.core.pipeline import analyse
+from sagittal.core.recording import Recording
+from sagittal.core.simulate.daily import plan_daily_life, record_daily_life, simulate_daily_life
+from sagittal.server.report import activity_files
+from sagittal.server.report.activity_files import read_activity, write_activity
+from sagittal.server.report.bundle import load_bundle
+from sagittal.server.services import analysing
 
 
 @pytest.fixture(scope="module")

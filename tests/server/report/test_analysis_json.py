@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from core.body.health import HealthFinding
-from core.parameters.result import Parameter
-from core.pipeline import TakeAnalysis
-from server.report.analysis_json import parameter_row, summarise_analysis
-from server.report.wording import JUDGED, PATH_JUDGED
+from sagittal.core.body.health import HealthFinding
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.pipeline import TakeAnalysis
+from sagittal.server.report.analysis_json import parameter_row, summarise_analysis
+from sagittal.server.report.wording import JUDGED, PATH_JUDGED
 from tests.server import analysed
 
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from core.parameters.catalogue import CATALOGUE
-from server.report.behind import open_row
-from server.report.bundle import read_columns
-from server.report.exports import strides_csv
-from server.report.level import level_column
-from server.report.model import report_model
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.report.behind import open_row
+from sagittal.server.report.bundle import read_columns
+from sagittal.server.report.exports import strides_csv
+from sagittal.server.report.level import level_column
+from sagittal.server.report.model import report_model
 from tests.server import walk
 from tests.server.report.conftest import MakeBundle
 

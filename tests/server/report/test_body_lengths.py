@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from core.anthropometry import BodyMeasures
-from core.body.model import LENGTHS, BodyModel
-from server.report.body_lengths import BY_PELVIS, view_lengths
+from sagittal.core.anthropometry import BodyMeasures
+from sagittal.core.body.model import LENGTHS, BodyModel
+from sagittal.server.report.body_lengths import BY_PELVIS, view_lengths
 
 
 def told(height_m: float | None, measures: BodyMeasures) -> dict[str, tuple[str, bool, str]]:

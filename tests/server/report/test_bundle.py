@@ -13,10 +13,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from core.errors import FormatError
-from core.parameters.temporal import stride_values
-from server.report.bundle import load_bundle, read_angles, read_poses
-from server.report.exports import analysis_files, angles_parquet
+from sagittal.core.errors import FormatError
+from sagittal.core.parameters.temporal import stride_values
+from sagittal.server.report.bundle import load_bundle, read_angles, read_poses
+from sagittal.server.report.exports import analysis_files, angles_parquet
 from tests.server import walk
 from tests.server.analysed import analysis
 

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from server.report import columns
-from server.report.columns import (
+from sagittal.server.report import columns
+from sagittal.server.report.columns import (
     parquet_file,
     read_table,
     repeat_words,

@@ -9,10 +9,10 @@ from itertools import accumulate
 import pytest
 from defusedxml.ElementTree import fromstring
 
-from server.report.bundle import Bundle
-from server.report.curves import cycle_svg, range_svg, strip_svg
-from server.report.model import report_model
-from server.report.panels import DRAWN_STRIDES
+from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.curves import cycle_svg, range_svg, strip_svg
+from sagittal.server.report.model import report_model
+from sagittal.server.report.panels import DRAWN_STRIDES
 
 MakeBundle = Callable[..., Bundle]
 

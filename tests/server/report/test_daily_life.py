@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.activity.result import ActivityBout, ActivityKind
-from server.report.activity_files import read_activity, write_activity
-from server.report.daily_charts import CSS, inclination_svg, ribbon_svg, steps_svg
-from server.report.daily_life import DailyLifeView, bin_bouts, daily_life_view, inclination_course
+from sagittal.core.activity.result import ActivityBout, ActivityKind
+from sagittal.server.report.activity_files import read_activity, write_activity
+from sagittal.server.report.daily_charts import CSS, inclination_svg, ribbon_svg, steps_svg
+from sagittal.server.report.daily_life import DailyLifeView, bin_bouts, daily_life_view, inclination_course
 from tests.server import daily
 
 

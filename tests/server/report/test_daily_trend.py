@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from defusedxml.ElementTree import fromstring
 
-from core.activity.parameters import WORN_H
-from core.activity.result import ActivityBout, ActivityDay, ActivityResult
-from core.parameters.result import Parameter
-from server.report.daily_trend import (
+from sagittal.core.activity.parameters import WORN_H
+from sagittal.core.activity.result import ActivityBout, ActivityDay, ActivityResult
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.daily_trend import (
     LONG_BOUT_S,
     CapacityVisit,
     PerformanceDay,

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import pytest
 from defusedxml.ElementTree import fromstring
 
-from server.report.device_chart import draw_device
-from server.report.trend_chart import ROOM
+from sagittal.server.report.device_chart import draw_device
+from sagittal.server.report.trend_chart import ROOM
 
 DAYS = (dt.date(2026, 3, 1), dt.date(2026, 3, 6), dt.date(2026, 3, 11))
 

@@ -6,15 +6,15 @@ from typing import Any
 
 import pytest
 
-from core.estimators import ESTIMATORS, NO_FIGURE, PoseEstimator
-from server.report.estimator import (
+from sagittal.core.estimators import ESTIMATORS, NO_FIGURE, PoseEstimator
+from sagittal.server.report.estimator import (
     QUANTITIES,
     choice_label,
     estimator_view,
     list_estimated_angles,
     method_label,
 )
-from server.report.model import report_model
+from sagittal.server.report.model import report_model
 from tests.server.report.conftest import MakeBundle
 
 

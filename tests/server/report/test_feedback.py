@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from core.events.result import Stride, Strides
-from core.feedback import AnalysedStride, Cue, FeedbackSplit, GuardState, split
-from core.feedback.cue import WhyNot
-from server.report.feedback import FeedbackView, feedback_view, list_analysed_strides
-from server.report.feedback_words import NBSP
+from sagittal.core.events.result import Stride, Strides
+from sagittal.core.feedback import AnalysedStride, Cue, FeedbackSplit, GuardState, split
+from sagittal.core.feedback.cue import WhyNot
+from sagittal.server.report.feedback import FeedbackView, feedback_view, list_analysed_strides
+from sagittal.server.report.feedback_words import NBSP
 from tests.helpers.feedback import prescription
 
 

@@ -8,21 +8,21 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from core.feedback import AnalysedStride, FeedbackSplit, GuardState, SideEffect
-from core.feedback.cue import Summary
-from core.feedback.guard import FIRST
-from core.frames import Side
-from core.norms.profile import SAGITTAL
-from core.parameters.result import CycleCurves
-from server.report.feedback_beside import (
+from sagittal.core.feedback import AnalysedStride, FeedbackSplit, GuardState, SideEffect
+from sagittal.core.feedback.cue import Summary
+from sagittal.core.feedback.guard import FIRST
+from sagittal.core.frames import Side
+from sagittal.core.norms.profile import SAGITTAL
+from sagittal.core.parameters.result import CycleCurves
+from sagittal.server.report.feedback_beside import (
     PreviousTraining,
     Retention,
     compare_retention,
     describe_effects,
     side_effects,
 )
-from server.report.feedback_words import NBSP
-from server.report.wording import parameter_term
+from sagittal.server.report.feedback_words import NBSP
+from sagittal.server.report.wording import parameter_term
 from tests.helpers.feedback import NAME, OPEN, prescription
 
 METRES = parameter_term(NAME)

@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 from defusedxml.ElementTree import fromstring
 
-from core.feedback import AnalysedStride, Cue, FeedbackSplit, split
-from core.feedback.cue import WhyNot
-from server.report.feedback_chart import feedback_svg
-from server.report.wording import parameter_term
+from sagittal.core.feedback import AnalysedStride, Cue, FeedbackSplit, split
+from sagittal.core.feedback.cue import WhyNot
+from sagittal.server.report.feedback_chart import feedback_svg
+from sagittal.server.report.wording import parameter_term
 from tests.helpers.feedback import NAME, prescription
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from core.feedback.cue import Summary
-from server.report.feedback_rows import NO_STRIDES, describe_summary, format_signed
-from server.report.feedback_words import NBSP
-from server.report.wording import parameter_term
+from sagittal.core.feedback.cue import Summary
+from sagittal.server.report.feedback_rows import NO_STRIDES, describe_summary, format_signed
+from sagittal.server.report.feedback_words import NBSP
+from sagittal.server.report.wording import parameter_term
 
 METRES = parameter_term("step_length_m")
 

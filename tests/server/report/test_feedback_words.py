@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from server.report.feedback_words import (
+from sagittal.server.report.feedback_words import (
     NBSP,
     digits_of,
     format_quantity,
@@ -15,7 +15,7 @@ from server.report.feedback_words import (
     schedule_words,
     target_words,
 )
-from server.report.wording import parameter_term
+from sagittal.server.report.wording import parameter_term
 from tests.helpers.feedback import prescription
 
 METRES = parameter_term("step_length_m")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from defusedxml.ElementTree import fromstring
 
-from server.report.filter_charts import AGREEMENT_HEIGHT, TOP, draw_agreement, draw_spread
+from sagittal.server.report.filter_charts import AGREEMENT_HEIGHT, TOP, draw_agreement, draw_spread
 
 
 def read(chart: str) -> ET.Element:

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from server.report.columns import read_table
-from server.report.filter_files import BINS, bin_values, filter_run_files, orientations_parquet
-from server.report.filter_list import FILTERS, PROPOSED, list_engines
-from server.report.filter_view import view_comparison
+from sagittal.server.report.columns import read_table
+from sagittal.server.report.filter_files import BINS, bin_values, filter_run_files, orientations_parquet
+from sagittal.server.report.filter_list import FILTERS, PROPOSED, list_engines
+from sagittal.server.report.filter_view import view_comparison
 from tests.server import analysed
 
 FILES = filter_run_files(analysed.comparison())

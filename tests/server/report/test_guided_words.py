@@ -6,10 +6,10 @@ from typing import get_args
 
 import pytest
 
-from core.functional_tests.guided import GUIDED, STANDING_TESTS
-from core.functional_tests.result import TestPhase
-from core.parameters.catalogue import CATALOGUE
-from server.report.guided_words import HINTS, OVER, SAYS, TOTAL, tell_person
+from sagittal.core.functional_tests.guided import GUIDED, STANDING_TESTS
+from sagittal.core.functional_tests.result import TestPhase
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.report.guided_words import HINTS, OVER, SAYS, TOTAL, tell_person
 
 
 def test_every_guided_test_has_words_a_hint_and_a_figure_of_the_catalogue() -> None:

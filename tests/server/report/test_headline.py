@@ -8,17 +8,17 @@ from string import Formatter
 
 import pytest
 
-from core.change import Change, sort_changes
-from core.change.verdict import Verdict
-from core.frames import Side
-from core.norms.lookup import Norms
-from core.norms.values import NormValue
-from core.parameters.catalogue import CATALOGUE
-from core.parameters.result import Parameter
-from server.report.headline import LARGEST, MOST, Headline, find_changes, find_standouts
-from server.report.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
-from server.report.level import choose_zero
-from server.report.table import ParameterRow, parameter_rows
+from sagittal.core.change import Change, sort_changes
+from sagittal.core.change.verdict import Verdict
+from sagittal.core.frames import Side
+from sagittal.core.norms.lookup import Norms
+from sagittal.core.norms.values import NormValue
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.headline import LARGEST, MOST, Headline, find_changes, find_standouts
+from sagittal.server.report.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
+from sagittal.server.report.level import choose_zero
+from sagittal.server.report.table import ParameterRow, parameter_rows
 
 WORDS = {"side", "other", "d", "v", "l", "r", "a", "b", "cm", "c", "word"}
 LONGEST = 100

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from core.change import parameter_changes
-from core.parameters.result import Parameter
-from server.report.leaflet import LeafletFigure, list_figures
+from sagittal.core.change import parameter_changes
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.leaflet import LeafletFigure, list_figures
 
 
 def knee(degrees: float, *, estimated: bool = False) -> Parameter:

@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import pytest
 
-from core.change import parameter_changes
-from core.frames import SIDES
-from core.norms import Norms, look_up_norms
-from core.parameters import cycle_curves
-from core.parameters.anatomical_zero import anatomical_variables
-from core.parameters.result import CycleCurves, Parameter
-from server.report.bundle import Bundle
-from server.report.comparison import add_changes
-from server.report.level import GROUP, level_rows
-from server.report.model import report_model
+from sagittal.core.change import parameter_changes
+from sagittal.core.frames import SIDES
+from sagittal.core.norms import Norms, look_up_norms
+from sagittal.core.parameters import cycle_curves
+from sagittal.core.parameters.anatomical_zero import anatomical_variables
+from sagittal.core.parameters.result import CycleCurves, Parameter
+from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.comparison import add_changes
+from sagittal.server.report.level import GROUP, level_rows
+from sagittal.server.report.model import report_model
 from tests.server import walk
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from core.flags import RULES
-from core.norms.lookup import look_up_norms
-from core.parameters.result import Parameter
-from server.report.limits import NAMES
-from server.report.model import report_model
-from server.report.table import parameter_rows
+from sagittal.core.flags import RULES
+from sagittal.core.norms.lookup import look_up_norms
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.limits import NAMES
+from sagittal.server.report.model import report_model
+from sagittal.server.report.table import parameter_rows
 from tests.server.report.conftest import MakeBundle
 from tests.server.report.test_estimator import section
 
@@ -43,7 +43,7 @@ def test_estimated_angles_are_held_against_nothing(make_bundle: MakeBundle) -> N
 
 
 def test_without_counted_strides_there_are_none(make_bundle: MakeBundle) -> None:
-    from core.events.result import Strides
+    from sagittal.core.events.result import Strides
 
     assert report_model(make_bundle(strides=Strides(()))).limits is None
 

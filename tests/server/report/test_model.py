@@ -10,16 +10,16 @@ from dataclasses import replace
 
 import pytest
 
-from core.errors import Notice
-from core.events.result import GaitEvents, Strides
-from core.norms.lookup import look_up_norms
-from core.parameters.result import Parameter
-from server.report.bundle import Bundle
-from server.report.model import _plus_minus, report_model
-from server.report.panels import FEW_BAND
-from server.report.table import FEW_NOTE, ParameterRow, parameter_rows
-from server.report.tables import curves_csv, parameters_csv
-from server.report.wording import VARIABLES, difference_words, parameter_term, place_words
+from sagittal.core.errors import Notice
+from sagittal.core.events.result import GaitEvents, Strides
+from sagittal.core.norms.lookup import look_up_norms
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.model import _plus_minus, report_model
+from sagittal.server.report.panels import FEW_BAND
+from sagittal.server.report.table import FEW_NOTE, ParameterRow, parameter_rows
+from sagittal.server.report.tables import curves_csv, parameters_csv
+from sagittal.server.report.wording import VARIABLES, difference_words, parameter_term, place_words
 from tests.helpers.pairs import in_pairs, plain_python
 
 MakeBundle = Callable[..., Bundle]
@@ -383,7 +383,7 @@ def test_ten_minutes_are_reported_in_little_more_than_a_piece_of_plain_python(
 
 @pytest.mark.slow
 def test_reading_a_result_does_not_load_the_compiler() -> None:
-    code = "import sys, server.report.model, server.report.tables; sys.exit('numba' in sys.modules)"
+    code = "import sys; from sagittal.server.report import model, tables; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from core.errors import Notice
-from server.report.no_figure import FEW_SENSORS, OF_A_TEST, explain_no_figure
+from sagittal.core.errors import Notice
+from sagittal.server.report.no_figure import FEW_SENSORS, OF_A_TEST, explain_no_figure
 from tests.server.report.conftest import MakeBundle
 
 

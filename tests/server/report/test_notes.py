@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from core.norms import Norms, look_up_norms
-from core.norms.controls import ControlGroup
-from server.report.bundle import Bundle
-from server.report.model import ReportModel, report_model
-from server.report.notes import curve_notes, norm_note
-from server.report.panels import CurvePanel, SideCurve
-from server.report.table import FEW_NOTE
-from server.report.wording import NO_NORM
+from sagittal.core.norms import Norms, look_up_norms
+from sagittal.core.norms.controls import ControlGroup
+from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.model import ReportModel, report_model
+from sagittal.server.report.notes import curve_notes, norm_note
+from sagittal.server.report.panels import CurvePanel, SideCurve
+from sagittal.server.report.table import FEW_NOTE
+from sagittal.server.report.wording import NO_NORM
 from tests.server.report.conftest import MakeBundle
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from server.report.bundle import load_bundle
-from server.report.numbers import means_of, read_means
+from sagittal.server.report.bundle import load_bundle
+from sagittal.server.report.numbers import means_of, read_means
 from tests.server import analysed
 
 

@@ -6,8 +6,8 @@ from xml.etree.ElementTree import fromstring
 
 import pytest
 
-from server.report.paper_charts import prepare_figures, read_chart_styles, stretch_path
-from server.report.paper_words import SVG
+from sagittal.server.report.paper_charts import prepare_figures, read_chart_styles, stretch_path
+from sagittal.server.report.paper_words import SVG
 
 STYLES = """
 :root { --left: light-dark(#D55E00, #F5873A); --ink: light-dark(#11181E, #E9EDF0); }

@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element, fromstring
 
 import pytest
 
-from server.report.paper_words import SVG, place_words
+from sagittal.server.report.paper_words import SVG, place_words
 
 
 def chart(path: str, word: str = "Flexion ↑", y: int = 0, dy: int = 11, more: str = "") -> Element:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from server.report.change_words import find_term
-from server.report.model import report_model
-from server.report.numbers import numbers_of
-from server.report.profile import TOTALS, profile_view
-from server.report.trends import collect_figures
+from sagittal.server.report.change_words import find_term
+from sagittal.server.report.model import report_model
+from sagittal.server.report.numbers import numbers_of
+from sagittal.server.report.profile import TOTALS, profile_view
+from sagittal.server.report.trends import collect_figures
+from sagittal.web.language import load_catalogue
 from tests.server.report.conftest import MakeBundle
 from tests.server.report.test_estimator import section
-from web.language import load_catalogue
 
 
 def test_every_scored_curve_has_a_bar_and_the_profile_comes_last(make_bundle: MakeBundle) -> None:
@@ -62,6 +62,6 @@ def test_the_score_is_that_of_patient_page_and_trends(make_bundle: MakeBundle) -
 
 def test_without_angles_there_is_none(make_bundle: MakeBundle) -> None:
     assert report_model(make_bundle(angles=None)).profile is None
-    from core.scores import Scores
+    from sagittal.core.scores import Scores
 
     assert profile_view(Scores((), 42, "", "", "")) is None

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from core.activity.parameters import measure_day
-from core.errors import Notice
-from core.formats.draft import FEW_ROWS, grade_loss
-from server.report.bundle import Bundle, join_faults
-from server.report.quality_box import NO_WHOLE_DAY, quality_box
+from sagittal.core.activity.parameters import measure_day
+from sagittal.core.errors import Notice
+from sagittal.core.formats.draft import FEW_ROWS, grade_loss
+from sagittal.server.report.bundle import Bundle, join_faults
+from sagittal.server.report.quality_box import NO_WHOLE_DAY, quality_box
 from tests.server import daily
 from tests.server.report.conftest import MakeBundle
 from tests.server.report.test_estimator import section

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from server.report.sensor_checks import NOT_JUDGED, sensor_checks
+from sagittal.server.report.sensor_checks import NOT_JUDGED, sensor_checks
 
 
 def sensor(name: str, **changes: Any) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from server.report.sensor_places import view_sensor_places
+from sagittal.server.report.sensor_places import view_sensor_places
 
 STORED: dict[str, Any] = {
     "sensors": {

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.angles import JointAngles
-from core.frames import Floats, Side
-from core.squat.curves import VALGUS
-from core.squat.repetitions import FOOT_LIFTED
-from server.report.bundle import Bundle, StoredRepetition
-from server.report.squat import SURE, SquatSpan, SquatView, squat_view
+from sagittal.core.angles import JointAngles
+from sagittal.core.frames import Floats, Side
+from sagittal.core.squat.curves import VALGUS
+from sagittal.core.squat.repetitions import FOOT_LIFTED
+from sagittal.server.report.bundle import Bundle, StoredRepetition
+from sagittal.server.report.squat import SURE, SquatSpan, SquatView, squat_view
 
 VALUES = {
     "squat_depth_deg": 91.4,

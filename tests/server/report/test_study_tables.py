@@ -9,8 +9,8 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
-from core.errors import InputError, SagittalError
-from server.report.study_tables import FAILURES, PROVENANCE, StudyTables, StudyTake, write_study
+from sagittal.core.errors import InputError, SagittalError
+from sagittal.server.report.study_tables import FAILURES, PROVENANCE, StudyTables, StudyTake, write_study
 
 STRIDES = (
     b"side,start_s,stride_time_s,excluded_reason\n"

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from server.report.svg import TICKS, find_round_ticks
+from sagittal.server.report.svg import TICKS, find_round_ticks
 
 ENDS = st.floats(-1e3, 1e3)
 SPANS = st.floats(1e-2, 1e4)

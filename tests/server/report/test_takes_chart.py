@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from defusedxml.ElementTree import fromstring
 
-from core.parameters.result import Parameter
-from server.report.takes_chart import ROOM, WIDTH, find_scale, takes_svg
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.takes_chart import ROOM, WIDTH, find_scale, takes_svg
 
 
 def figure(mean: float | None, sd: float | None = None) -> Parameter:

@@ -12,15 +12,15 @@ from dataclasses import asdict, replace
 import pytest
 from defusedxml import ElementTree
 
-from core.condition import USUAL
-from core.norms import look_up_norms, temporal_values
-from core.parameters.result import Parameter
-from server.report.change_words import change_words
-from server.report.numbers import Numbers, read_numbers
-from server.report.tables import trends_csv
-from server.report.trend_chart import PlannedAssessment, trend_svg, value_range
-from server.report.trend_strip import trend_strip
-from server.report.trends import AnalysedVisit, Trend, VisitKind, follow_figures, names_in
+from sagittal.core.condition import USUAL
+from sagittal.core.norms import look_up_norms, temporal_values
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.change_words import change_words
+from sagittal.server.report.numbers import Numbers, read_numbers
+from sagittal.server.report.tables import trends_csv
+from sagittal.server.report.trend_chart import PlannedAssessment, trend_svg, value_range
+from sagittal.server.report.trend_strip import trend_strip
+from sagittal.server.report.trends import AnalysedVisit, Trend, VisitKind, follow_figures, names_in
 
 DAY = dt.date(2026, 3, 2)
 

@@ -11,16 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.frames import SIDES, SUFFIX
-from core.norms.controls import ControlSession, control_group, mean_curves
-from core.norms.kinematics import adult_kinematics
-from core.parameters import cycle_curves
-from core.parameters.kinematic import MEAN_ZERO
-from core.standing_angles import NAMES, PELVIS
-from server.report.bundle import Bundle
-from server.report.model import ReportModel, report_model
-from server.report.panels import CurvePanel, same_zero
-from server.report.tables import curves_csv, parameters_csv
+from sagittal.core.frames import SIDES, SUFFIX
+from sagittal.core.norms.controls import ControlSession, control_group, mean_curves
+from sagittal.core.norms.kinematics import adult_kinematics
+from sagittal.core.parameters import cycle_curves
+from sagittal.core.parameters.kinematic import MEAN_ZERO
+from sagittal.core.standing_angles import NAMES, PELVIS
+from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.model import ReportModel, report_model
+from sagittal.server.report.panels import CurvePanel, same_zero
+from sagittal.server.report.tables import curves_csv, parameters_csv
 from tests.server.report.conftest import MakeBundle
 from tests.server.report.test_estimator import section
 

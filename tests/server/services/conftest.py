@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from fastapi import FastAPI
 
-from server.jobs.opening import open_queue
-from server.services.reviewed import ReviewedAnalyses
-from server.settings import Settings
-from server.storage.blob_opening import open_blobs
-from server.storage.db import Database
+from sagittal.server.jobs.opening import open_queue
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blob_opening import open_blobs
+from sagittal.server.storage.db import Database
 from tests.helpers.databases import write_database
 from tests.helpers.engines import choose_url
 from tests.server.clinic import Clinic

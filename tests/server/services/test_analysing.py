@@ -9,13 +9,13 @@ from math import pi
 
 import pytest
 
-from core import held_samples
-from core.formats import SourceFile, write_recording
-from core.frames import Segment
-from core.recording import Recording
-from core.rotation import arrays
-from core.simulate import Arc, Dropout, RecordingSetup, Stand, Straight, simulate
-from server.services import analysing
+from sagittal.core import held_samples
+from sagittal.core.formats import SourceFile, write_recording
+from sagittal.core.frames import Segment
+from sagittal.core.recording import Recording
+from sagittal.core.rotation import arrays
+from sagittal.core.simulate import Arc, Dropout, RecordingSetup, Stand, Straight, simulate
+from sagittal.server.services import analysing
 
 STROLL = (Straight(5.0, 0.62, 0.54), Arc(1.5, pi, 0.52, 0.56))
 WORN: Mapping[str, tuple[Segment, ...]] = {

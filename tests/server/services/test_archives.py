@@ -12,16 +12,16 @@ from typing import Any
 
 import pytest
 
-from core.errors import ArchiveError
-from core.formats import SourceFile, read_recording
-from core.simulate import simulate_scenario
-from core.simulate.mt_text import mt_files
-from server.services import analysing, archives
-from server.services.analyses import AnalysisRecord
-from server.services.edit_log import EditHistory
-from server.services.recordings import RecordedFile, StoredRecording
-from server.services.signed_reports import SignedDocuments, SignedReport
-from server.storage.blob_folder import FolderBlobs
+from sagittal.core.errors import ArchiveError
+from sagittal.core.formats import SourceFile, read_recording
+from sagittal.core.simulate import simulate_scenario
+from sagittal.core.simulate.mt_text import mt_files
+from sagittal.server.services import analysing, archives
+from sagittal.server.services.analyses import AnalysisRecord
+from sagittal.server.services.edit_log import EditHistory
+from sagittal.server.services.recordings import RecordedFile, StoredRecording
+from sagittal.server.services.signed_reports import SignedDocuments, SignedReport
+from sagittal.server.storage.blob_folder import FolderBlobs
 from tests.core.formats.making import zipped
 
 SPACE = "0" * 32

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from server.commands.check import check
-from server.services import patients
-from server.settings import Settings
-from server.storage.db import Database
-from server.storage.high_water import raise_mark, set_mark
+from sagittal.server.commands.check import check
+from sagittal.server.services import patients
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import raise_mark, set_mark
 from tests.helpers.databases import write_database
 
 ROWS = 6

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from server.services import backup_schedule, erasure
-from server.services.backup_schedule import BackupState, Outcome, is_due, next_time, read_state
-from server.services.backups import list_backups
-from server.services.reviewed import ReviewedAnalyses
-from server.settings import Settings
-from server.storage.archive import make_key
-from server.storage.db import Database
-from server.worker.backing_up import BackupKeeper
+from sagittal.server.services import backup_schedule, erasure
+from sagittal.server.services.backup_schedule import BackupState, Outcome, is_due, next_time, read_state
+from sagittal.server.services.backups import list_backups
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.settings import Settings
+from sagittal.server.storage.archive import make_key
+from sagittal.server.storage.db import Database
+from sagittal.server.worker.backing_up import BackupKeeper
 from tests.faults.clinic import Clinic
 
 ZONE = dt.timezone(dt.timedelta(hours=2))

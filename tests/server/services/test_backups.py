@@ -15,24 +15,33 @@ from pathlib import Path
 import pytest
 from sqlalchemy import insert, select
 
-from server import audit
-from server.main import main
-from server.services import backups, checks, erasure, identities, patients, recordings, report_links, sessions
-from server.services.backups import MANIFEST, BackupError, MadeBackup, choose_kept, make_backup
-from server.services.restore_room import RestoreError
-from server.services.restoring import RestoredClinic, restore, try_restore
-from server.services.reviewed import ReviewedAnalyses
-from server.services.sweep import sweep
-from server.services.tombstones import Tombstones
-from server.settings import Settings, SettingsError
-from server.storage import fs
-from server.storage.archive import BackupFileError, ClinicKey, make_key, read_archive, read_key
-from server.storage.blob_folder import FolderBlobs
-from server.storage.db import Database
-from server.storage.person_tables import patient_identity
-from server.storage.report_tables import report_file, signed_report
-from server.storage.tables import audit as audit_table
-from server.storage.tables import login_session, now, user
+from sagittal.server import audit
+from sagittal.server.main import main
+from sagittal.server.services import (
+    backups,
+    checks,
+    erasure,
+    identities,
+    patients,
+    recordings,
+    report_links,
+    sessions,
+)
+from sagittal.server.services.backups import MANIFEST, BackupError, MadeBackup, choose_kept, make_backup
+from sagittal.server.services.restore_room import RestoreError
+from sagittal.server.services.restoring import RestoredClinic, restore, try_restore
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.sweep import sweep
+from sagittal.server.services.tombstones import Tombstones
+from sagittal.server.settings import Settings, SettingsError
+from sagittal.server.storage import fs
+from sagittal.server.storage.archive import BackupFileError, ClinicKey, make_key, read_archive, read_key
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.person_tables import patient_identity
+from sagittal.server.storage.report_tables import report_file, signed_report
+from sagittal.server.storage.tables import audit as audit_table
+from sagittal.server.storage.tables import login_session, now, user
 from tests.faults.clinic import Clinic, find_room
 from tests.helpers.engines import on_both_engines, tell_commands
 

@@ -12,19 +12,19 @@ from pathlib import Path
 import pytest
 from sqlalchemy import delete
 
-from server.main import main
-from server.processes.supervisor import Workers
-from server.services import backup_schedule, backups, checks, erasure, recordings, sweep, uploads
-from server.services.restore_room import RestoreError
-from server.services.restoring import restore
-from server.services.reviewed import ReviewedAnalyses
-from server.settings import Settings
-from server.storage.blob_bucket import BucketBlobs
-from server.storage.blob_folder import FolderBlobs
-from server.storage.blob_opening import open_blobs
-from server.storage.blobs import StoreAway
-from server.storage.db import Database
-from server.storage.tables import recording_file
+from sagittal.server.main import main
+from sagittal.server.processes.supervisor import Workers
+from sagittal.server.services import backup_schedule, backups, checks, erasure, recordings, sweep, uploads
+from sagittal.server.services.restore_room import RestoreError
+from sagittal.server.services.restoring import restore
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blob_bucket import BucketBlobs
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.blob_opening import open_blobs
+from sagittal.server.storage.blobs import StoreAway
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import recording_file
 from tests.faults.clinic import Clinic, until
 from tests.helpers.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
 

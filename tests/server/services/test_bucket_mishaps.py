@@ -15,18 +15,18 @@ from typing import Any
 import pytest
 from sqlalchemy.exc import OperationalError
 
-from server.main import main
-from server.services import backups, checks, custody, erasure, restoring, sweep, uploads
-from server.services.restore_room import RestoreError
-from server.services.restoring import restore
-from server.services.reviewed import ReviewedAnalyses
-from server.settings import Settings, SettingsError
-from server.storage import fs
-from server.storage.blob_bucket import BucketBlobs, BucketTrash
-from server.storage.blob_opening import note_bucket, open_blobs, read_note
-from server.storage.blobs import StoreAway
-from server.storage.db import Database
-from server.storage.trash import Address, name_stamp
+from sagittal.server.main import main
+from sagittal.server.services import backups, checks, custody, erasure, restoring, sweep, uploads
+from sagittal.server.services.restore_room import RestoreError
+from sagittal.server.services.restoring import restore
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.settings import Settings, SettingsError
+from sagittal.server.storage import fs
+from sagittal.server.storage.blob_bucket import BucketBlobs, BucketTrash
+from sagittal.server.storage.blob_opening import note_bucket, open_blobs, read_note
+from sagittal.server.storage.blobs import StoreAway
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.trash import Address, name_stamp
 from tests.data import ROOT
 from tests.faults.clinic import Clinic, until
 from tests.faults.failing import Dying, PowerError
@@ -60,7 +60,7 @@ def sweep_now(clinic: Clinic) -> int:
 
 def start(*words: str, home: Path, url: str, **more: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "server.main", *words, "--data", str(home)],
+        [sys.executable, "-m", "sagittal.server.main", *words, "--data", str(home)],
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env={**os.environ, "SAGITTAL_BUCKET": url, **more},
     )  # fmt: skip

@@ -6,9 +6,9 @@ import datetime as dt
 
 import pytest
 
-from server.services import notes, patients, programmes
-from server.services.errors import ServiceError
-from server.storage.db import Database
+from sagittal.server.services import notes, patients, programmes
+from sagittal.server.services.errors import ServiceError
+from sagittal.server.storage.db import Database
 
 
 @pytest.mark.parametrize("day", [dt.date(1, 1, 1), dt.date(9998, 12, 1)])

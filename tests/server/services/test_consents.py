@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from server.services import consents, erasure
-from server.services.errors import Conflict, ServiceError
-from server.services.reviewed import ReviewedAnalyses
-from server.storage.tables import now
+from sagittal.server.services import consents, erasure
+from sagittal.server.services.errors import Conflict, ServiceError
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage.tables import now
 from tests.faults.clinic import Clinic
 
 

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from core.events.edits import Edit
-from server import audit
-from server.commands.research import research
-from server.report.columns import read_table
-from server.services import consents, patients, reviews, sessions
-from server.services.deidentified import MOST_SHIFT_DAYS, open_key
+from sagittal.core.events.edits import Edit
+from sagittal.server import audit
+from sagittal.server.commands.research import research
+from sagittal.server.report.columns import read_table
+from sagittal.server.services import consents, patients, reviews, sessions
+from sagittal.server.services.deidentified import MOST_SHIFT_DAYS, open_key
 from tests.helpers.engines import tell_commands
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic, open_clinic

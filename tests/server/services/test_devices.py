@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from sqlalchemy import func, select
 
-from core.frames import GRAVITY
-from core.quality.device_course import follow_device
-from core.quality.devices import DeviceCheck
-from server.report.device_words import judge_device
-from server.services import devices, erasure, patients, recordings, sessions
-from server.services.devices import recall_places
-from server.storage.tables import device_check, now
+from sagittal.core.frames import GRAVITY
+from sagittal.core.quality.device_course import follow_device
+from sagittal.core.quality.devices import DeviceCheck
+from sagittal.server.report.device_words import judge_device
+from sagittal.server.services import devices, erasure, patients, recordings, sessions
+from sagittal.server.services.devices import recall_places
+from sagittal.server.storage.tables import device_check, now
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.pages.test_upload import device
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from core.feedback import Cue
-from server.services import histories, patients, prescriptions
-from server.services.feedback import REASONS, FeedbackRecords, _limb, gather, view
+from sagittal.core.feedback import Cue
+from sagittal.server.services import histories, patients, prescriptions
+from sagittal.server.services.feedback import REASONS, FeedbackRecords, _limb, gather, view
 from tests.server import feedback
 from tests.server.clinic import Clinic
 

@@ -13,15 +13,22 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select, update
 
-from server import audit
-from server.main import main
-from server.services import identities, patients
-from server.services.errors import Conflict, ServiceError
-from server.services.identities import PatientIdentity
-from server.settings import Settings
-from server.storage.db import Database, Source
-from server.storage.field_cipher import FieldKeys, KeyUnusable, ValueUnreadable, add_key, make_keys, read_keys
-from server.storage.person_tables import patient_identity
+from sagittal.server import audit
+from sagittal.server.main import main
+from sagittal.server.services import identities, patients
+from sagittal.server.services.errors import Conflict, ServiceError
+from sagittal.server.services.identities import PatientIdentity
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database, Source
+from sagittal.server.storage.field_cipher import (
+    FieldKeys,
+    KeyUnusable,
+    ValueUnreadable,
+    add_key,
+    make_keys,
+    read_keys,
+)
+from sagittal.server.storage.person_tables import patient_identity
 from tests.helpers.engines import choose_url, tell_commands
 
 WHO = {

@@ -10,10 +10,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from server.processes.channel import Channel
-from server.services import paper_child
-from server.services.paper_child import PaperReply
-from server.settings import Settings
+from sagittal.server.processes.channel import Channel
+from sagittal.server.services import paper_child
+from sagittal.server.services.paper_child import PaperReply
+from sagittal.server.settings import Settings
 
 Ask = Callable[[bytes], PaperReply]
 

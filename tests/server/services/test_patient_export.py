@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 from sqlalchemy import insert
 
-from server.services import consents, notes, patients, recordings, sessions
-from server.services.errors import NotFound
-from server.services.patient_export import export_patient
-from server.services.references import list_referenced
-from server.storage.archive import PIECE
-from server.storage.live_tables import live_event, live_take
-from server.storage.tables import new_id, now
+from sagittal.server.services import consents, notes, patients, recordings, sessions
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.patient_export import export_patient
+from sagittal.server.services.references import list_referenced
+from sagittal.server.storage.archive import PIECE
+from sagittal.server.storage.live_tables import live_event, live_take
+from sagittal.server.storage.tables import new_id, now
 from tests.faults.clinic import Clinic
 
 

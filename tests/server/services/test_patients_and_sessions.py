@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
-from core.errors import SagittalError
-from server import audit
-from server.jobs.queue import COMPARE_FILTERS
-from server.jobs.table import TableQueue
-from server.services import (
+from sagittal.core.errors import SagittalError
+from sagittal.server import audit
+from sagittal.server.jobs.queue import COMPARE_FILTERS
+from sagittal.server.jobs.table import TableQueue
+from sagittal.server.services import (
     analyses,
     checks,
     erasure,
@@ -24,13 +24,13 @@ from server.services import (
     reference_files,
     sessions,
 )
-from server.services.errors import Conflict, NotFound, ServiceError, TooLarge
-from server.services.reviewed import ReviewedAnalyses
-from server.services.sweep import sweep
-from server.settings import Settings
-from server.storage import tables
-from server.storage.blob_folder import FolderBlobs
-from server.storage.db import Database, Source
+from sagittal.server.services.errors import Conflict, NotFound, ServiceError, TooLarge
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.services.sweep import sweep
+from sagittal.server.settings import Settings
+from sagittal.server.storage import tables
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.db import Database, Source
 
 NO_TRIGGERS = {
     "sqlite": ("DROP TRIGGER audit_no_update", "DROP TRIGGER audit_no_delete"),
@@ -398,7 +398,7 @@ def test_no_byte_of_an_erased_patient_is_left_in_the_data_folder(clinic: Clinic)
 def test_no_byte_of_an_erased_session_is_left_and_who_reads_an_older_state_only_delays_it(
     clinic: Clinic, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.storage.sqlite_file.BUSY_TIMEOUT_MS", 10)
+    monkeypatch.setattr("sagittal.server.storage.sqlite_file.BUSY_TIMEOUT_MS", 10)
     patient_id = clinic.patient()
     with clinic.db.write() as c:
         session_id = sessions.create(c, clinic.who, patient_id, title="CANARY-TITLE").id

@@ -8,15 +8,15 @@ import msgspec
 import pytest
 from sqlalchemy import insert
 
-from server.processes.errand import MOST_WAITING
-from server.report.pdf import PdfMissing
-from server.services import pdfs, signed_reports
-from server.services.errors import NotFound
-from server.services.paper_child import PaperReply
-from server.services.pdfs import PdfFailed, make_pdf, read_signed_pdf
-from server.settings import Settings
-from server.storage.report_tables import report_file, signed_report
-from server.storage.tables import now
+from sagittal.server.processes.errand import MOST_WAITING
+from sagittal.server.report.pdf import PdfMissing
+from sagittal.server.services import pdfs, signed_reports
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.paper_child import PaperReply
+from sagittal.server.services.pdfs import PdfFailed, make_pdf, read_signed_pdf
+from sagittal.server.settings import Settings
+from sagittal.server.storage.report_tables import report_file, signed_report
+from sagittal.server.storage.tables import now
 from tests.server import feedback
 from tests.server.clinic import Clinic
 
@@ -46,7 +46,7 @@ def answering(monkeypatch: pytest.MonkeyPatch, said: PaperReply | Exception) -> 
 def test_the_document_goes_to_a_process_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     child = answering(monkeypatch, PaperReply(b"%PDF"))
     assert make_pdf(Settings(data_dir=tmp_path), PAGE) == b"%PDF"
-    assert child.orders == [("server.services.paper_child", PAGE, pdfs.LONGEST_S)]
+    assert child.orders == [("sagittal.server.services.paper_child", PAGE, pdfs.LONGEST_S)]
 
 
 @pytest.mark.parametrize(

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
-from server.services import erasure, patients, programmes, sessions
-from server.services.course import SIX_WEEKS
-from server.services.errors import Conflict, NotFound, ServiceError
-from server.services.reviewed import ReviewedAnalyses
-from server.settings import Settings
-from server.storage.blob_folder import FolderBlobs
-from server.storage.db import Database
-from server.storage.tables import audit, now, planned_visit
+from sagittal.server.services import erasure, patients, programmes, sessions
+from sagittal.server.services.course import SIX_WEEKS
+from sagittal.server.services.errors import Conflict, NotFound, ServiceError
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import audit, now, planned_visit
 
 MONDAY = dt.date(2026, 3, 2)
 

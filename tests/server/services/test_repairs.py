@@ -6,11 +6,11 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from core.correction import SensorCorrection
-from server.services import analyses, recordings
-from server.services.analyses import AnalysisRecord
-from server.services.analysing import REPAIRED
-from server.services.repairs import _list_changes, read_proposal, read_without_limits, take_setup
+from sagittal.core.correction import SensorCorrection
+from sagittal.server.services import analyses, recordings
+from sagittal.server.services.analyses import AnalysisRecord
+from sagittal.server.services.analysing import REPAIRED
+from sagittal.server.services.repairs import _list_changes, read_proposal, read_without_limits, take_setup
 from tests.server import analysed, feedback
 from tests.server.clinic import Clinic
 

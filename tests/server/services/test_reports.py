@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from core.events.edits import Edit
-from server.services import histories, patients, reports, reviews
-from server.services.errors import NotFound
-from server.services.histories import AnalysedSession
-from server.services.patients import Patient
+from sagittal.core.events.edits import Edit
+from sagittal.server.services import histories, patients, reports, reviews
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.services.patients import Patient
 from tests.server import feedback
 from tests.server.clinic import Clinic
 

@@ -9,11 +9,11 @@ import pytest
 from sqlalchemy import delete, func, select, update
 from sqlalchemy.exc import IntegrityError as DatabaseIntegrityError
 
-from core.events.edits import Edit
-from server.services import analyses, edit_log, erasure, patients, reviews, sessions
-from server.services.errors import Conflict
-from server.services.reviewed import ReviewedAnalyses
-from server.storage import tables
+from sagittal.core.events.edits import Edit
+from sagittal.server.services import analyses, edit_log, erasure, patients, reviews, sessions
+from sagittal.server.services.errors import Conflict
+from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.storage import tables
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic, open_clinic
 

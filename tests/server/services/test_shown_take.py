@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import select
 
-from server.services import analyses, recordings
-from server.services.analyses import AnalysisRecord
-from server.services.recordings import RecordedFile
-from server.services.shown_take import make_key, submit_for, submit_on_shown
-from server.storage.tables import audit, job
+from sagittal.server.services import analyses, recordings
+from sagittal.server.services.analyses import AnalysisRecord
+from sagittal.server.services.recordings import RecordedFile
+from sagittal.server.services.shown_take import make_key, submit_for, submit_on_shown
+from sagittal.server.storage.tables import audit, job
 from tests.server import feedback
 from tests.server.clinic import Clinic
 

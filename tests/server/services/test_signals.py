@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from server.services import analyses
-from server.services.analyses import AnalysisRecord
-from server.services.errors import NotFound
-from server.services.signals import MOST_POINTS, SignalWindow, _extremes, list_lanes, read_window
+from sagittal.server.services import analyses
+from sagittal.server.services.analyses import AnalysisRecord
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.signals import MOST_POINTS, SignalWindow, _extremes, list_lanes, read_window
 from tests.server import analysed, feedback
 from tests.server.clinic import Clinic
 

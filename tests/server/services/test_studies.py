@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from server.auth.identity import Identity
-from server.auth.roles import Role
-from server.report.study_tables import FAILURES, PROVENANCE
-from server.services import analyses, recordings
-from server.services.errors import Conflict
-from server.services.exports import make_pseudonym
-from server.services.studies import MOST_VISITS, StudyChoice, check_size, list_visits, make_study
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Role
+from sagittal.server.report.study_tables import FAILURES, PROVENANCE
+from sagittal.server.services import analyses, recordings
+from sagittal.server.services.errors import Conflict
+from sagittal.server.services.exports import make_pseudonym
+from sagittal.server.services.studies import MOST_VISITS, StudyChoice, check_size, list_visits, make_study
 from tests.server import feedback
 from tests.server.clinic import Clinic
 from tests.server.services.test_visits import take

@@ -10,16 +10,16 @@ from collections.abc import Callable, Iterator
 import msgspec
 import pytest
 
-from server.auth.identity import Identity
-from server.auth.roles import Role
-from server.processes.channel import Channel
-from server.report.study_tables import PROVENANCE
-from server.services import study_child
-from server.services.studies import StudyChoice
-from server.services.study_child import StudyReply
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Role
+from sagittal.server.processes.channel import Channel
+from sagittal.server.report.study_tables import PROVENANCE
+from sagittal.server.services import study_child
+from sagittal.server.services.studies import StudyChoice
+from sagittal.server.services.study_child import StudyReply
+from sagittal.web.user_text import encode_user_text
 from tests.server import feedback
 from tests.server.clinic import Clinic
-from web.user_text import encode_user_text
 
 ADMIN = Identity("u", "ada", "Ada", Role.ADMIN, "l")
 Ask = Callable[[bytes], StudyReply]

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.errors import ManifestError
-from core.frames import GRAVITY
-from server.services import recordings, tables
-from server.services.errors import NotFound
-from server.services.tables import TableShape
+from sagittal.core.errors import ManifestError
+from sagittal.core.frames import GRAVITY
+from sagittal.server.services import recordings, tables
+from sagittal.server.services.errors import NotFound
+from sagittal.server.services.tables import TableShape
 from tests.core.formats.making import signals
 from tests.server import feedback
 from tests.server.clinic import Clinic

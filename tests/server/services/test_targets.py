@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from core.frames import Side
-from core.norms import Norms, NormValue
-from core.parameters.result import Parameter
-from server.report.numbers import Numbers
-from server.report.wording import NO_NORM
-from server.services import patients
-from server.services.targets import (
+from sagittal.core.frames import Side
+from sagittal.core.norms import Norms, NormValue
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.numbers import Numbers
+from sagittal.server.report.wording import NO_NORM
+from sagittal.server.services import patients
+from sagittal.server.services.targets import (
     FEWEST,
     AnalysedWalk,
     _earlier,

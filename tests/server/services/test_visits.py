@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from core.condition import WalkingCondition
-from server.report.trends import VisitKind
-from server.services.analyses import AnalysisRecord
-from server.services.edit_log import EditHistory
-from server.services.histories import AnalysedSession, list_analysed
-from server.services.sessions import Session, WalkedSession
-from server.services.visits import (
+from sagittal.core.condition import WalkingCondition
+from sagittal.server.report.trends import VisitKind
+from sagittal.server.services.analyses import AnalysisRecord
+from sagittal.server.services.edit_log import EditHistory
+from sagittal.server.services.histories import AnalysedSession, list_analysed
+from sagittal.server.services.sessions import Session, WalkedSession
+from sagittal.server.services.visits import (
     ClinicVisit,
     _two_days,
     choose_newest_walks,

@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import Column, Connection, Integer, MetaData, Table, create_engine, delete, insert, update
 from sqlalchemy.exc import IntegrityError
 
-from server.storage.append_only import make_append_only, write_triggers
+from sagittal.server.storage.append_only import make_append_only, write_triggers
 
 KEEP = "Rows of this log stay."
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from server.settings import Settings, SettingsError
-from server.storage.blob_folder import FolderBlobs
-from server.storage.blob_moving import move_blobs
-from server.storage.blob_opening import is_moving, open_blobs, read_note, write_note
-from server.storage.blobs import INCOMING
+from sagittal.server.settings import Settings, SettingsError
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.blob_moving import move_blobs
+from sagittal.server.storage.blob_opening import is_moving, open_blobs, read_note, write_note
+from sagittal.server.storage.blobs import INCOMING
 from tests.helpers.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
 
 SPACE = "a" * 32

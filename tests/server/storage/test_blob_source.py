@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from server.storage.blob_folder import FolderBlobs
-from server.storage.blob_source import open_source
-from server.storage.blobs import IntegrityError
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.blob_source import open_source
+from sagittal.server.storage.blobs import IntegrityError
 
 SPACE = "a" * 32
 

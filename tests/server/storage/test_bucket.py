@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from server.settings import Settings, SettingsError, load_settings
-from server.storage import blob_bucket, s3_bucket
-from server.storage.blob_bucket import BucketBlobs
-from server.storage.blob_opening import open_blobs, require_use
-from server.storage.blobs import BlobFile, BlobStore, StoreAway
+from sagittal.server.settings import Settings, SettingsError, load_settings
+from sagittal.server.storage import blob_bucket, s3_bucket
+from sagittal.server.storage.blob_bucket import BucketBlobs
+from sagittal.server.storage.blob_opening import open_blobs, require_use
+from sagittal.server.storage.blobs import BlobFile, BlobStore, StoreAway
 from tests.data import ROOT
 from tests.helpers.buckets import KEYS, Bucket, bucket, s3_server  # noqa: F401 - fixtures
 
@@ -233,7 +233,10 @@ def test_a_server_does_not_start_on_a_bucket_that_is_not_there(
 ) -> None:
     environment = {**os.environ, "SAGITTAL_BUCKET": "s3://nobodys"}
     started = subprocess.run(
-        [sys.executable, "-m", "server.main", "serve", "--data", str(tmp_path / "home"), "--port", "0"],
+        [
+            sys.executable, "-m", "sagittal.server.main",
+            "serve", "--data", str(tmp_path / "home"), "--port", "0",
+        ],
         capture_output=True, text=True, check=False, timeout=120, cwd=ROOT, env=environment,
     )  # fmt: skip
     assert started.returncode == 1

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from server.processes.environment import make_environment
-from server.settings import Settings
-from server.storage.compile_cache import (
+from sagittal.server.processes.environment import make_environment
+from sagittal.server.settings import Settings
+from sagittal.server.storage.compile_cache import (
     KEEP_S,
     find_compile_cache,
     fingerprint_filters,
@@ -19,8 +19,8 @@ from server.storage.compile_cache import (
 from tests.data import ROOT
 
 FILTER = """from numba import njit
-from core.frames import G
-from core import (
+from sagittal.core.frames import G
+from sagittal.core import (
     angles,
 )
 @njit
@@ -45,7 +45,7 @@ def test_two_data_folders_share_what_has_been_compiled(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_second_process_compiles_nothing_again(tmp_path: Path) -> None:
     code = (
-        "from core.fusion import attitude; attitude.compile_attitude_kernel();"
+        "from sagittal.core.fusion import attitude; attitude.compile_attitude_kernel();"
         "s = attitude.attitude_kernel.stats; print(len(s.cache_hits), len(s.cache_misses))"
     )
     said = []
@@ -99,7 +99,7 @@ def test_two_installations_of_one_version_have_folders_of_their_own(
         package = tmp_path / name / "core"
         package.mkdir(parents=True)
         (package / "kernel.py").write_text(FILTER)
-        monkeypatch.setattr("core.__file__", str(package / "__init__.py"))
+        monkeypatch.setattr("sagittal.core.__file__", str(package / "__init__.py"))
         folder = find_compile_cache(os.environ, tmp_path)
         (folder / "core_0").mkdir()
         (folder / "core_0" / "kernel.nbi").write_bytes(b"")

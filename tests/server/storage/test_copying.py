@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from sqlalchemy import insert, select
 
-from server import audit
-from server.services import patients, sessions
-from server.storage.copying import copy_rows
-from server.storage.db import Database, highest_number, raise_number
-from server.storage.tables import audit as audit_table
-from server.storage.tables import recording, session
+from sagittal.server import audit
+from sagittal.server.services import patients, sessions
+from sagittal.server.storage.copying import copy_rows
+from sagittal.server.storage.db import Database, highest_number, raise_number
+from sagittal.server.storage.tables import audit as audit_table
+from sagittal.server.storage.tables import recording, session
 from tests.helpers.databases import write_database
 
 

@@ -9,9 +9,9 @@ import pytest
 from sqlalchemy import insert, select, update
 from sqlalchemy.exc import DBAPIError, IntegrityError, StatementError
 
-from server.storage.db import Database, Source
-from server.storage.migrate import copy_database
-from server.storage.tables import new_id, now, patient, session
+from sagittal.server.storage.db import Database, Source
+from sagittal.server.storage.migrate import copy_database
+from sagittal.server.storage.tables import new_id, now, patient, session
 
 WRITERS, ROUNDS = 50, 4
 

@@ -8,7 +8,7 @@ import os
 
 import pytest
 
-from server.storage.disk_log import QUIET_S, DiskLog
+from sagittal.server.storage.disk_log import QUIET_S, DiskLog
 
 FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 

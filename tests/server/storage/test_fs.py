@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from server.storage import fs
-from server.storage.blob_folder import FolderBlobs
-from server.storage.blobs import IntegrityError
+from sagittal.server.storage import fs
+from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.blobs import IntegrityError
 from tests.data import ROOT
 from tests.faults.failing import FailingSystem
 
@@ -100,7 +100,7 @@ def test_one_lock_at_a_time_and_it_dies_with_its_holder(tmp_path: Path) -> None:
     path = tmp_path / "lock"
     script = f"""
 import pathlib, sys
-from server.storage import fs
+from sagittal.server.storage import fs
 lock = fs.Lock(pathlib.Path({str(path)!r}), "process one")
 print("locked", flush=True)
 sys.stdin.read()

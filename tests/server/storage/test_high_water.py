@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from server import audit
-from server.storage import fs
-from server.storage.db import Database
-from server.storage.high_water import (
+from sagittal.server import audit
+from sagittal.server.storage import fs
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import (
     HighWater,
     MarkKeeper,
     explain_lost_rows,
@@ -21,7 +21,7 @@ from server.storage.high_water import (
     read_newest,
     set_mark,
 )
-from server.storage.migrate import copy_database, upgrade
+from sagittal.server.storage.migrate import copy_database, upgrade
 from tests.faults.clinic import until
 from tests.faults.model_disk import ModelDisk
 from tests.helpers.databases import write_database

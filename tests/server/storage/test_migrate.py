@@ -20,11 +20,11 @@ from alembic import command
 from alembic.script import ScriptDirectory
 from sqlalchemy.exc import IntegrityError
 
-from server.commands import serve
-from server.settings import Settings
-from server.storage import migrate
-from server.storage.db import Database, Source
-from server.storage.tables import metadata
+from sagittal.server.commands import serve
+from sagittal.server.settings import Settings
+from sagittal.server.storage import migrate
+from sagittal.server.storage.db import Database, Source
+from sagittal.server.storage.tables import metadata
 from tests.data import ROOT
 from tests.helpers.postgres import run_sql
 
@@ -234,7 +234,7 @@ def test_a_migration_killed_in_the_middle_leaves_exactly_the_old_revision(
     step.write_text(HANG.format(head=head, then=f"pathlib.Path({str(marker)!r}).touch(); time.sleep(600)"))
     script = textwrap.dedent(f"""
         from pathlib import PosixPath
-        from server.storage.migrate import upgrade
+        from sagittal.server.storage.migrate import upgrade
         upgrade({source!r}, scripts={scripts!r}, backups={kept!r})
     """)
     process = subprocess.Popen([sys.executable, "-c", script], cwd=ROOT)
@@ -322,7 +322,7 @@ def test_a_stopped_worker_does_not_wait_and_a_newer_database_is_refused(tmp_path
 def test_the_command_waits_quietly_and_ends_when_told(tmp_path: Path) -> None:
     migrate.upgrade(tmp_path / "sagittal.db", target="0020")
     worker = subprocess.Popen(
-        [sys.executable, "-m", "server.main", "worker", "--data", str(tmp_path)],
+        [sys.executable, "-m", "sagittal.server.main", "worker", "--data", str(tmp_path)],
         cwd=ROOT, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     with worker:

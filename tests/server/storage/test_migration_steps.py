@@ -12,7 +12,7 @@ from alembic.operations import Operations
 from sqlalchemy import create_engine
 from sqlalchemy.exc import IntegrityError
 
-from server.storage.migration_steps import forbid_changes, is_sqlite, rebuild
+from sagittal.server.storage.migration_steps import forbid_changes, is_sqlite, rebuild
 
 
 @contextmanager

@@ -16,19 +16,19 @@ from alembic import command
 from sqlalchemy import insert, make_url, select
 from sqlalchemy.exc import IntegrityError, OperationalError
 
-from server import audit
-from server.jobs.opening import open_queue
-from server.main import main
-from server.services import patients
-from server.services.custody import StrangersError, refuse_foreign_folder
-from server.settings import Settings, SettingsError
-from server.storage import migrate
-from server.storage.db import Database, highest_number
-from server.storage.high_water import set_mark
-from server.storage.person_tables import api_token
-from server.storage.postgres import PostgresServer
-from server.storage.refusal import is_busy
-from server.storage.tables import metadata, new_id, now, patient, user
+from sagittal.server import audit
+from sagittal.server.jobs.opening import open_queue
+from sagittal.server.main import main
+from sagittal.server.services import patients
+from sagittal.server.services.custody import StrangersError, refuse_foreign_folder
+from sagittal.server.settings import Settings, SettingsError
+from sagittal.server.storage import migrate
+from sagittal.server.storage.db import Database, highest_number
+from sagittal.server.storage.high_water import set_mark
+from sagittal.server.storage.person_tables import api_token
+from sagittal.server.storage.postgres import PostgresServer
+from sagittal.server.storage.refusal import is_busy
+from sagittal.server.storage.tables import metadata, new_id, now, patient, user
 from tests.helpers.databases import write_database
 from tests.helpers.engines import require_postgres
 from tests.helpers.postgres import PASSWORD, run_sql
@@ -217,7 +217,7 @@ def test_a_clinic_moves_to_postgres_and_back_unchanged(
 def test_a_writer_that_waits_too_long_is_told_that_the_database_is_busy(
     postgres: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.storage.postgres.WAIT_MS", 50)
+    monkeypatch.setattr("sagittal.server.storage.postgres.WAIT_MS", 50)
     with closing(Database(postgres)) as one, closing(Database(postgres)) as two, one.write():
         with pytest.raises(OperationalError) as busy, two.write():
             pass
@@ -244,7 +244,7 @@ async def test_what_only_postgres_refuses_is_a_problem_of_the_request(tmp_path: 
 
 
 def test_a_frozen_writer_is_forgotten(postgres: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.storage.postgres.FORGOTTEN_S", 1)
+    monkeypatch.setattr("sagittal.server.storage.postgres.FORGOTTEN_S", 1)
     with closing(Database(postgres)) as frozen, closing(Database(postgres)) as other:
 
         def hold() -> None:
@@ -301,7 +301,7 @@ def test_a_worker_elsewhere_needs_the_servers_folder_and_its_time(
 def test_what_was_erased_is_in_no_table_of_the_disk_and_who_reads_only_delays_it(
     postgres: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.storage.postgres.WAIT_MS", 50)
+    monkeypatch.setattr("sagittal.server.storage.postgres.WAIT_MS", 50)
 
     def found() -> bool:
         run_sql("CHECKPOINT")

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from core.errors import InputError
-from core.formats.live_log import FILE_MARK, LogRecord, hello_json, record
-from server.storage import fs, segments
+from sagittal.core.errors import InputError
+from sagittal.core.formats.live_log import FILE_MARK, LogRecord, hello_json, record
+from sagittal.server.storage import fs, segments
 from tests.helpers.live_takes import HELLO, frame, stored
 
 FRAMES = [frame(i) for i in range(4)]

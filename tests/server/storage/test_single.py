@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import Engine, create_engine, event
 from sqlalchemy.pool import StaticPool
 
-from server.storage.single import begin_with, without_transactions
+from sagittal.server.storage.single import begin_with, without_transactions
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from server.storage.trash import FolderTrash
+from sagittal.server.storage.trash import FolderTrash
 
 SPACE, NAME, OTHER = "a" * 32, "b" * 64, "c" * 64
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from server.report.exports import poses_parquet
-from server.services import analyses, patients, recordings, sessions
-from server.viewer.motion import ReplayMotion, prepare_motion
+from sagittal.server.report.exports import poses_parquet
+from sagittal.server.services import analyses, patients, recordings, sessions
+from sagittal.server.viewer.motion import ReplayMotion, prepare_motion
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from core.body.poses import Poses
-from core.frames import FOOT, SIDES, SUFFIX, Side
-from core.online.frame import LiveFrame
-from core.parameters.live_stride import LiveStride
-from server.live import wire
-from server.live.messages import Picture
+from sagittal.core.body.poses import Poses
+from sagittal.core.frames import FOOT, SIDES, SUFFIX, Side
+from sagittal.core.online.frame import LiveFrame
+from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.server.live import wire
+from sagittal.server.live.messages import Picture
 from tests.server import walk
 
 RATE_HZ = 30.0

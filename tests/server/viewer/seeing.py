@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from core.frames import SIDES, Side
-from server.viewer.colours import TINTS
+from sagittal.core.frames import SIDES, Side
+from sagittal.server.viewer.colours import TINTS
 
 CHROMIUM = Path("/usr/bin/chromium")
 ARGS = [

@@ -7,9 +7,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from core.body.model import BodyModel
-from server.viewer.body_parts import find_toe_bend, locate_ball, make_parts
-from server.viewer.shapes import Mesh
+from sagittal.core.body.model import BodyModel
+from sagittal.server.viewer.body_parts import find_toe_bend, locate_ball, make_parts
+from sagittal.server.viewer.shapes import Mesh
 from tests.server import walk
 
 BODIES = [

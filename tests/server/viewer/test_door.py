@@ -15,7 +15,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 from websockets.typing import Subprotocol
 
-from server.viewer.views import FigureViews
+from sagittal.server.viewer.views import FigureViews
 from tests.server.viewer.conftest import Ward
 
 pytestmark = pytest.mark.anyio

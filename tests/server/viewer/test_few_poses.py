@@ -1,11 +1,11 @@
-"""Rotations of a moment are those of core.rotation."""
+"""Rotations of a moment are those of sagittal.core.rotation."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from core import rotation
-from server.viewer.few_poses import find_matrices, turn_about_z
+from sagittal.core import rotation
+from sagittal.server.viewer.few_poses import find_matrices, turn_about_z
 
 Q = rotation.normalise(np.random.default_rng(4).normal(size=(3, 5, 4)))
 

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 import pytest
 
-from server.viewer.first_picture import HEIGHT, draw_first_picture
-from server.viewer.motion import ReplayMotion, prepare_motion
-from server.viewer.room import FOV_RAD, frame_person
+from sagittal.server.viewer.first_picture import HEIGHT, draw_first_picture
+from sagittal.server.viewer.motion import ReplayMotion, prepare_motion
+from sagittal.server.viewer.room import FOV_RAD, frame_person
 from tests.server import walk
 
 CLOSE: Final = 4

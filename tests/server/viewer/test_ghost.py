@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 import viser
 
-from core import rotation
-from core.angles import cardan_zxy
-from core.body.poses import Poses
-from core.frames import SIDES, Side
-from core.norms import adult_kinematics
-from server.viewer.batches import PALE, RAISED_M
-from server.viewer.colours import GHOST, to_linear_rgb
-from server.viewer.ghost import PHASES, find_heading, match_ghost, match_reference
-from server.viewer.motion import GhostMotion, ReplayMotion, prepare_motion
-from server.viewer.reference import ReferenceWalk
-from server.viewer.replay_figure import ReplayFigure
+from sagittal.core import rotation
+from sagittal.core.angles import cardan_zxy
+from sagittal.core.body.poses import Poses
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.norms import adult_kinematics
+from sagittal.server.viewer.batches import PALE, RAISED_M
+from sagittal.server.viewer.colours import GHOST, to_linear_rgb
+from sagittal.server.viewer.ghost import PHASES, find_heading, match_ghost, match_reference
+from sagittal.server.viewer.motion import GhostMotion, ReplayMotion, prepare_motion
+from sagittal.server.viewer.reference import ReferenceWalk
+from sagittal.server.viewer.replay_figure import ReplayFigure
 from tests.server import walk
 
 TURN = np.radians(70.0)

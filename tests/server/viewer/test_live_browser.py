@@ -9,8 +9,8 @@ import threading
 import numpy as np
 import pytest
 
-from core.frames import SIDES
-from server.viewer.colours import TINTS
+from sagittal.core.frames import SIDES
+from sagittal.server.viewer.colours import TINTS
 from tests.server.viewer.conftest import Ward
 from tests.server.viewer.pictures import POSES, picture
 from tests.server.viewer.seeing import ARGS, CHROMIUM, PATIENCE_MS, pixels_of, shot, until

@@ -12,21 +12,21 @@ import pytest
 import viser
 from viser._messages import SceneNodeUpdateMessage
 
-from core import rotation
-from core.angles import cardan_zxy
-from core.body.poses import Poses
-from core.frames import FOOT, SIDES, Segment
-from core.norms import adult_kinematics
-from server.viewer.batches import PALE
-from server.viewer.colours import GHOST, TINTS, to_linear_rgb
-from server.viewer.layout import FigureLayout
-from server.viewer.live_figure import LiveFigure
-from server.viewer.live_floor import PRINTS, TRAIL_S
-from server.viewer.live_path import LivePath
-from server.viewer.moment import FigureMoment
-from server.viewer.motion import prepare_motion
-from server.viewer.reference import SEGMENTS, ReferenceWalk
-from server.viewer.steps import PIECE_M
+from sagittal.core import rotation
+from sagittal.core.angles import cardan_zxy
+from sagittal.core.body.poses import Poses
+from sagittal.core.frames import FOOT, SIDES, Segment
+from sagittal.core.norms import adult_kinematics
+from sagittal.server.viewer.batches import PALE
+from sagittal.server.viewer.colours import GHOST, TINTS, to_linear_rgb
+from sagittal.server.viewer.layout import FigureLayout
+from sagittal.server.viewer.live_figure import LiveFigure
+from sagittal.server.viewer.live_floor import PRINTS, TRAIL_S
+from sagittal.server.viewer.live_path import LivePath
+from sagittal.server.viewer.moment import FigureMoment
+from sagittal.server.viewer.motion import prepare_motion
+from sagittal.server.viewer.reference import SEGMENTS, ReferenceWalk
+from sagittal.server.viewer.steps import PIECE_M
 from tests.server import walk
 
 RATE_HZ = 30.0

@@ -15,9 +15,9 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.typing import Subprotocol
 
-from server.live.hub import Hub
-from server.services import patients, sessions
-from server.viewer.views import FigureView, FigureViews
+from sagittal.server.live.hub import Hub
+from sagittal.server.services import patients, sessions
+from sagittal.server.viewer.views import FigureView, FigureViews
 from tests.server.viewer.conftest import Ward
 from tests.server.viewer.pictures import picture
 

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 import viser
 
-from core.angles import cardan_zxy
-from core.angles.measure import measure_angles
-from core.frames import SHANK, SIDES, THIGH, Side
-from core.fusion.orientations import Orientations
-from core.norms import adult_kinematics, look_up_norms
-from core.rotation import conjugate, multiply
-from server.live.messages import STALE_S, Picture
-from server.live.room import Room
-from server.viewer.live_figure import LiveFigure
-from server.viewer.live_reference import LiveReference, find_standing_angles
-from server.viewer.live_watch import FeedFrame, LiveWatch, read_moment
-from server.viewer.moment import FigureMoment
-from server.viewer.reference import SEGMENTS, ReferenceWalk, add_standing_angles, find_better_side
+from sagittal.core.angles import cardan_zxy
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.frames import SHANK, SIDES, THIGH, Side
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.norms import adult_kinematics, look_up_norms
+from sagittal.core.rotation import conjugate, multiply
+from sagittal.server.live.messages import STALE_S, Picture
+from sagittal.server.live.room import Room
+from sagittal.server.viewer.live_figure import LiveFigure
+from sagittal.server.viewer.live_reference import LiveReference, find_standing_angles
+from sagittal.server.viewer.live_watch import FeedFrame, LiveWatch, read_moment
+from sagittal.server.viewer.moment import FigureMoment
+from sagittal.server.viewer.reference import SEGMENTS, ReferenceWalk, add_standing_angles, find_better_side
 from tests.server import walk
 from tests.server.viewer import pictures
 from tests.server.viewer.pictures import Leg, picture, stride
@@ -234,7 +234,7 @@ def moment_at(i: int) -> FigureMoment:
 
 
 def raw_angles(*, zeroed: bool) -> dict[str, np.ndarray]:
-    """Angles of the walk as core.angles measures them, from the first sample as standing or as they are."""
+    """Angles of the walk by `sagittal.core.angles`, from the first sample as standing or not."""
     poses = pictures.POSES
     valid = dict.fromkeys(poses.q, poses.valid)
     whole = measure_angles(Orientations(poses.t_s, poses.rate_hz, poses.q, valid, "kinematic"), (0.0, 0.03))

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core import rotation
-from core.body.poses import Poses
-from core.errors import ParameterError
-from core.frames import FOOT, SHANK, SIDES, THIGH, Segment, Side
-from server.viewer.body_parts import PartName
-from server.viewer.colours import TINTS, to_linear_rgb
-from server.viewer.motion import LOWER_BODY, ReplayMotion, prepare_motion
+from sagittal.core import rotation
+from sagittal.core.body.poses import Poses
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Segment, Side
+from sagittal.server.viewer.body_parts import PartName
+from sagittal.server.viewer.colours import TINTS, to_linear_rgb
+from sagittal.server.viewer.motion import LOWER_BODY, ReplayMotion, prepare_motion
 from tests.data import ROOT
 from tests.server import walk
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.frames import Floats
-from server.viewer.outlines import find_front, split_surfaces, trace_edges
-from server.viewer.shapes import Mesh, loft_sections
+from sagittal.core.frames import Floats
+from sagittal.server.viewer.outlines import find_front, split_surfaces, trace_edges
+from sagittal.server.viewer.shapes import Mesh, loft_sections
 
 ROWS = np.array([[0.0, 0.0, 1.0, 1.0, 1.0], [2.0, 0.0, 1.0, 1.0, 1.0]])
 

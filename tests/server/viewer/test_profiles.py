@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from server.viewer import profiles
-from server.viewer.profiles import ARM, FOOT, HEAD, PELVIS, SHANK, SHOULDER, THIGH, TRUNK, Floats
+from sagittal.server.viewer import profiles
+from sagittal.server.viewer.profiles import ARM, FOOT, HEAD, PELVIS, SHANK, SHOULDER, THIGH, TRUNK, Floats
 
 TABLES = {
     name: getattr(profiles, name) for name in ("THIGH", "SHANK", "FOOT", "PELVIS", "TRUNK", "HEAD", "ARM")

@@ -14,12 +14,12 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.typing import Subprotocol
 
-from server.auth.identity import Identity
-from server.auth.roles import Role
-from server.report.no_figure import FEW_SENSORS
-from server.viewer import pipe
-from server.viewer.room import VIEWS
-from server.viewer.views import FigureView, FigureViews
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Role
+from sagittal.server.report.no_figure import FEW_SENSORS
+from sagittal.server.viewer import pipe
+from sagittal.server.viewer.room import VIEWS
+from sagittal.server.viewer.views import FigureView, FigureViews
 from tests.server.viewer.conftest import Ward
 
 pytestmark = pytest.mark.anyio
@@ -219,7 +219,7 @@ async def test_close_code_of_viser_reaches_the_browser(ward: Ward) -> None:
 
 
 async def test_sign_out_ends_the_view(ward: Ward, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.auth.access.CHECK_EVERY_S", 0.05)
+    monkeypatch.setattr("sagittal.server.auth.access.CHECK_EVERY_S", 0.05)
     headers = ward.cookie("viewer")
     async with replaying(ward, headers) as (cursor, opened), piped(ward, headers, opened["view"]) as ws:
         with ward.clinic.db.write() as c:

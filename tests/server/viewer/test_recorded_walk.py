@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import zstandard
 
-from core.errors import FormatError
-from server.export.kinds import write_export
-from server.viewer.recorded_walk import RATE_HZ, record_walk
+from sagittal.core.errors import FormatError
+from sagittal.server.export.kinds import write_export
+from sagittal.server.viewer.recorded_walk import RATE_HZ, record_walk
 from tests.server import walk
 from tests.server.export.opened import open_walk
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import viser
 
-from server.viewer.motion import ReplayMotion, prepare_motion
-from server.viewer.replay_figure import ReplayFigure
-from server.viewer.replay_floor import CHUNK, RECENT_PRINTS
+from sagittal.server.viewer.motion import ReplayMotion, prepare_motion
+from sagittal.server.viewer.replay_figure import ReplayFigure
+from sagittal.server.viewer.replay_floor import CHUNK, RECENT_PRINTS
 from tests.server import walk
 
 LONG_S = 120.0

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from server.report.bundle import read_poses
-from server.services import analyses, histories, patients, sessions
-from server.viewer.motion import prepare_motion
-from server.viewer.reference import SAGITTAL
-from server.viewer.replay_reference import _average_side, find_references
+from sagittal.server.report.bundle import read_poses
+from sagittal.server.services import analyses, histories, patients, sessions
+from sagittal.server.viewer.motion import prepare_motion
+from sagittal.server.viewer.reference import SAGITTAL
+from sagittal.server.viewer.replay_reference import _average_side, find_references
 from tests.server import analysed
 from tests.server.clinic import Clinic, open_clinic
 

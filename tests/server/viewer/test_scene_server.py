@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from viser._messages import ShareUrlRequest
 
-from core.errors import EstimationError
-from server.viewer.scene_server import (
+from sagittal.core.errors import EstimationError
+from sagittal.server.viewer.scene_server import (
     LONGEST_PATH_BYTES,
     socket_of,
     start_scene_server,

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core import rotation
-from core.body.poses import Poses
-from core.frames import FOOT, SIDES, Floats
-from server.viewer.motion import ReplayMotion, prepare_motion
-from server.viewer.steps import PIECE_M, find_prints, lay_trail
+from sagittal.core import rotation
+from sagittal.core.body.poses import Poses
+from sagittal.core.frames import FOOT, SIDES, Floats
+from sagittal.server.viewer.motion import ReplayMotion, prepare_motion
+from sagittal.server.viewer.steps import PIECE_M, find_prints, lay_trail
 from tests.helpers.walks import simulated
 from tests.server import walk
 

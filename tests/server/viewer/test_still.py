@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.frames import Side
-from server.viewer.still import HEIGHT_PX, draw_still
+from sagittal.core.frames import Side
+from sagittal.server.viewer.still import HEIGHT_PX, draw_still
 from tests.server import walk
 
 

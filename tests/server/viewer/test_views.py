@@ -10,10 +10,10 @@ from typing import NoReturn
 
 import pytest
 
-from core.errors import EstimationError, InputError
-from server.auth.roles import Role
-from server.viewer.motion import ReplayMotion
-from server.viewer.views import MOST_NAMES, FigureViews
+from sagittal.core.errors import EstimationError, InputError
+from sagittal.server.auth.roles import Role
+from sagittal.server.viewer.motion import ReplayMotion
+from sagittal.server.viewer.views import MOST_NAMES, FigureViews
 
 pytestmark = pytest.mark.anyio
 

@@ -17,11 +17,11 @@ from viser import _messages
 from viser._messages import SceneNodeUpdateMessage
 from viser.infra import _infra
 
-from server.viewer import pipe
-from server.viewer.batches import DrawnBatch
-from server.viewer.client import client_page, unpack_page
-from server.viewer.motion import ReplayMotion, prepare_motion
-from server.viewer.sending import (
+from sagittal.server.viewer import pipe
+from sagittal.server.viewer.batches import DrawnBatch
+from sagittal.server.viewer.client import client_page, unpack_page
+from sagittal.server.viewer.motion import ReplayMotion, prepare_motion
+from sagittal.server.viewer.sending import (
     WINDOW_S,
     ArraysChanged,
     draw_lines,
@@ -29,7 +29,7 @@ from server.viewer.sending import (
     move_copies,
     show_at_once,
 )
-from server.viewer.views import FigureViews
+from sagittal.server.viewer.views import FigureViews
 from tests.server import walk
 
 

@@ -11,7 +11,7 @@ import httpx
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
-from server.live.protocol import MOST_MESSAGE_BYTES
+from sagittal.server.live.protocol import MOST_MESSAGE_BYTES
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve, serving
 

@@ -19,7 +19,7 @@ import httpx
 import pytest
 from starlette.types import Receive, Scope, Send
 
-from server.web_server.listener import RESERVED, SeldomLog, make_room
+from sagittal.server.web_server.listener import RESERVED, SeldomLog, make_room
 from tests.data import ROOT
 from tests.helpers.service import line_with
 from tests.server.serving import serving
@@ -53,7 +53,7 @@ def a_server(folder: Path, log: Path) -> Iterator[tuple[int, int]]:
     """Port and process of `sagittal serve` without workers."""
     with log.open("wb") as stderr:
         process = subprocess.Popen(
-            [sys.executable, "-m", "server.main", "serve", "--data", str(folder), "--port", "0"],
+            [sys.executable, "-m", "sagittal.server.main", "serve", "--data", str(folder), "--port", "0"],
             cwd=ROOT, stdout=subprocess.PIPE, stderr=stderr, text=True,
             env={**os.environ, "OPENBLAS_NUM_THREADS": "1",
                  "SAGITTAL_WORKERS": "0", "SAGITTAL_LIVE_WORKERS": "0"},

@@ -10,7 +10,7 @@ import httpx
 import pytest
 from starlette.types import Receive, Scope, Send
 
-from server.settings import Settings
+from sagittal.server.settings import Settings
 from tests.server.clinic import open_clinic
 from tests.server.serving import serve
 

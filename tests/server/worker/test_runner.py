@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from server.processes.child import start_child
-from server.settings import Settings
-from server.worker import runner
-from server.worker.messages import ChildReady, Order, Stage, encode
-from server.worker.runner import Child, ChildDiedError
+from sagittal.server.processes.child import start_child
+from sagittal.server.settings import Settings
+from sagittal.server.worker import runner
+from sagittal.server.worker.messages import ChildReady, Order, Stage, encode
+from sagittal.server.worker.runner import Child, ChildDiedError
 
 PATIENCE_S = 60.0
 OBEDIENT = """
@@ -38,7 +38,7 @@ def child(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Child]:
     ready, stage = (encode(word) for word in (ChildReady(), Stage("reading", 0.5)))
     (tmp_path / "obedient.py").write_text(OBEDIENT.format(ready=ready, stage=stage))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    # a real process on a real line; only its module is another one than server.worker.child
+    # a real process on a real line; only its module is another one than sagittal.server.worker.child
     monkeypatch.setattr(runner, "start_child", lambda module, *given: start_child("obedient", *given))
     made = Child(Settings(data_dir=tmp_path))
     yield made

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from core.errors import FormatError
-from server.jobs.attempt import Attempt
-from server.jobs.queue import BESIDE, COMPARE_FILTERS, EXPORT, SENSITIVITY, TUNE
-from server.services import recordings
-from server.services.errors import Conflict
-from server.settings import Settings
-from server.storage.blob_source import open_source
-from server.worker import tasks
-from server.worker.task import TASKS, load
+from sagittal.core.errors import FormatError
+from sagittal.server.jobs.attempt import Attempt
+from sagittal.server.jobs.queue import BESIDE, COMPARE_FILTERS, EXPORT, SENSITIVITY, TUNE
+from sagittal.server.services import recordings
+from sagittal.server.services.errors import Conflict
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blob_source import open_source
+from sagittal.server.worker import tasks
+from sagittal.server.worker.task import TASKS, load
 from tests.faults.clinic import Clinic
 
 load(Settings(data_dir=Path()).task_modules)

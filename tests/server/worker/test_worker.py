@@ -13,16 +13,16 @@ from typing import Any, cast
 
 import pytest
 
-from server.jobs.queue import Claim, JobQueue, LeaseState
-from server.processes.channel import Channel
-from server.services import erasure
-from server.settings import Settings
-from server.storage.blobs import Blob, BlobStore, StoreAway
-from server.storage.db import Database
-from server.worker import worker as at
-from server.worker.child import compute
-from server.worker.messages import Checkpoint, ChildReady, Failure, Order, Result
-from server.worker.task import TASKS, Task
+from sagittal.server.jobs.queue import Claim, JobQueue, LeaseState
+from sagittal.server.processes.channel import Channel
+from sagittal.server.services import erasure
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blobs import Blob, BlobStore, StoreAway
+from sagittal.server.storage.db import Database
+from sagittal.server.worker import worker as at
+from sagittal.server.worker.child import compute
+from sagittal.server.worker.messages import Checkpoint, ChildReady, Failure, Order, Result
+from sagittal.server.worker.task import TASKS, Task
 
 SPACE = "0" * 32
 

@@ -7,16 +7,16 @@ from math import radians
 
 import numpy as np
 
-from core.body.chain.filter import ChainFilter, ChainFilterParams, ChainMotion
-from core.body.chain.geometry import LegGeometry
-from core.body.chain.model import build_leg_chain, leg_segments
-from core.calibration.fixed_offset import make_fixed_mounts
-from core.frames import FOOT, Floats, Segment, Side
-from core.rotation import from_matrix
-from core.simulate import RecordingSetup, SensorNoise, Squats, SquatSimulation, simulate_squats
-from core.simulate.squat_chain import measure_leg, place_sensors
-from core.simulate.truth import joint_angles
-from core.squat.joints import JOINTS
+from sagittal.core.body.chain.filter import ChainFilter, ChainFilterParams, ChainMotion
+from sagittal.core.body.chain.geometry import LegGeometry
+from sagittal.core.body.chain.model import build_leg_chain, leg_segments
+from sagittal.core.calibration.fixed_offset import make_fixed_mounts
+from sagittal.core.frames import FOOT, Floats, Segment, Side
+from sagittal.core.rotation import from_matrix
+from sagittal.core.simulate import RecordingSetup, SensorNoise, Squats, SquatSimulation, simulate_squats
+from sagittal.core.simulate.squat_chain import measure_leg, place_sensors
+from sagittal.core.simulate.truth import joint_angles
+from sagittal.core.squat.joints import JOINTS
 
 HEIGHT_M = 1.75
 

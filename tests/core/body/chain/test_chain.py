@@ -7,16 +7,16 @@ from math import pi, radians
 import numpy as np
 import pytest
 
-from core.body.chain.filter import ChainFilter, ChainFilterParams
-from core.body.chain.geometry import LegGeometry, locate_hip
-from core.body.chain.kernel import ChainArrays, climb, make_scratch, predict_signals
-from core.body.chain.model import RevoluteChain, build_leg_chain
-from core.calibration.fixed_offset import make_fixed_mounts
-from core.errors import EstimationError, ParameterError
-from core.frames import GRAVITY, SHANK, Floats, Side
-from core.rotation import about, exp, to_matrix
-from core.simulate import SquatSimulation
-from core.simulate.squat_chain import measure_leg
+from sagittal.core.body.chain.filter import ChainFilter, ChainFilterParams
+from sagittal.core.body.chain.geometry import LegGeometry, locate_hip
+from sagittal.core.body.chain.kernel import ChainArrays, climb, make_scratch, predict_signals
+from sagittal.core.body.chain.model import RevoluteChain, build_leg_chain
+from sagittal.core.calibration.fixed_offset import make_fixed_mounts
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.frames import GRAVITY, SHANK, Floats, Side
+from sagittal.core.rotation import about, exp, to_matrix
+from sagittal.core.simulate import SquatSimulation
+from sagittal.core.simulate.squat_chain import measure_leg
 from tests.core.body.chain.squats import HEIGHT_M, run, split, squat_on, stack_signals, start_filter
 
 

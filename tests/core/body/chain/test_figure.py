@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.body.chain.figure import HAND_OVER_S, draw_legs, join_legs
-from core.body.chain.leg import LegMotion
-from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
-from core.fusion.orientations import Orientations
-from core.rotation import about, from_matrix, multiply
+from sagittal.core.body.chain.figure import HAND_OVER_S, draw_legs, join_legs
+from sagittal.core.body.chain.leg import LegMotion
+from sagittal.core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import about, from_matrix, multiply
 
 RATE = 50.0
 N = 200

@@ -9,19 +9,19 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.angles.measure import measure_angles
-from core.body.chain.leg import estimate_leg
-from core.calibration.fixed_offset import make_fixed_mounts
-from core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
-from core.calibration.result import CalibratedRecording
-from core.errors import CalibrationError, EstimationError
-from core.frames import Segment, Side
-from core.rotation import about, to_matrix
-from core.simulate import SquatSimulation
-from core.simulate.mems import MEMS
-from core.simulate.squat_chain import measure_leg
-from core.squat.joints import JOINTS
-from core.timeline import synchronise
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body.chain.leg import estimate_leg
+from sagittal.core.calibration.fixed_offset import make_fixed_mounts
+from sagittal.core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.errors import CalibrationError, EstimationError
+from sagittal.core.frames import Segment, Side
+from sagittal.core.rotation import about, to_matrix
+from sagittal.core.simulate import SquatSimulation
+from sagittal.core.simulate.mems import MEMS
+from sagittal.core.simulate.squat_chain import measure_leg
+from sagittal.core.squat.joints import JOINTS
+from sagittal.core.timeline import synchronise
 from tests.core.body.chain.squats import HEIGHT_M, squat_on
 
 

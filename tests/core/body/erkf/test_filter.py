@@ -7,12 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.body.erkf.filter import ErkfState, filter_block, make_lines, memory_of
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.predict import GAMMA, A, C, D, S, move, propagate, propagate_back, propagate_error
-from core.body.erkf.smoother import smooth
-from core.body.erkf.start import start_state
-from core.body.erkf.updates import (
+from sagittal.core.body.erkf.filter import ErkfState, filter_block, make_lines, memory_of
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.predict import (
+    GAMMA,
+    A,
+    C,
+    D,
+    S,
+    move,
+    propagate,
+    propagate_back,
+    propagate_error,
+)
+from sagittal.core.body.erkf.smoother import smooth
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.body.erkf.updates import (
     complete_rows,
     heading_rows,
     joint_rows,
@@ -21,10 +31,10 @@ from core.body.erkf.updates import (
     tilt_rows,
     velocity_rows,
 )
-from core.body.tree import ImuTree
-from core.errors import EstimationError
-from core.frames import Floats
-from core.rotation import exp, log, multiply, normalise, to_matrix
+from sagittal.core.body.tree import ImuTree
+from sagittal.core.errors import EstimationError
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import exp, log, multiply, normalise, to_matrix
 from tests.core.body.erkf.walks import (
     angle_errors_deg,
     angles_of,
@@ -246,7 +256,7 @@ def test_the_smoother_equals_the_best_estimate_on_a_linear_problem() -> None:
         states=9, acc_sd=0.5, gyr_sd=1e-9, gyr_sd_of={}, impact=0.0, gate=None, tilt_sd=None,
         start_tilt_sd=1e-9, start_heading_sd=1e-9, start_velocity_sd=0.3,
     )  # fmt: skip
-    from core.body.erkf.filter import ErkfInputs
+    from sagittal.core.body.erkf.filter import ErkfInputs
 
     acc = np.array([0.0, 0.0, 9.80665]) + rng.normal(0.0, 0.5, (n, 1, 3))
     contact = np.zeros((n, 1), bool)

@@ -8,12 +8,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.erkf.filter import erkf_inputs
-from core.body.erkf.gaps import HOLD_S, bridge_gaps
-from core.body.erkf.params import ErkfParams
-from core.body.tree import ImuTree
-from core.frames import GRAVITY, Bools, Floats, Segment
-from core.rotation import rotate
+from sagittal.core.body.erkf.filter import erkf_inputs
+from sagittal.core.body.erkf.gaps import HOLD_S, bridge_gaps
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.tree import ImuTree
+from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
+from sagittal.core.rotation import rotate
 from tests.core.body.erkf.walks import SEGMENTS, Take, mixed_walk, smoothed
 
 PEOPLE = ErkfParams.people()

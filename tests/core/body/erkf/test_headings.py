@@ -8,17 +8,22 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from core import calibration
-from core.body import nominal_body
-from core.body.erkf.headings import align_forward_axes, heading_errors, judge_turned_axes, turn_forward_axes
-from core.body.erkf.params import ErkfParams
-from core.body.tree import PRESETS
-from core.calibration.result import CalibratedRecording
-from core.frames import R_NEUTRAL, Segment
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.rest import index_window
-from core.rotation import about, angle_between, from_matrix, to_matrix
+from sagittal.core import calibration
+from sagittal.core.body import nominal_body
+from sagittal.core.body.erkf.headings import (
+    align_forward_axes,
+    heading_errors,
+    judge_turned_axes,
+    turn_forward_axes,
+)
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.tree import PRESETS
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.frames import R_NEUTRAL, Segment
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rest import index_window
+from sagittal.core.rotation import about, angle_between, from_matrix, to_matrix
 from tests.helpers.walks import simulated
 
 WHOLE = PRESETS["lower_body7"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.body.erkf import kernel
-from core.body.erkf.filter import noise_of
-from core.body.erkf.kernel import (
+from sagittal.core.body.erkf import kernel
+from sagittal.core.body.erkf.filter import noise_of
+from sagittal.core.body.erkf.kernel import (
     CONTACT,
     INVALID,
     PATCHED,
@@ -19,8 +19,8 @@ from core.body.erkf.kernel import (
     Noise,
     row_length,
 )
-from core.body.erkf.params import ErkfParams
-from core.frames import Floats
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.frames import Floats
 from tests.helpers.uncompiled import run_uncompiled
 
 N = 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from core.body.erkf.lanes import mix, read_columns, read_lanes, write_columns, write_lanes
+from sagittal.core.body.erkf.lanes import mix, read_columns, read_lanes, write_columns, write_lanes
 
 
 @numba.njit  # type: ignore[misc, unused-ignore]

@@ -8,14 +8,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from core.body.erkf.gaps import HOLD_S
-from core.body.erkf.live_erkf import LiveErkf, SignalBlock, live_params
-from core.body.live_still import ROLLING_MPS
-from core.body.tree import person_tree
-from core.frames import GRAVITY, Floats, Segment
-from core.online import LiveStride
-from core.recording import UniformRecording
-from core.rotation import about, multiply
+from sagittal.core.body.erkf.gaps import HOLD_S
+from sagittal.core.body.erkf.live_erkf import LiveErkf, SignalBlock, live_params
+from sagittal.core.body.live_still import ROLLING_MPS
+from sagittal.core.body.tree import person_tree
+from sagittal.core.frames import GRAVITY, Floats, Segment
+from sagittal.core.online import LiveStride
+from sagittal.core.recording import UniformRecording
+from sagittal.core.rotation import about, multiply
 from tests.core.body.live_standing import BODY, NEUTRAL, RATE
 from tests.helpers.live_walks import live as stream
 from tests.helpers.walks import cut, only, simulated

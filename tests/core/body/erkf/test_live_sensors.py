@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.body.erkf.live_erkf import live_params
-from core.body.erkf.live_sensors import FilteredSensors, FootPaths
-from core.body.live_estimator import MeasuredBlock
-from core.frames import GRAVITY, Segment
+from sagittal.core.body.erkf.live_erkf import live_params
+from sagittal.core.body.erkf.live_sensors import FilteredSensors, FootPaths
+from sagittal.core.body.live_estimator import MeasuredBlock
+from sagittal.core.frames import GRAVITY, Segment
 from tests.core.body.live_standing import BODY, NEUTRAL, RATE, mounted, stand
 
 WORN: tuple[Segment, ...] = ("chest", "foot_r", "foot_l")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.body import BodyModel
-from core.body.erkf.health import RESIDUAL_MM
-from core.body.erkf.live_watch import WINDOW_S, JointWatch
-from core.body.tree import ImuTree, person_tree
-from core.errors import Notice
-from core.frames import Segment
+from sagittal.core.body import BodyModel
+from sagittal.core.body.erkf.health import RESIDUAL_MM
+from sagittal.core.body.erkf.live_watch import WINDOW_S, JointWatch
+from sagittal.core.body.tree import ImuTree, person_tree
+from sagittal.core.errors import Notice
+from sagittal.core.frames import Segment
 
 RATE = 20.0
 WINDOW = round(WINDOW_S * RATE)

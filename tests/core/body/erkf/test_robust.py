@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.body.erkf.filter import ErkfInputs, erkf_inputs, filter_block
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.start import start_state
-from core.body.tree import ImuTree, Joint, person_tree
-from core.errors import EstimationError, ParameterError, SignalError
-from core.frames import Floats
-from core.rotation import conjugate, multiply, normalise, rotate, to_matrix
+from sagittal.core.body.erkf.filter import ErkfInputs, erkf_inputs, filter_block
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.body.tree import ImuTree, Joint, person_tree
+from sagittal.core.errors import EstimationError, ParameterError, SignalError
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import conjugate, multiply, normalise, rotate, to_matrix
 from tests.core.body.erkf.walks import (
     SEGMENTS,
     Take,

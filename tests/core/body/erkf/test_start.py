@@ -8,13 +8,13 @@ from math import degrees
 import numpy as np
 import pytest
 
-from core.body.erkf.filter import ErkfInputs
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.smoother import smooth
-from core.body.erkf.start import chain_positions, start_state
-from core.body.tree import PRESETS, ImuTree
-from core.frames import Floats
-from core.rotation import multiply, rotate
+from sagittal.core.body.erkf.filter import ErkfInputs
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.smoother import smooth
+from sagittal.core.body.erkf.start import chain_positions, start_state
+from sagittal.core.body.tree import PRESETS, ImuTree
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import multiply, rotate
 from tests.core.body.erkf.walks import SEGMENTS, Take, mixed_walk
 
 OFFLINE = ErkfParams.offline()

@@ -9,14 +9,14 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from core.body.erkf.filter import ErkfState, ErkfTrack, filter_block
-from core.body.erkf.health import START_HEADING_DEG, erkf_health, erkf_notices
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.poses import ErkfRun
-from core.body.erkf.smoother import smooth
-from core.body.erkf.start import start_state
-from core.frames import Floats
-from core.rotation import about, multiply, rotate, to_matrix, yaw
+from sagittal.core.body.erkf.filter import ErkfState, ErkfTrack, filter_block
+from sagittal.core.body.erkf.health import START_HEADING_DEG, erkf_health, erkf_notices
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.poses import ErkfRun
+from sagittal.core.body.erkf.smoother import smooth
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import about, multiply, rotate, to_matrix, yaw
 from tests.core.body.erkf.walks import SEGMENTS, Take, angles_of, mixed_walk
 
 LIVE, OFFLINE = ErkfParams.live(), ErkfParams.offline()

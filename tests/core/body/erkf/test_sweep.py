@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.body.erkf import sweep
-from core.body.erkf.kernel import SmootherRecord
-from core.body.erkf.predict import GAMMA, A, C, D, S
-from core.frames import Floats
-from core.rotation import exp, multiply
+from sagittal.core.body.erkf import sweep
+from sagittal.core.body.erkf.kernel import SmootherRecord
+from sagittal.core.body.erkf.predict import GAMMA, A, C, D, S
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import exp, multiply
 from tests.helpers.uncompiled import run_uncompiled
 
 K, N, DT = 3, 2, 0.02

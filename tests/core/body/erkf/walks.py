@@ -8,17 +8,26 @@ from math import pi
 
 import numpy as np
 
-from core.angles.measure import measure_angles
-from core.body.erkf.filter import ErkfInputs, ErkfTrack, erkf_inputs, filter_block
-from core.body.erkf.params import ErkfParams
-from core.body.erkf.smoother import smooth
-from core.body.erkf.start import start_state
-from core.body.tree import PRESETS, ImuTree, person_tree
-from core.frames import FOOT, GRAVITY, Floats, Segment
-from core.fusion.orientations import Orientations
-from core.rotation import to_matrix
-from core.simulate import Arc, Pivot, RecordingSetup, Simulation, Stand, Straight, WalkTruth, simulate
-from core.timeline import synchronise
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body.erkf.filter import ErkfInputs, ErkfTrack, erkf_inputs, filter_block
+from sagittal.core.body.erkf.params import ErkfParams
+from sagittal.core.body.erkf.smoother import smooth
+from sagittal.core.body.erkf.start import start_state
+from sagittal.core.body.tree import PRESETS, ImuTree, person_tree
+from sagittal.core.frames import FOOT, GRAVITY, Floats, Segment
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import to_matrix
+from sagittal.core.simulate import (
+    Arc,
+    Pivot,
+    RecordingSetup,
+    Simulation,
+    Stand,
+    Straight,
+    WalkTruth,
+    simulate,
+)
+from sagittal.core.timeline import synchronise
 
 MIXED = (
     Stand(6.0), Straight(12.8, 0.64, 0.54), Arc(1.5, pi, 0.52, 0.56), Straight(12.8, 0.64, 0.54),

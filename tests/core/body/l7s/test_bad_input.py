@@ -9,25 +9,25 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.estimate import PoseEstimate
-from core.body.health import HealthFinding, Verdict
-from core.body.l7s.filter import filter_block, start_l7s_state
-from core.body.l7s.health import INNER_M, list_health_notices
-from core.body.l7s.inputs import free_acceleration, take_of
-from core.body.l7s.legs import LegModel
-from core.body.l7s.poses import l7s_poses
-from core.body.model import BodyModel
-from core.body.pose_params import PoseParams
-from core.calibration import calibrate
-from core.errors import EstimationError, SagittalError
-from core.estimators import Estimator
-from core.frames import FOOT, SIDES, Floats, Segment
-from core.fusion.mahony import estimate_orientations
-from core.held_samples import SampleSeries
-from core.pipeline import PipelineConfig, analyse
-from core.recording import Recording, SensorSignals, UniformRecording
-from core.rotation import about, multiply, rotate
-from core.simulate import simulate_scenario
+from sagittal.core.body.estimate import PoseEstimate
+from sagittal.core.body.health import HealthFinding, Verdict
+from sagittal.core.body.l7s.filter import filter_block, start_l7s_state
+from sagittal.core.body.l7s.health import INNER_M, list_health_notices
+from sagittal.core.body.l7s.inputs import free_acceleration, take_of
+from sagittal.core.body.l7s.legs import LegModel
+from sagittal.core.body.l7s.poses import l7s_poses
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.pose_params import PoseParams
+from sagittal.core.calibration import calibrate
+from sagittal.core.errors import EstimationError, SagittalError
+from sagittal.core.estimators import Estimator
+from sagittal.core.frames import FOOT, SIDES, Floats, Segment
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.held_samples import SampleSeries
+from sagittal.core.pipeline import PipelineConfig, analyse
+from sagittal.core.recording import Recording, SensorSignals, UniformRecording
+from sagittal.core.rotation import about, multiply, rotate
+from sagittal.core.simulate import simulate_scenario
 from tests.core.body.l7s.test_poses import still_feet
 from tests.core.body.test_estimate import FEET, PELVIS_FEET, estimated
 from tests.helpers.marks import sweep_after

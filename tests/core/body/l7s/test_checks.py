@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.body import BodyModel
-from core.body.l7s.checks import SeenWalk, longest_gaps, walking_checks
-from core.body.l7s.filter import L7sInputs, L7sTrack
-from core.body.l7s.legs import LegModel
-from core.frames import Floats
-from core.rotation import about, to_matrix
+from sagittal.core.body import BodyModel
+from sagittal.core.body.l7s.checks import SeenWalk, longest_gaps, walking_checks
+from sagittal.core.body.l7s.filter import L7sInputs, L7sTrack
+from sagittal.core.body.l7s.legs import LegModel
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import about, to_matrix
 
 MODEL = LegModel.of(BodyModel.from_height(1.7))
 WIDTH = MODEL.hip_width

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.body.l7s.filter import L7sInputs
-from core.body.l7s.foot_place import find_sensor_offsets
-from core.body.l7s.inputs import free_acceleration, take_of
-from core.body.l7s.legs import LEGS, LegModel
-from core.body.model import BodyModel
-from core.calibration import calibrate
-from core.frames import FOOT, Floats
-from core.fusion.mahony import estimate_orientations
+from sagittal.core.body.l7s.filter import L7sInputs
+from sagittal.core.body.l7s.foot_place import find_sensor_offsets
+from sagittal.core.body.l7s.inputs import free_acceleration, take_of
+from sagittal.core.body.l7s.legs import LEGS, LegModel
+from sagittal.core.body.model import BodyModel
+from sagittal.core.calibration import calibrate
+from sagittal.core.frames import FOOT, Floats
+from sagittal.core.fusion.mahony import estimate_orientations
 from tests.helpers.l7s_walks import steps_of
 from tests.helpers.walks import simulated
 

@@ -7,12 +7,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from core.body import BodyModel
-from core.body.l7s.inputs import KnownSamples, arrange_inputs, remove_gravity
-from core.body.l7s.legs import BODIES, LegModel
-from core.calibration.result import SegmentCalibration
-from core.frames import GRAVITY, Bools, Floats
-from core.rotation import exp, from_matrix, rotate, to_matrix
+from sagittal.core.body import BodyModel
+from sagittal.core.body.l7s.inputs import KnownSamples, arrange_inputs, remove_gravity
+from sagittal.core.body.l7s.legs import BODIES, LegModel
+from sagittal.core.calibration.result import SegmentCalibration
+from sagittal.core.frames import GRAVITY, Bools, Floats
+from sagittal.core.rotation import exp, from_matrix, rotate, to_matrix
 
 MODEL = LegModel.of(BodyModel.from_height(1.7))
 N = 300

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.body.l7s import kernel, updates
-from core.body.l7s.updates import VELOCITY, WIDTH, N
-from core.frames import Floats
-from core.rotation import exp, to_matrix
+from sagittal.core.body.l7s import kernel, updates
+from sagittal.core.body.l7s.updates import VELOCITY, WIDTH, N
+from sagittal.core.frames import Floats
+from sagittal.core.rotation import exp, to_matrix
 from tests.helpers.uncompiled import run_uncompiled
 
 DT = 0.01

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.body.l7s.legs import FIGURE, HIP_SIDE, LEGS, solve_legs
-from core.frames import FOOT, SHANK, THIGH, Floats
-from core.rotation import from_matrix
+from sagittal.core.body.l7s.legs import FIGURE, HIP_SIDE, LEGS, solve_legs
+from sagittal.core.frames import FOOT, SHANK, THIGH, Floats
+from sagittal.core.rotation import from_matrix
 from tests.core.body.l7s.test_inputs import MODEL, N, poses
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.body.erkf.live_erkf import live_params
-from core.body.erkf.live_sensors import FilteredSensors, FootPaths
-from core.body.l7s.legs import FIGURE, LegModel
-from core.body.l7s.live_figure import LiveL7s
-from core.body.live_estimator import BodyBlock, MeasuredBlock
-from core.frames import Segment
+from sagittal.core.body.erkf.live_erkf import live_params
+from sagittal.core.body.erkf.live_sensors import FilteredSensors, FootPaths
+from sagittal.core.body.l7s.legs import FIGURE, LegModel
+from sagittal.core.body.l7s.live_figure import LiveL7s
+from sagittal.core.body.live_estimator import BodyBlock, MeasuredBlock
+from sagittal.core.frames import Segment
 from tests.core.body.live_standing import BODY, NEUTRAL, RATE, mounted, stand
 
 THREE: tuple[Segment, ...] = ("foot_r", "pelvis", "foot_l")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.body.l7s import node_kernel
-from core.body.l7s.node_kernel import KEPT, SIZE
-from core.frames import Bools, Floats
-from core.rotation import exp, to_matrix
+from sagittal.core.body.l7s import node_kernel
+from sagittal.core.body.l7s.node_kernel import KEPT, SIZE
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.rotation import exp, to_matrix
 from tests.helpers.uncompiled import run_uncompiled
 
 T = 5

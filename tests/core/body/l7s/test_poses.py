@@ -8,28 +8,28 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.angles.measure import measure_angles
-from core.body.l7s import smoother
-from core.body.l7s.constraints import constraint_rows
-from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
-from core.body.l7s.health import l7s_health
-from core.body.l7s.inputs import free_acceleration, take_of
-from core.body.l7s.legs import LegModel
-from core.body.l7s.poses import l7s_poses
-from core.body.l7s.updates import inject, reset
-from core.body.model import BodyModel
-from core.body.poses import Poses
-from core.body.se3 import right_jacobian
-from core.body.still import FOOT_STILL, still_samples
-from core.calibration import calibrate
-from core.calibration.result import CalibratedRecording
-from core.errors import EstimationError, ParameterError
-from core.frames import FOOT, SIDES, Bools, Floats, Side
-from core.fusion.mahony import estimate_orientations
-from core.fusion.orientations import Orientations
-from core.rotation import about, exp, multiply, to_matrix
-from core.simulate import WalkTruth
-from core.withheld import withhold
+from sagittal.core.angles.measure import measure_angles
+from sagittal.core.body.l7s import smoother
+from sagittal.core.body.l7s.constraints import constraint_rows
+from sagittal.core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
+from sagittal.core.body.l7s.health import l7s_health
+from sagittal.core.body.l7s.inputs import free_acceleration, take_of
+from sagittal.core.body.l7s.legs import LegModel
+from sagittal.core.body.l7s.poses import l7s_poses
+from sagittal.core.body.l7s.updates import inject, reset
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.poses import Poses
+from sagittal.core.body.se3 import right_jacobian
+from sagittal.core.body.still import FOOT_STILL, still_samples
+from sagittal.core.calibration import calibrate
+from sagittal.core.calibration.result import CalibratedRecording
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Side
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.rotation import about, exp, multiply, to_matrix
+from sagittal.core.simulate import WalkTruth
+from sagittal.core.withheld import withhold
 from tests.helpers.walks import simulated
 
 BODY = BodyModel.from_height(1.75)

@@ -8,16 +8,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.l7s import smoother
-from core.body.l7s.filter import L7sInputs, L7sTrack, Worn, filter_block, start_l7s_state
-from core.body.l7s.inputs import free_acceleration, take_of
-from core.body.l7s.legs import LegModel, solve_legs
-from core.body.l7s.smoother import WholeTrack, smooth_track, solve_nodes
-from core.calibration import calibrate
-from core.errors import EstimationError
-from core.frames import Bools, Floats
-from core.fusion.mahony import estimate_orientations
-from core.rotation import about, exp, to_matrix
+from sagittal.core.body.l7s import smoother
+from sagittal.core.body.l7s.filter import L7sInputs, L7sTrack, Worn, filter_block, start_l7s_state
+from sagittal.core.body.l7s.inputs import free_acceleration, take_of
+from sagittal.core.body.l7s.legs import LegModel, solve_legs
+from sagittal.core.body.l7s.smoother import WholeTrack, smooth_track, solve_nodes
+from sagittal.core.calibration import calibrate
+from sagittal.core.errors import EstimationError
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.fusion.mahony import estimate_orientations
+from sagittal.core.rotation import about, exp, to_matrix
 from tests.helpers.l7s_walks import steps_of
 from tests.helpers.walks import simulated
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core import held_samples
-from core.body import poses
-from core.body.l7s import windows
-from core.body.l7s.windows import cut_windows
-from core.body.poses import Poses
-from core.frames import FOOT, SHANK, SIDES
+from sagittal.core import held_samples
+from sagittal.core.body import poses
+from sagittal.core.body.l7s import windows
+from sagittal.core.body.l7s.windows import cut_windows
+from sagittal.core.body.poses import Poses
+from sagittal.core.frames import FOOT, SHANK, SIDES
 from tests.core.body.l7s.test_poses import poses_of
 
 

@@ -8,9 +8,9 @@ from io import BytesIO
 
 import numpy as np
 
-from core.frames import Floats
-from core.fusion.algorithms.filter import RestMeans
-from core.rotation import angle_between, conjugate, exp, multiply, normalise, rotate
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.filter import RestMeans
+from sagittal.core.rotation import angle_between, conjugate, exp, multiply, normalise, rotate
 
 FIELD = np.array([0.0, np.cos(np.radians(63.0)), -np.sin(np.radians(63.0))]) * 48.0
 """µT, east north up."""

@@ -7,9 +7,9 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-from core.errors import FormatError, SignalError
-from core.fusion.algorithms.benchmark import find_rest, read_trial, run_trial, score_orientation
-from core.rotation import about, multiply
+from sagittal.core.errors import FormatError, SignalError
+from sagittal.core.fusion.algorithms.benchmark import find_rest, read_trial, run_trial, score_orientation
+from sagittal.core.rotation import about, multiply
 from tests.core.fusion.algorithms.motion import trial_bytes
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from core.errors import ParameterError
-from core.fusion.algorithms.choice import LABELS, OWN, require_filters, require_tunable
-from core.fusion.algorithms.listed import ALGORITHMS
+from sagittal.core.errors import ParameterError
+from sagittal.core.fusion.algorithms.choice import LABELS, OWN, require_filters, require_tunable
+from sagittal.core.fusion.algorithms.listed import ALGORITHMS
 
 OURS, THEIRS = OWN[0].name, ALGORITHMS[0].name
 

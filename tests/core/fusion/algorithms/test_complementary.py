@@ -9,12 +9,19 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.frames import Floats
-from core.fusion.algorithms import complementary
-from core.fusion.algorithms.complementary import BIAS, CONSTANTS, FRACTIONS, GAINS, KINDS, LEARNS_BIAS
-from core.fusion.algorithms.engines import Setting, prepare_complementary
-from core.fusion.algorithms.listed import ALGORITHMS
-from core.rotation import angle_between, conjugate, exp, multiply, rotate
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms import complementary
+from sagittal.core.fusion.algorithms.complementary import (
+    BIAS,
+    CONSTANTS,
+    FRACTIONS,
+    GAINS,
+    KINDS,
+    LEARNS_BIAS,
+)
+from sagittal.core.fusion.algorithms.engines import Setting, prepare_complementary
+from sagittal.core.fusion.algorithms.listed import ALGORITHMS
+from sagittal.core.rotation import angle_between, conjugate, exp, multiply, rotate
 from tests.helpers.uncompiled import run_uncompiled
 
 RATE = 100.0

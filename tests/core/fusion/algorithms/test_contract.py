@@ -9,13 +9,13 @@ from math import inf
 import numpy as np
 import pytest
 
-from core.errors import EstimationError, ParameterError, SignalError
-from core.frames import Floats
-from core.fusion.algorithms import parameters
-from core.fusion.algorithms.filter import FusionFilter, RestMeans
-from core.fusion.algorithms.gains import Corners, FixedGain, FuzzyGain, InnovationRules, TwoLevelGain
-from core.fusion.algorithms.listed import ALGORITHMS, Algorithm
-from core.rotation import conjugate, exp, multiply, rotate
+from sagittal.core.errors import EstimationError, ParameterError, SignalError
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms import parameters
+from sagittal.core.fusion.algorithms.filter import FusionFilter, RestMeans
+from sagittal.core.fusion.algorithms.gains import Corners, FixedGain, FuzzyGain, InnovationRules, TwoLevelGain
+from sagittal.core.fusion.algorithms.listed import ALGORITHMS, Algorithm
+from sagittal.core.rotation import conjugate, exp, multiply, rotate
 from tests.core.fusion.algorithms.motion import FIELD, UP, TurningSensors, error_deg, tilt_deg, turning
 from tests.data import ROOT
 

@@ -8,12 +8,12 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.fusion.algorithms import complementary, parameters
-from core.fusion.algorithms.engines import GAINS_RATE_HZ, PREPARE, Setting, prepare_complementary
-from core.fusion.algorithms.gains import WIDTH, FixedGain, TwoLevelGain
-from core.fusion.algorithms.listed import ALGORITHMS, Algorithm
-from core.rotation import exp
+from sagittal.core.errors import ParameterError
+from sagittal.core.fusion.algorithms import complementary, parameters
+from sagittal.core.fusion.algorithms.engines import GAINS_RATE_HZ, PREPARE, Setting, prepare_complementary
+from sagittal.core.fusion.algorithms.gains import WIDTH, FixedGain, TwoLevelGain
+from sagittal.core.fusion.algorithms.listed import ALGORITHMS, Algorithm
+from sagittal.core.rotation import exp
 
 Q = exp(np.array([[0.1, 0.2, 0.3], [0.0, -0.4, 0.0]]))
 FIELD = np.tile([0.0, 0.6, -0.8], (2, 1))

@@ -8,10 +8,10 @@ from math import inf
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.frames import Floats
-from core.fusion.algorithms.gain_kernel import choose_level
-from core.fusion.algorithms.gains import (
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.gain_kernel import choose_level
+from sagittal.core.fusion.algorithms.gains import (
     Corners,
     FixedGain,
     FuzzyGain,
@@ -20,7 +20,7 @@ from core.fusion.algorithms.gains import (
     TwoLevelGain,
     order_corners,
 )
-from core.fusion.algorithms.presets import MADGWICK_ON_A_LEG
+from sagittal.core.fusion.algorithms.presets import MADGWICK_ON_A_LEG
 
 INPUT: Corners = (0.02, 0.08, 0.04, 0.1, 0.15, 0.25, 0.2, 0.4)
 OUTPUT: Corners = (0.005, 0.02, 0.01, 0.03, 0.04, 0.07, 0.05, 0.09)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.frames import Floats
-from core.fusion.algorithms import kalman, sigma_point, vectors
-from core.rotation import conjugate, exp, multiply, normalise, rotate, to_matrix
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms import kalman, sigma_point, vectors
+from sagittal.core.rotation import conjugate, exp, multiply, normalise, rotate, to_matrix
 
 RNG = np.random.default_rng(11)
 UP = np.array([0.0, 0.0, 1.0])

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from core.frames import Floats
-from core.fusion.algorithms import direction, error_state, extended_kalman, quaternion_kalman
-from core.rotation import conjugate, exp, multiply, normalise, rotate
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms import direction, error_state, extended_kalman, quaternion_kalman
+from sagittal.core.rotation import conjugate, exp, multiply, normalise, rotate
 
 pytestmark = pytest.mark.slow
 

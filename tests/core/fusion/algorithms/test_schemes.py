@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import get_args
 
-from core.fusion.algorithms.gain_space import choose_scheme
-from core.fusion.algorithms.gains import FixedGain, ThreeLevelGain, TwoLevelGain
-from core.fusion.algorithms.parameters import MadgwickGains
-from core.fusion.algorithms.presets import MADGWICK_ON_A_LEG
-from core.fusion.algorithms.schemes import Scheme
+from sagittal.core.fusion.algorithms.gain_space import choose_scheme
+from sagittal.core.fusion.algorithms.gains import FixedGain, ThreeLevelGain, TwoLevelGain
+from sagittal.core.fusion.algorithms.parameters import MadgwickGains
+from sagittal.core.fusion.algorithms.presets import MADGWICK_ON_A_LEG
+from sagittal.core.fusion.algorithms.schemes import Scheme
 
 
 def test_each_scheme_makes_gains_of_its_own_kind() -> None:

@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from core.errors import ParameterError
-from core.frames import Floats
-from core.fusion.algorithms.swarm import Swarm, SwarmRules, advance_swarm, read_swarm, write_swarm
+from sagittal.core.errors import ParameterError
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.algorithms.swarm import Swarm, SwarmRules, advance_swarm, read_swarm, write_swarm
 
 SHORT = SwarmRules(particles=8, iterations=5, rounds=3, random_rounds=2)
 START = np.full(3, 0.9)

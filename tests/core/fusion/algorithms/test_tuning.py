@@ -9,14 +9,19 @@ from math import inf
 import numpy as np
 import pytest
 
-from core.errors import EstimationError, ParameterError, SignalError
-from core.fusion.algorithms.benchmark import ReferenceTrial, read_trial
-from core.fusion.algorithms.gain_space import GainSpace, choose_scheme, gains_to_json
-from core.fusion.algorithms.gains import FixedGain, FuzzyGain, ThreeLevelGain, TwoLevelGain
-from core.fusion.algorithms.listed import ALGORITHMS, Algorithm
-from core.fusion.algorithms.parameters import AquaGains, MadgwickGains, MahonyGains, Nazarahari2021Gains
-from core.fusion.algorithms.swarm import SwarmRules
-from core.fusion.algorithms.tuning import GainTuner, TrialSplit, TuningResult
+from sagittal.core.errors import EstimationError, ParameterError, SignalError
+from sagittal.core.fusion.algorithms.benchmark import ReferenceTrial, read_trial
+from sagittal.core.fusion.algorithms.gain_space import GainSpace, choose_scheme, gains_to_json
+from sagittal.core.fusion.algorithms.gains import FixedGain, FuzzyGain, ThreeLevelGain, TwoLevelGain
+from sagittal.core.fusion.algorithms.listed import ALGORITHMS, Algorithm
+from sagittal.core.fusion.algorithms.parameters import (
+    AquaGains,
+    MadgwickGains,
+    MahonyGains,
+    Nazarahari2021Gains,
+)
+from sagittal.core.fusion.algorithms.swarm import SwarmRules
+from sagittal.core.fusion.algorithms.tuning import GainTuner, TrialSplit, TuningResult
 from tests.core.fusion.algorithms.motion import trial_bytes
 
 SHORT = SwarmRules(particles=4, iterations=3, rounds=2, random_rounds=1)

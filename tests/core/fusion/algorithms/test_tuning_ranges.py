@@ -7,10 +7,10 @@ from typing import Any, get_type_hints
 
 import pytest
 
-from core.fusion.algorithms import tuning_ranges
-from core.fusion.algorithms.gains import Gain
-from core.fusion.algorithms.listed import ALGORITHMS
-from core.fusion.algorithms.tuning_ranges import LEFT, SAMPLES, SHARE, TuningRange
+from sagittal.core.fusion.algorithms import tuning_ranges
+from sagittal.core.fusion.algorithms.gains import Gain
+from sagittal.core.fusion.algorithms.listed import ALGORITHMS
+from sagittal.core.fusion.algorithms.tuning_ranges import LEFT, SAMPLES, SHARE, TuningRange
 
 RANGES = {name: x for name, x in vars(tuning_ranges).items() if isinstance(x, TuningRange)}
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from core.frames import GRAVITY, Floats
-from core.rotation import conjugate, exp, log, multiply, rotate
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.rotation import conjugate, exp, log, multiply, rotate
 
 NORTH = np.array([0.0, 0.5, -0.8660254])
 """Field of the world, 60° down."""

@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.frames import Floats
-from core.fusion.self_calibrating import SelfCalibratingFilter
-from core.fusion.self_calibrating import layout as at
-from core.fusion.self_calibrating.covariance import write_transition
-from core.fusion.self_calibrating.kernel import add_sample
-from core.fusion.self_calibrating.motion import tilt
-from core.rotation import conjugate, log, multiply
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.self_calibrating import SelfCalibratingFilter
+from sagittal.core.fusion.self_calibrating import layout as at
+from sagittal.core.fusion.self_calibrating.covariance import write_transition
+from sagittal.core.fusion.self_calibrating.kernel import add_sample
+from sagittal.core.fusion.self_calibrating.motion import tilt
+from sagittal.core.rotation import conjugate, log, multiply
 from tests.core.fusion.self_calibrating.moving import MovingSensor, move_sensor
 
 pytestmark = pytest.mark.slow  # compiles for half a minute what the product does not run

@@ -7,12 +7,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.errors import EstimationError, ParameterError
-from core.frames import Floats
-from core.fusion.self_calibrating import SelfCalibratingFilter, SelfCalibratingParams, smooth_orientations
-from core.fusion.self_calibrating import layout as at
-from core.fusion.self_calibrating.params import GRAVITY_MPS2, MAG_NOISE
-from core.rotation import conjugate, exp, log, multiply, rotate
+from sagittal.core.errors import EstimationError, ParameterError
+from sagittal.core.frames import Floats
+from sagittal.core.fusion.self_calibrating import (
+    SelfCalibratingFilter,
+    SelfCalibratingParams,
+    smooth_orientations,
+)
+from sagittal.core.fusion.self_calibrating import layout as at
+from sagittal.core.fusion.self_calibrating.params import GRAVITY_MPS2, MAG_NOISE
+from sagittal.core.rotation import conjugate, exp, log, multiply, rotate
 from tests.core.fusion.self_calibrating.moving import (
     NORTH,
     MovingSensor,

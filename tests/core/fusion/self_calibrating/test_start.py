@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.frames import GRAVITY, Floats
-from core.fusion.self_calibrating import layout as at
-from core.fusion.self_calibrating.params import (
+from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.fusion.self_calibrating import layout as at
+from sagittal.core.fusion.self_calibrating.params import (
     LEAST_FIELD,
     MAG_NOISE,
     REGION_ACROSS_SD,
@@ -19,8 +19,8 @@ from core.fusion.self_calibrating.params import (
     SelfCalibratingParams,
     make_weights,
 )
-from core.fusion.self_calibrating.start import is_known, start_from_first, take_start
-from core.rotation import about, conjugate, exp, multiply, rotate
+from sagittal.core.fusion.self_calibrating.start import is_known, start_from_first, take_start
+from sagittal.core.rotation import about, conjugate, exp, multiply, rotate
 from tests.core.fusion.self_calibrating.moving import NORTH
 
 pytestmark = pytest.mark.slow  # the loops are compiled with the rest of the filter
