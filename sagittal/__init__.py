@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from sagittal.analysis import Analysis
     from sagittal.core.errors import Notice, SagittalError
-    from sagittal.core.recording import Recording
+    from sagittal.core.signals.recording import Recording
     from sagittal.functions import analyse, read, simulate
     from sagittal.simulated import SimulatedWalk
 
@@ -29,7 +29,7 @@ if (_DIRECTORY / "core").is_file():
 _HOMES = {
     "Analysis": "sagittal.analysis",
     "Notice": "sagittal.core.errors",
-    "Recording": "sagittal.core.recording",
+    "Recording": "sagittal.core.signals.recording",
     "SagittalError": "sagittal.core.errors",
     "SimulatedWalk": "sagittal.simulated",
     "analyse": "sagittal.functions",

@@ -20,7 +20,7 @@ from sagittal.core.pipeline import PipelineConfig
 from sagittal.core.pipeline import analyse as run_pipeline
 from sagittal.core.pipeline.config import override_config
 from sagittal.core.pipeline.recipes import say_nothing
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 from sagittal.core.simulate import simulate_scenario
 from sagittal.simulated import SimulatedWalk
 

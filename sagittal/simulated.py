@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 from sagittal.core.simulate import Simulation, angle_table, event_table, stride_table
 
 

@@ -36,7 +36,7 @@ def create_app(settings: Settings) -> FastAPI:
     from sagittal.server.metrics import RequestMetrics
     from sagittal.server.nodes.forwarding import Forwarding
     from sagittal.server.nodes.known import KnownNodes
-    from sagittal.server.services.provenance import CODE_VERSION
+    from sagittal.server.provenance import CODE_VERSION
 
     metrics = RequestMetrics()
     app = FastAPI(

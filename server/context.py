@@ -14,12 +14,12 @@ from starlette.requests import HTTPConnection
 from sagittal.core.frames import Protocol
 from sagittal.server.auth.sessions import Logins
 from sagittal.server.auth.throttle import Throttle
+from sagittal.server.downloads.studies import StudyChoice
 from sagittal.server.jobs.feed import JobFeed
 from sagittal.server.jobs.queue import JobQueue
 from sagittal.server.live.hub import Hub
-from sagittal.server.services.films import FilmIntake
-from sagittal.server.services.reviewed import ReviewedAnalyses
-from sagittal.server.services.studies import StudyChoice
+from sagittal.server.live_takes.films import FilmIntake
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings
 from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database

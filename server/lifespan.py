@@ -19,14 +19,15 @@ from sagittal.server.auth.throttle import SharedFailures, Throttle
 from sagittal.server.jobs.feed import JobFeed
 from sagittal.server.jobs.opening import open_queue
 from sagittal.server.live.hub import Hub
+from sagittal.server.live_takes.films import FilmIntake
 from sagittal.server.metrics import StateCollector
 from sagittal.server.nodes.registry import Nodes
 from sagittal.server.processes.supervisor import Workers
-from sagittal.server.services import custody, erasure, report_links
-from sagittal.server.services.custody import refuse_strangers
-from sagittal.server.services.films import FilmIntake
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.server.safekeeping import custody, erasure
+from sagittal.server.safekeeping.custody import refuse_strangers
 from sagittal.server.settings import Settings
+from sagittal.server.sharing import report_links
 from sagittal.server.storage.blob_opening import open_blobs
 from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database

@@ -15,7 +15,7 @@ from prometheus_client.registry import Collector
 from sqlalchemy import func, select
 
 from sagittal.server.nodes.registry import Nodes
-from sagittal.server.services import backup_schedule
+from sagittal.server.safekeeping import backup_schedule
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.high_water import read_newest

@@ -18,7 +18,7 @@ from sqlalchemy import make_url
 from sagittal.server.main import _parser
 from sagittal.server.settings import Settings, load_settings
 from tests.data import ROOT
-from tests.server.clinic import open_clinic
+from tests.helpers.clinic import open_clinic
 from tests.test_packaging import EXTRAS, INSTRUCTIONS, last
 
 TEXT = (ROOT / "compose.yaml").read_text("utf-8")

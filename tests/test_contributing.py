@@ -18,21 +18,21 @@ from sagittal.core.formats import SourceFile, read_recording, vendors
 from sagittal.core.formats.draft import Draft
 from sagittal.core.formats.source_spec import SourceSpec
 from sagittal.core.formats.vendors import VendorFormat
-from sagittal.core.measure import Tracks, measure_gait
 from sagittal.core.parameters.catalogue import CATALOGUE, CurveFigure, ParameterEntry
 from sagittal.core.parameters.catalogue.entry import ANKLE_AND_FOOT, DORSIFLEXION
+from sagittal.core.parameters.measure import Tracks, measure_gait
 from sagittal.core.pipeline import WALK, PipelineConfig, PipelineStage, TakeAnalysis, analyse, recipes
 from sagittal.core.pipeline.recipes import SIGNALS, run_stages, say_nothing
 from sagittal.core.pipeline.stages import ORIENTATION, orient_segments
 from sagittal.core.simulate import simulate_scenario
 from sagittal.server.pages.live import list_terms
 from sagittal.server.pages.prescription import group_trainable
-from sagittal.server.report.exports import analysis_files
+from sagittal.server.report.files.exports import analysis_files
 from tests.data import ROOT
+from tests.helpers.clinic import open_clinic
 from tests.helpers.parameter_page import PAGE, render_page
 from tests.helpers.true_walks import true_tracks
 from tests.server import analysed, feedback
-from tests.server.clinic import open_clinic
 
 API: Final = "/api/v1"
 

@@ -11,9 +11,9 @@ from babel.messages.pofile import read_po
 
 from sagittal.core.frames import SIDES
 from sagittal.core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES
-from sagittal.server.report.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
-from sagittal.server.report.level import STANDING, define_parameter
-from sagittal.server.report.wording import JUDGED, PATH_JUDGED, REASONS, reason_words
+from sagittal.server.report.view.level import STANDING, define_parameter
+from sagittal.server.report.words.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
+from sagittal.server.report.words.wording import JUDGED, PATH_JUDGED, REASONS, reason_words
 from sagittal.web.language import (
     LANGUAGES,
     PLACEHOLDER,

@@ -35,7 +35,7 @@ from sagittal.core.activity.wear import (
 from sagittal.core.events.bouts import plain_bouts
 from sagittal.core.events.turns import Turn
 from sagittal.core.frames import Bools, Floats
-from sagittal.core.rest import Window, find_runs
+from sagittal.core.signals.rest import Window, find_runs
 
 NEAR_LYING_S = 10.0
 """Leans so close to lying do not tell where forward is."""

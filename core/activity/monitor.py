@@ -29,8 +29,8 @@ from sagittal.core.events.bouts import Bout, plain_bouts
 from sagittal.core.events.turns import Turn
 from sagittal.core.frames import Floats, Segment
 from sagittal.core.plurals import plural
-from sagittal.core.rest import Window
-from sagittal.core.sample_blocks import LongStream
+from sagittal.core.signals.rest import Window
+from sagittal.core.signals.sample_blocks import LongStream
 
 DAY_SLABS_S: Final = 86400
 AROUND_S: Final = 2400

@@ -23,7 +23,7 @@ from sagittal.core.activity.result import (
     TransitionCandidate,
     TransitionKind,
 )
-from sagittal.core.rest import Window
+from sagittal.core.signals.rest import Window
 
 Upright = Literal["sitting", "standing"]
 

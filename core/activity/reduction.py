@@ -22,9 +22,9 @@ from sagittal.core.errors import SignalError
 from sagittal.core.events.lumbar import StepTimeParams, find_moving, find_step_times, split_about_vertical
 from sagittal.core.events.turns import Turn, find_turns
 from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
-from sagittal.core.recording import SensorSignals, Subject, UniformRecording
-from sagittal.core.rest import find_runs
-from sagittal.core.sample_blocks import LongStream, SampleBlock, find_complete_rows
+from sagittal.core.signals.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.signals.rest import find_runs
+from sagittal.core.signals.sample_blocks import LongStream, SampleBlock, find_complete_rows
 from sagittal.core.timeline.grid import lay_signal
 from sagittal.core.timeline.params import TimelineParams
 

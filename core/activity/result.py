@@ -14,7 +14,7 @@ ActivityDay        the same in one day, and how much of it can be judged
 WearPeriod         how the sensor sat while it was worn: its up and forward axes, and how they were found
 inclination_deg    once a second: signed lean of the trunk, NaN where it was not worn or forward is unknown
 
-The files they become: server/report/activity_files.py.
+The files they become: server/report/files/activity_files.py.
 """
 
 from __future__ import annotations

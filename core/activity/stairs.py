@@ -17,7 +17,7 @@ from sagittal.core.activity.frames import FRAME_HZ, Singles
 from sagittal.core.activity.params import StairParams
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Bools, Floats
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.rest import find_runs
 
 StepKind = Literal["walking", "stairs_up", "stairs_down"]
 

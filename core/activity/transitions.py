@@ -18,8 +18,8 @@ from sagittal.core.activity.result import (
     TransitionRefusal,
 )
 from sagittal.core.frames import GRAVITY, Bools, Floats
-from sagittal.core.peaks import find_peaks
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.peaks import find_peaks
+from sagittal.core.signals.rest import find_runs
 
 EDGE_RISE = 0.035
 """A lean ends where the inclination rises again by so much, rad: 2°, above the unrest of sitting."""

@@ -15,7 +15,7 @@ from sagittal.core.activity.frames import FRAME_HZ, PER_MINUTE, Frames, Singles,
 from sagittal.core.activity.params import UprightParams, WearParams
 from sagittal.core.activity.result import UprightMethod, WearPeriod
 from sagittal.core.frames import Bools, Floats
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.rest import find_runs
 
 Axis = tuple[float, float, float]
 

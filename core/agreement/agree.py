@@ -20,8 +20,8 @@ from sagittal.core.agreement.windows import JointWindows, compare_at_joint
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Floats, Segment
 from sagittal.core.quality.stuck import drop_stuck_sensors
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import Window
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import Window
 from sagittal.core.timeline import TimelineParams
 
 

@@ -24,7 +24,7 @@ from sagittal.core.agreement.terms import (
 )
 from sagittal.core.frames import Bools, Floats
 from sagittal.core.fusion.attitude import advance
-from sagittal.core.recording import SensorSignals
+from sagittal.core.signals.recording import SensorSignals
 
 SETTLE_S: Final = 0.3
 """The filters of the upper edge of the band see so much on either side: they have forgotten it after."""

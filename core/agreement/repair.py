@@ -9,9 +9,9 @@ import numpy as np
 
 from sagittal.core.agreement.slips import SensorSlip
 from sagittal.core.frames import Floats
-from sagittal.core.recording import SensorSignals
-from sagittal.core.rest import Window
 from sagittal.core.rotation import exp, rotate
+from sagittal.core.signals.recording import SensorSignals
+from sagittal.core.signals.rest import Window
 from sagittal.core.timeline.grid import lay_signal
 from sagittal.core.timeline.params import TimelineParams
 

@@ -21,8 +21,8 @@ from sagittal.core.agreement.strides import choose_leg, find_main_axis, find_str
 from sagittal.core.agreement.terms import SensorMotion, SensorTerms, find_terms
 from sagittal.core.agreement.windows import JointWindows, compare_at_joint
 from sagittal.core.frames import Bools, Floats, Segment
-from sagittal.core.recording import SensorSignals, UniformRecording
-from sagittal.core.rest import Window
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
+from sagittal.core.signals.rest import Window
 
 INDEPENDENT: Final = 5.0
 """More windows side by side than this do not make a median surer: gait changes between them too."""

@@ -20,10 +20,10 @@ from sagittal.core.agreement.params import SlipParams
 from sagittal.core.agreement.slips import SensorSlip
 from sagittal.core.agreement.strides import SMOOTH_HZ, find_main_axis, find_swings
 from sagittal.core.agreement.terms import SensorTerms
-from sagittal.core.filtering import low_pass
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import Window, drop_false_rests, find_rest_windows, index_window
+from sagittal.core.signals.filtering import low_pass
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import Window, drop_false_rests, find_rest_windows, index_window
 
 WITHIN_S: Final = 0.4
 """A thigh and a foot swing forward so near to their shank."""

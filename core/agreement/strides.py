@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from sagittal.core.agreement.params import SlipParams
 from sagittal.core.agreement.terms import SensorMotion
-from sagittal.core.filtering import low_pass
 from sagittal.core.frames import Bools, Floats, Segment
-from sagittal.core.peaks import find_peaks
 from sagittal.core.rotation import conjugate, exp, find_lengths, rotate, to_matrix
+from sagittal.core.signals.filtering import low_pass
+from sagittal.core.signals.peaks import find_peaks
 
 SMOOTH_HZ: Final = 4.0
 LEAST_SWING: Final = 0.6

@@ -13,12 +13,12 @@ import numba
 import numpy as np
 
 from sagittal.core.agreement.params import JointBandParams, JointParams
-from sagittal.core.filtering import low_pass
 from sagittal.core.frames import GRAVITY, Bools, Floats
 from sagittal.core.fusion.attitude import AttitudeParams, AttitudeState, advance
-from sagittal.core.recording import SensorSignals
-from sagittal.core.rest import Quietness, measure_quietness
 from sagittal.core.rotation import compiled, find_lengths, from_matrix
+from sagittal.core.signals.filtering import low_pass
+from sagittal.core.signals.recording import SensorSignals
+from sagittal.core.signals.rest import Quietness, measure_quietness
 
 TERMS: Final = 4
 """Columns of a sensor's terms: three for the place, one for its own specific force."""

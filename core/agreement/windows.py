@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sagittal.core.agreement.params import JointParams, JointSumParams
 from sagittal.core.agreement.terms import TERMS, SensorTerms, TermsPart
 from sagittal.core.frames import Bools, Floats, Segment
-from sagittal.core.inner import inner_njit
+from sagittal.core.signals.inner import inner_njit
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from sagittal.core.frames import R_NEUTRAL, Floats, Oriented, Segment
-from sagittal.core.held_samples import cut_blocks
 from sagittal.core.rotation import conjugate, from_matrix, multiply, rotate, to_matrix
+from sagittal.core.signals.held_samples import cut_blocks
 
 COURSE_AXES: Final[dict[Segment, tuple[float, float, float]]] = {
     "pelvis": (0.0, 0.0, 1.0),

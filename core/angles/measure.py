@@ -13,8 +13,8 @@ from sagittal.core.angles.kernel import AngleKernel, mean_angles, subtract_zero
 from sagittal.core.angles.result import SIGNS, JointAngles, list_leg_joints
 from sagittal.core.errors import Notice
 from sagittal.core.frames import SIDES, SUFFIX, Bools, Floats, Posture
-from sagittal.core.held_samples import cut_blocks, give_pages_back, make_room
-from sagittal.core.rest import Window, index_window
+from sagittal.core.signals.held_samples import cut_blocks, give_pages_back, make_room
+from sagittal.core.signals.rest import Window, index_window
 
 if TYPE_CHECKING:
     from sagittal.core.body.poses import Poses

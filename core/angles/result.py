@@ -44,10 +44,11 @@ class JointAngles:
     zero : "standing", or "walking": nobody stood still and the angles start from their mean over straight
         walking, so that they have a shape and a range and no level.
     standing_deg : angles of that standing by goniometer, where somebody entered them; see
-        `sagittal.core.standing_angles`, and `sagittal.core.parameters.anatomical_zero`, which adds them back.
+        `sagittal.core.subject.standing_angles`, and `sagittal.core.parameters.anatomical_zero`, which adds
+        them back.
     headings : "pelvis", "foot_l", "foot_r" → (n,) rad about the vertical, left positive, unwrapped, from a
         zero of its own; only of segments with a sensor. Its course over a stride means something.
-    withheld : angles that were taken out again → reason (`sagittal.core.withheld`).
+    withheld : angles that were taken out again → reason (`sagittal.core.angles.withheld`).
     bounds : name → rad, the straight knee of a leg model: at it the angle is a limit and no measurement.
     """
 

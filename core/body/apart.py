@@ -14,10 +14,10 @@ from typing import Final
 import numpy as np
 
 from sagittal.core.body.model import BodyModel
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.frames import SIDES, SUFFIX, Segment
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.rotation import about, multiply, to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
 
 LONGEST: Final = 0.5
 """Sine of the widest lean that is believed."""

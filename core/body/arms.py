@@ -22,13 +22,13 @@ from sagittal.core.body.corrected import correct_signals
 from sagittal.core.body.model import BodyModel
 from sagittal.core.body.places import joint_places, sensor_place
 from sagittal.core.calibration.knee_axis import KneeAxes, measure_knees
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import Notice
-from sagittal.core.filtering import low_pass
 from sagittal.core.frames import Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.rest import index_window
 from sagittal.core.rotation import conjugate, from_matrix, multiply, to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.filtering import low_pass
+from sagittal.core.signals.rest import index_window
 
 LegJoint = tuple[Segment, Segment]
 """The segments on either side of a joint, proximal first."""

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from sagittal.core.body.tree import PRESETS
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import EstimationError, Notice
 from sagittal.core.estimators import (
     AUTO,
@@ -23,6 +22,7 @@ from sagittal.core.estimators import (
 )
 from sagittal.core.frames import Segment
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.signals.calibrated import CalibratedRecording
 
 WHOLE: Final = PRESETS["lower_body7"]
 

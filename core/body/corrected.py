@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
+from sagittal.core.signals.calibrated import CalibratedRecording
 
 
 def correct_signals(

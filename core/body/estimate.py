@@ -40,13 +40,13 @@ from sagittal.core.body.pose_params import PoseParams
 from sagittal.core.body.poses import Poses
 from sagittal.core.body.still import contact_samples
 from sagittal.core.body.tree import person_tree
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import EstimationError, Notice
 from sagittal.core.estimators import BY_NAME, ERKF, L7S_3I, NO_FIGURE, ORIENTATIONS_ONLY, Estimator
 from sagittal.core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
 from sagittal.core.fusion.orientations import LastReading, Orientations
-from sagittal.core.held_samples import lay_aside
-from sagittal.core.memory import give_memory_back
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.held_samples import lay_aside
+from sagittal.core.signals.memory import give_memory_back
 
 ON_A_BELT: Final = (
     "On a treadmill a foot on the belt does not rest in the room, as the estimator takes it to. Positions "

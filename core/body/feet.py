@@ -25,7 +25,7 @@ class FootTracks:
     posture : what the feet's neutral posture and direction are of; toe-out is told from standing alone.
     sensor_ahead : side → how far ahead of its nominal place the sensor was found to sit, m, 0 where not
         given; a shoe's sole is measured from the sensor.
-    withheld : side → reason why no distance of this foot is told (core/withheld.py).
+    withheld : side → reason why no distance of this foot is told (core/angles/withheld.py).
     """
 
     t_s: Floats

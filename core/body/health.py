@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from sagittal.core.frames import Bools
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.rest import find_runs
 
 Verdict = Literal["good", "warn", "bad"]
 

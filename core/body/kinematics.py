@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagittal.core.anthropometry import BodyMeasures
 from sagittal.core.body.model import LEG_FRACTION, NOMINAL_HEIGHT_M, BodyModel
 from sagittal.core.body.places import FOOT as SENSOR_ON_FOOT
 from sagittal.core.body.poses import Poses
@@ -24,7 +23,8 @@ from sagittal.core.errors import Notice
 from sagittal.core.estimators import NO_FIGURE, ORIENTATIONS_ONLY
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from sagittal.core.rotation import rotate
-from sagittal.core.shoe import Shoe
+from sagittal.core.subject.anthropometry import BodyMeasures
+from sagittal.core.subject.shoe import Shoe
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sagittal.core.anthropometry import BodyMeasures, locate_hips_across
+from sagittal.core.subject.anthropometry import BodyMeasures, locate_hips_across
 
 NOMINAL_HEIGHT_M = 1.70
 """Body height assumed when nobody gave one (±5 cm change joint angles by ±0.2°:

@@ -18,11 +18,11 @@ from sagittal.core.body.erkf.headings import align_forward_axes
 from sagittal.core.body.kinematics import nominal_body
 from sagittal.core.body.model import BodyModel
 from sagittal.core.body.pose_params import PoseParams
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import EstimationError, Notice
 from sagittal.core.estimators import ERKF
 from sagittal.core.frames import Segment
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.signals.calibrated import CalibratedRecording
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from sagittal.core.body.health import HealthFinding
 from sagittal.core.body.model import BodyModel
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Bools, Floats, Segment
-from sagittal.core.held_samples import SHORT
+from sagittal.core.signals.held_samples import SHORT
 
 
 def figure_precision(samples: int) -> type[np.floating[Any]]:

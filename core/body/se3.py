@@ -12,8 +12,8 @@ from math import factorial, sin, sqrt
 
 import numba
 
-from sagittal.core.inner import inner_njit
 from sagittal.core.rotation.compiled import multiply3, orthonormalise, skew_polynomial
+from sagittal.core.signals.inner import inner_njit
 
 SMALL = 0.25
 """Square of the angle up to which seven terms of a series are exact to 1e-17: no sine is needed."""

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sagittal.core.frames import GRAVITY, Bools, Floats
-from sagittal.core.rest import find_runs
 from sagittal.core.rotation import find_lengths
+from sagittal.core.signals.rest import find_runs
 
 
 @dataclass(frozen=True)

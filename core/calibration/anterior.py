@@ -47,9 +47,9 @@ from sagittal.core.calibration.standing import SensorAtRest, vertical_frame
 from sagittal.core.calibration.walking import TRUNK
 from sagittal.core.errors import CalibrationError, Notice
 from sagittal.core.frames import FOOT, Bools, Floats, Segment
-from sagittal.core.recording import SensorSignals
-from sagittal.core.rest import Window
 from sagittal.core.rotation import rotate
+from sagittal.core.signals.recording import SensorSignals
+from sagittal.core.signals.rest import Window
 
 DISAGREEMENT = radians(15.0)
 """Difference of two measures of the walking direction that is told

@@ -26,7 +26,6 @@ from sagittal.core.calibration.functional import (
 from sagittal.core.calibration.gyro_pca import about_vertical, count_steps, sagittal_angle, sagittal_course
 from sagittal.core.calibration.heading import HeadingParams, Part, step_time
 from sagittal.core.calibration.joint_turns import JointTurnParams, measure_joint_turns
-from sagittal.core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
 from sagittal.core.calibration.score import ScoreParams
 from sagittal.core.calibration.sensor_in_walk import WalkRungParams
 from sagittal.core.calibration.standing import (
@@ -51,11 +50,12 @@ from sagittal.core.calibration.walking import (
 from sagittal.core.errors import CalibrationError, Notice, SignalError
 from sagittal.core.frames import R_NEUTRAL, Bools, Floats, Segment
 from sagittal.core.fusion.attitude import AttitudeParams, estimate_orientation
-from sagittal.core.held_samples import HeldSeries
 from sagittal.core.plurals import plural
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import RestParams, Window
 from sagittal.core.rotation import find_vertical, from_matrix, rotate
+from sagittal.core.signals.calibrated import CalibratedRecording, Calibration, SegmentCalibration
+from sagittal.core.signals.held_samples import HeldSeries
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import RestParams, Window
 
 FACING = radians(20.0)
 """Turn between standing and the first straight part that still counts as facing the walk (our choice)."""

@@ -16,12 +16,12 @@ import numpy as np
 
 from sagittal.core.calibration.calibrate import CalibrationParams, calibrate
 from sagittal.core.calibration.mounting import WAYS, Way, read_declared_direction, say_other_way
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import CalibrationError, SignalError
 from sagittal.core.frames import Segment
-from sagittal.core.recording import UniformRecording
 from sagittal.core.rotation import wrap_angle
 from sagittal.core.setup.repair import SetupRepair
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.recording import UniformRecording
 
 CONTRADICTED: Final = radians(60.0)
 """A declaration names one of four ways, so a right one is up to 45° off; from here on it is wrong (our

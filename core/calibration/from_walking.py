@@ -37,7 +37,6 @@ from sagittal.core.calibration.heading import (
 )
 from sagittal.core.calibration.joint_turns import JointTurnParams, measure_joint_turns
 from sagittal.core.calibration.mounting import read_declared_angle
-from sagittal.core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
 from sagittal.core.calibration.sensor_in_walk import SensorInWalk, WalkRungParams, follow_sensor
 from sagittal.core.calibration.standing import vertical_frame
 from sagittal.core.calibration.walking import (
@@ -51,12 +50,13 @@ from sagittal.core.calibration.walking import (
     turning_mask,
 )
 from sagittal.core.errors import CalibrationError, Notice, SignalError
-from sagittal.core.filtering import low_pass
 from sagittal.core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, THIGH, Bools, Floats, Segment
 from sagittal.core.fusion.attitude import AttitudeParams
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import Window, find_runs
 from sagittal.core.rotation import about, find_vertical, from_matrix, multiply, rotate
+from sagittal.core.signals.calibrated import CalibratedRecording, Calibration, SegmentCalibration
+from sagittal.core.signals.filtering import low_pass
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import Window, find_runs
 
 SWING_HZ: Final = 1.6
 """Low-pass under which the sensors of one leg are pushed forward together: a stride and its double."""

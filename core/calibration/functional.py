@@ -29,9 +29,9 @@ from sagittal.core.calibration.walking import TRUNK
 from sagittal.core.errors import CalibrationError, Notice
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from sagittal.core.plurals import plural
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import find_runs
 from sagittal.core.rotation import find_lengths, find_vertical
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import find_runs
 
 FunctionalMethod = Literal["hip_swing", "trunk_bow"]
 FUNCTIONAL: Final[tuple[FunctionalMethod, ...]] = ("hip_swing", "trunk_bow")

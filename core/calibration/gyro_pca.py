@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from sagittal.core.errors import CalibrationError
 from sagittal.core.frames import Bools, Floats, Segment
-from sagittal.core.held_samples import cut_blocks
 from sagittal.core.rotation import find_vertical
+from sagittal.core.signals.held_samples import cut_blocks
 
 SINGLE_AXIS, GOOD_AXIS = 0.70, 0.85
 """Share of the first component: below the first an error, below the second a notice

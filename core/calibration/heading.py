@@ -20,10 +20,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sagittal.core.filtering import low_pass
 from sagittal.core.frames import Floats
-from sagittal.core.rest import Window
 from sagittal.core.rotation import rotate, wrap_angle
+from sagittal.core.signals.filtering import low_pass
+from sagittal.core.signals.rest import Window
 
 Complexes = NDArray[np.complex128]
 Part = tuple[int, int]

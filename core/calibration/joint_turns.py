@@ -21,8 +21,8 @@ from sagittal.core.agreement.windows import JointSums
 from sagittal.core.calibration.forward import JointMeasure
 from sagittal.core.calibration.heading import Part
 from sagittal.core.frames import Bools, Floats, Segment
-from sagittal.core.recording import UniformRecording
 from sagittal.core.rotation import wrap_angle
+from sagittal.core.signals.recording import UniformRecording
 
 LEAST_CHUNKS: Final = 3
 """Seconds of walking with both sensors from which a joint is asked."""

@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.frames import SHANK, SIDES, THIGH, Floats, Side
-from sagittal.core.rest import index_window
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.rest import index_window
 
 MOST_SAMPLES: Final = 2000
 """More are thinned: a step has some fifty of its own."""

@@ -13,13 +13,13 @@ from typing import Final
 
 import numpy as np
 
-from sagittal.core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
 from sagittal.core.calibration.standing import GOOD_S, LONGEST_S, find_rests, stand_all
 from sagittal.core.calibration.standing_leg import find_standing_legs
 from sagittal.core.errors import CalibrationError, SignalError
 from sagittal.core.frames import SHANK, SIDES, THIGH, Floats, Segment, Side
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import RestParams, index_window
+from sagittal.core.signals.calibrated import CalibratedRecording, Calibration, SegmentCalibration
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import RestParams, index_window
 
 OFF: Final = radians(35.0)
 """From here on a mounting is not the one agreed on (our choice: people lean, knees bend aside, by less)."""

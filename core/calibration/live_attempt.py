@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sagittal.core.frames import Bools, Protocol, Segment
-from sagittal.core.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.signals.recording import SensorSignals, Subject, UniformRecording
 from sagittal.core.timeline.live import UniformBlock
 
 

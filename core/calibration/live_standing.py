@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sagittal.core.frames import Floats, Segment
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import RestParams, find_windows, measure_quietness
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import RestParams, find_windows, measure_quietness
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class StandingNow:
 
 
 def judge_standing(recording: UniformRecording, rest: RestParams) -> StandingNow:
-    """By the rules of core/rest.py; the last second decides on now."""
+    """By the rules of core/signals/rest.py; the last second decides on now."""
     rate, n = recording.rate_hz, len(recording.t_s)
     quiet = {s: measure_quietness(x, rate, rest).quiet for s, x in recording.sensors.items()}
     if not quiet or not n:

@@ -18,11 +18,11 @@ from sagittal.core.calibration.forward import MeasureName
 from sagittal.core.calibration.functional import FUNCTIONAL
 from sagittal.core.calibration.gyro_pca import GOOD_AXIS, measure_main_axis
 from sagittal.core.calibration.knee_axis import KNEE_SEEN, STEEPEST, measure_knees
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.calibration.walking import TRUNK
 from sagittal.core.frames import FOOT, GRAVITY, SEGMENTS, SHANK, SIDES, THIGH, Bools, Floats, Segment
-from sagittal.core.rest import index_window, measure_turn
 from sagittal.core.rotation import wrap_angle
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.rest import index_window, measure_turn
 
 CheckName = Literal[
     "forward_found", "stillness", "gravity", "axis_share", "repetitions", "mirror", "knee_axis",

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from sagittal.core.frames import FOOT, Bools, Floats, Segment
 from sagittal.core.fusion.attitude import AttitudeParams, AttitudeState, advance, estimate_orientation
-from sagittal.core.peaks import find_peaks
-from sagittal.core.recording import SensorSignals
-from sagittal.core.rest import find_runs
 from sagittal.core.rotation import conjugate, find_squares, multiply, rotate, wrap_angle
+from sagittal.core.signals.peaks import find_peaks
+from sagittal.core.signals.recording import SensorSignals
+from sagittal.core.signals.rest import find_runs
 
 Indices = NDArray[np.int64]
 Span = tuple[int, int]

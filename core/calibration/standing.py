@@ -10,8 +10,8 @@ import numpy as np
 
 from sagittal.core.errors import SignalError
 from sagittal.core.frames import SHANK, THIGH, Bools, Floats, Segment
-from sagittal.core.recording import SensorSignals, UniformRecording
-from sagittal.core.rest import (
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
+from sagittal.core.signals.rest import (
     QuietParams,
     RestParams,
     Window,

@@ -10,9 +10,9 @@ from typing import Final
 
 import numpy as np
 
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.frames import SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
-from sagittal.core.rest import index_window
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.rest import index_window
 
 LIFTED_M: Final = 0.04
 """An ankle so far above the other one, against standing, is off the floor (our choice: inclinations from

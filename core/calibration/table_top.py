@@ -15,10 +15,10 @@ import numpy as np
 
 from sagittal.core.errors import CalibrationError, Notice
 from sagittal.core.frames import R_NEUTRAL, Floats, Segment
-from sagittal.core.recording import SensorSignals, UniformRecording
-from sagittal.core.rest import QuietParams, Window, find_rest_windows, find_runs, index_window
 from sagittal.core.rotation import conjugate, exp, from_matrix, mean, multiply, rotate, to_matrix
 from sagittal.core.rotation.compiled import turn
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
+from sagittal.core.signals.rest import QuietParams, Window, find_rest_windows, find_runs, index_window
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from math import radians
 
 import numpy as np
 
-from sagittal.core.filtering import low_pass
 from sagittal.core.frames import Bools, Floats, Segment
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import find_runs
 from sagittal.core.rotation import conjugate, find_lengths, multiply, rotate, wrap_angle
+from sagittal.core.signals.filtering import low_pass
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import find_runs
 
 TRUNK: tuple[Segment, ...] = ("pelvis", "chest")
 DOWN: tuple[tuple[Segment, ...], ...] = (

@@ -22,13 +22,13 @@ from sagittal.core.change.limits import (
 )
 from sagittal.core.frames import Side
 from sagittal.core.norms.place import place_value
+from sagittal.core.norms.scores import Score
 from sagittal.core.norms.values import NormValue
 from sagittal.core.parameters.kinematic import is_level
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.parameters.symmetry import Symmetry
 from sagittal.core.parameters.uncertainty import difference_half_width
 from sagittal.core.parameters.variability import TOO_FEW, has_enough_values
-from sagittal.core.scores import Score
 
 Verdict = Literal["within_measurement_error", "real_change", "clinically_relevant"]
 
@@ -36,7 +36,7 @@ STRIDES: Final = "strides and measurement of the two sessions, 95 %"
 """Source of a limit that comes from the spread of the strides alone."""
 
 UNLIKE: Final = "conditions_differ"
-"""Reason of a change between takes that were not walked alike (core/condition.py)."""
+"""Reason of a change between takes that were not walked alike (core/subject/condition.py)."""
 
 NOT_MEASURED_ALIKE: Final = "not_measured_alike"
 """Reason of no change between an angle that a model of the leg estimated and one that sensors measured."""
@@ -54,7 +54,7 @@ class Change:
     verdict : None with a `reason`: "no_value" (one of the sessions has none, or of other sides),
         "not_measured_alike" (one is estimated, the other measured: no difference either), "too_few_strides"
         in one of them, "no_mdc" (no source has a limit for it), "conditions_differ" (not walked alike,
-        core/condition.py).
+        core/subject/condition.py).
     towards_norm : fewer standard deviations from the mean of the norm than before, each visit against the
         norm at its own speed; None where one of them has no comparable norm.
     note : "from_standing": a change of how the person stands is part of it.

@@ -17,7 +17,7 @@ import numpy as np
 
 from sagittal.core.events.result import GaitEvents
 from sagittal.core.frames import SIDES
-from sagittal.core.rest import Window
+from sagittal.core.signals.rest import Window
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class BoutParams(RowParams):
         stands in each. Our choice: both feet are never at rest together for so long in walking (ipol_walks,
         gaitmap_foot, neura_walk, all virtual patients).
     near_s : a rest so close to a bout's end is where the walk began or ended. Our choice: the longest rest
-        that the quiet window of 1 s cannot see (core/rest.py) and a step.
+        that the quiet window of 1 s cannot see (core/signals/rest.py) and a step.
     """
 
     long_s: float = 1.0

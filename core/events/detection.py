@@ -25,8 +25,8 @@ from sagittal.core.events.foot_movement import FootMovement, FootMovements
 from sagittal.core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
 from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
-from sagittal.core.held_samples import compare_neighbours, cut_blocks
 from sagittal.core.rotation import angle_between
+from sagittal.core.signals.held_samples import compare_neighbours, cut_blocks
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without

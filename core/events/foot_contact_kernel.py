@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from sagittal.core.events.foot_pitch_kernel import foot_pitch_kernel
-from sagittal.core.inner import inner_njit
+from sagittal.core.signals.inner import inner_njit
 
 # not plain numbers: for each of those all that takes it would be compiled once more
 TC: Final = np.int64(0)

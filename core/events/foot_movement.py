@@ -11,8 +11,8 @@ from sagittal.core.rotation import find_lengths
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
-    from sagittal.core.calibration.result import CalibratedRecording, SegmentCalibration
-    from sagittal.core.recording import SensorSignals
+    from sagittal.core.signals.calibrated import CalibratedRecording, SegmentCalibration
+    from sagittal.core.signals.recording import SensorSignals
 
 
 class FootMovement(NamedTuple):

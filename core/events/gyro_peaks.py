@@ -22,12 +22,12 @@ import numpy as np
 
 from sagittal.core.errors import Notice, SignalError
 from sagittal.core.events.result import GaitEvent, GaitEvents
-from sagittal.core.filtering import low_pass
 from sagittal.core.frames import FOOT, SHANK, SIDES, Bools, Floats, Oriented, Segment, Side
-from sagittal.core.held_samples import compare_neighbours
-from sagittal.core.peaks import find_peaks
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import conjugate, log, multiply
+from sagittal.core.signals.filtering import low_pass
+from sagittal.core.signals.held_samples import compare_neighbours
+from sagittal.core.signals.peaks import find_peaks
 
 
 @dataclass(frozen=True)

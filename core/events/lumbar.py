@@ -23,13 +23,13 @@ from sagittal.core.errors import Notice, SignalError
 from sagittal.core.events.bouts import Bout, BoutParams, RowParams, plain_bouts, walking_bouts
 from sagittal.core.events.periodicity import Periodicity, PeriodicityParams, step_times
 from sagittal.core.events.steps import Step, Steps
-from sagittal.core.filtering import low_pass, smooth_gaussian
 from sagittal.core.frames import Bools, Floats, Segment, Side
-from sagittal.core.peaks import find_peaks
 from sagittal.core.plurals import plural
-from sagittal.core.recording import SensorSignals, UniformRecording
-from sagittal.core.rest import STANDING, find_rest_windows, find_runs
 from sagittal.core.rotation import find_lengths
+from sagittal.core.signals.filtering import low_pass, smooth_gaussian
+from sagittal.core.signals.peaks import find_peaks
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
+from sagittal.core.signals.rest import STANDING, find_rest_windows, find_runs
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 

@@ -26,8 +26,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from sagittal.core.filtering import smooth_gaussian
 from sagittal.core.frames import Floats
+from sagittal.core.signals.filtering import smooth_gaussian
 
 TOGETHER: Final = 64
 """Windows whose rhythm is looked for at a time."""

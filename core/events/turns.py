@@ -18,11 +18,11 @@ from typing import Final, Literal
 
 import numpy as np
 
-from sagittal.core.filtering import low_pass
 from sagittal.core.frames import Bools, Floats, Oriented, Segment
-from sagittal.core.held_samples import compare_neighbours
-from sagittal.core.rest import find_runs
 from sagittal.core.rotation import conjugate, log, multiply
+from sagittal.core.signals.filtering import low_pass
+from sagittal.core.signals.held_samples import compare_neighbours
+from sagittal.core.signals.rest import find_runs
 
 LEVELS: Final[tuple[tuple[Segment, ...], ...]] = (
     ("pelvis",),

@@ -40,7 +40,7 @@ from sagittal.core.frames import SIDES, Bools, Floats, Segment
 from sagittal.core.fusion.algorithms.choice import LABELS
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.pipeline import Progress, TakeAnalysis
-from sagittal.core.rest import Window
+from sagittal.core.signals.rest import Window
 
 OWN_CHAIN: Final = "Sagittal, as analysed"
 """The product's own orientations, to which every filter is compared."""

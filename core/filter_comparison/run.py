@@ -16,15 +16,15 @@ from typing import Final
 
 import numpy as np
 
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import Notice, SagittalError
 from sagittal.core.frames import Floats, Segment
 from sagittal.core.fusion.algorithms.choice import OWN
 from sagittal.core.fusion.algorithms.filter import FusionFilter, RestMeans
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.fusion.self_calibrating import SelfCalibratingFilter
-from sagittal.core.rest import index_window
 from sagittal.core.rotation import about, conjugate, from_matrix, multiply, rotate, split_heading
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.rest import index_window
 
 Clock = Callable[[], float]
 """Seconds of a clock that only goes forward; core has none of its own."""

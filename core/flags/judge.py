@@ -101,8 +101,8 @@ def judge_flags(
     Parameters
     ----------
     curves : from standing; None without joint angles. parameters : of the session.
-    standing_deg : goniometer angles in standing (`sagittal.core.standing_angles`). height_m : m, makes speed
-        dimensionless.
+    standing_deg : goniometer angles in standing (`sagittal.core.subject.standing_angles`).
+    height_m : m, makes speed dimensionless.
     controls : own control group (`ControlGroup.norms`) for rules whose limit is theirs.
     age : years; below 18 limits made of the adult norms are not held against anybody. None = an adult.
 

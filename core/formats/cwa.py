@@ -20,7 +20,7 @@ from sagittal.core.errors import FormatError, Notice
 from sagittal.core.formats.draft import Draft
 from sagittal.core.formats.source_spec import SourceSpec
 from sagittal.core.frames import GRAVITY, Floats
-from sagittal.core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 
 LABEL: Final = "Axivity CWA"
 MAGIC: Final = b"MD\xfc\x03"

@@ -14,7 +14,6 @@ from typing import Any, Final
 import numpy as np
 
 from sagittal.core import rotation
-from sagittal.core.correction import AGAINST
 from sagittal.core.errors import FormatError, Notice
 from sagittal.core.formats import text
 from sagittal.core.formats.aliases import segment_in
@@ -23,6 +22,7 @@ from sagittal.core.formats.json_tree import read_json
 from sagittal.core.formats.source import stem_of
 from sagittal.core.formats.source_spec import GYR_UNITS, SourceSpec
 from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.signals.correction import AGAINST
 
 LABEL: Final = "DeviceMotion JSON"
 SIGN_ASSUMED: Final = "sign_assumed"

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from sagittal.core.errors import FormatError, Notice, Severity
 from sagittal.core.frames import Floats, Segment
-from sagittal.core.held_samples import cut_blocks, is_complete
 from sagittal.core.plurals import plural
-from sagittal.core.recording import ImuStream
+from sagittal.core.signals.held_samples import cut_blocks, is_complete
+from sagittal.core.signals.recording import ImuStream
 
 WRAP_16: Final = 1 << 16
 WRAP_32: Final = 1 << 32

@@ -29,7 +29,7 @@ from sagittal.core.formats.live_log import (
 )
 from sagittal.core.frames import Floats
 from sagittal.core.plurals import plural
-from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.signals.recording import ImuStream, Recording
 
 
 def looks_like(data: bytes) -> bool:

@@ -11,15 +11,15 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from sagittal.core.anthropometry import LIMITS, BodyMeasures
-from sagittal.core.correction import AS_READ, SensorCorrection
 from sagittal.core.errors import ManifestError, ParameterError
 from sagittal.core.formats.aliases import segment_named
 from sagittal.core.formats.json_tree import JsonNode, read_json
 from sagittal.core.formats.source_spec import SourceSpec, read_source
 from sagittal.core.frames import PROTOCOLS, SEGMENTS, Protocol, Segment
-from sagittal.core.recording import GivenLimits, Subject, check_belt
-from sagittal.core.shoe import Shoe
+from sagittal.core.signals.correction import AS_READ, SensorCorrection
+from sagittal.core.signals.recording import GivenLimits, Subject, check_belt
+from sagittal.core.subject.anthropometry import LIMITS, BodyMeasures
+from sagittal.core.subject.shoe import Shoe
 
 MAX_BYTES: Final = 1_000_000
 """A manifest is a page of text; more is a mistake."""

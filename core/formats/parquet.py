@@ -18,16 +18,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from sagittal.core.anthropometry import BodyMeasures
 from sagittal.core.errors import FormatError, Notice
 from sagittal.core.formats.draft import has_whole_row, signal_digest
 from sagittal.core.formats.json_tree import read_json
 from sagittal.core.formats.source import SourceFile
 from sagittal.core.frames import Floats, Protocol, Segment
 from sagittal.core.plurals import plural
-from sagittal.core.recording import ImuStream, Recording, Subject
-from sagittal.core.sample_blocks import LongStream, SampleBlock
-from sagittal.core.shoe import Shoe
+from sagittal.core.signals.recording import ImuStream, Recording, Subject
+from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
+from sagittal.core.subject.anthropometry import BodyMeasures
+from sagittal.core.subject.shoe import Shoe
 
 MAGIC: Final = b"PAR1"
 SCHEMA: Final = 1

@@ -8,7 +8,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from sagittal.core.correction import AS_READ, SensorCorrection
 from sagittal.core.errors import ArchiveError, FormatError, InputError, ManifestError, Notice
 from sagittal.core.formats import _sniff, bids, cwa, live_reader, mapping_xml, parquet, table, text
 from sagittal.core.formats.aliases import segment_named
@@ -21,8 +20,9 @@ from sagittal.core.formats.source_spec import SourceSpec
 from sagittal.core.formats.vendors import find_vendor, list_formats
 from sagittal.core.frames import Segment
 from sagittal.core.plurals import plural
-from sagittal.core.recording import ImuStream, Recording
-from sagittal.core.sample_blocks import LongStream
+from sagittal.core.signals.correction import AS_READ, SensorCorrection
+from sagittal.core.signals.recording import ImuStream, Recording
+from sagittal.core.signals.sample_blocks import LongStream
 
 _SHOWN = 5
 

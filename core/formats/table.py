@@ -17,7 +17,7 @@ from sagittal.core.formats.draft import Draft, make_draft
 from sagittal.core.formats.source import SourceFile
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, Counter, SourceSpec
 from sagittal.core.frames import Floats
-from sagittal.core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 
 _ROWS_TO_LOOK_AT = 4
 _CHUNK: Final = 1 << 23

@@ -20,7 +20,7 @@ from sagittal.core.functional_tests.trunk import TrunkMotion
 from sagittal.core.parameters.catalogue import list_names
 from sagittal.core.parameters.catalogue.entry import CHAIR
 from sagittal.core.plurals import plural
-from sagittal.core.recording import GivenLimits
+from sagittal.core.signals.recording import GivenLimits
 
 RISES: Final = 5
 

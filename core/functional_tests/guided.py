@@ -26,10 +26,10 @@ from sagittal.core.functional_tests.sway import STANDING_QUIETLY, measure_sway
 from sagittal.core.functional_tests.trunk import TRUNK, follow_trunk
 from sagittal.core.functional_tests.tug import measure_tug
 from sagittal.core.functional_tests.walks import LENGTH, measure_six_minutes, measure_ten_metres
-from sagittal.core.measure import MeasuredGait
 from sagittal.core.parameters.live_stride import LiveStride
-from sagittal.core.recording import GivenLimits, SensorSignals, Subject, UniformRecording
-from sagittal.core.rest import QuietParams, find_rest_windows, measure_quietness
+from sagittal.core.parameters.measure import MeasuredGait
+from sagittal.core.signals.recording import GivenLimits, SensorSignals, Subject, UniformRecording
+from sagittal.core.signals.rest import QuietParams, find_rest_windows, measure_quietness
 from sagittal.core.timeline.live import UniformBlock
 
 CHAIR_TESTS: Final = ("tug", "five_sit_to_stand")
@@ -330,7 +330,7 @@ class GuidedTest:
         return UniformRecording(t_s, self._rate, sensors, self._subject, self.protocol, {})
 
     def _quiet_s(self, low: int, at: int, most_s: float) -> float:
-        """How long all watched sensors have been quiet (core/rest.py), s; looked for over so long."""
+        """How long all watched sensors have been quiet (core/signals/rest.py), s; looked for over so long."""
         low = max(low, at - round((most_s + REST.window_s) * self._rate), self._kept.first)
         quiet = np.ones(at - low, np.bool_)
         for sensor in self._kept.cut(low, at, self._watched).values():

@@ -14,10 +14,10 @@ from typing import Final, Literal
 
 import numpy as np
 
-from sagittal.core.filtering import low_pass
 from sagittal.core.frames import Floats
 from sagittal.core.functional_tests.trunk import TrunkMotion
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.filtering import low_pass
+from sagittal.core.signals.rest import find_runs
 
 ChangeKind = Literal["sit_to_stand", "stand_to_sit"]
 

@@ -8,14 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from sagittal.core.filtering import low_pass
 from sagittal.core.frames import GRAVITY, Floats
 from sagittal.core.functional_tests.result import FunctionalTest, TimedSegment, state_figures
 from sagittal.core.functional_tests.trunk import find_trunk_sensor
 from sagittal.core.parameters.catalogue import list_names
 from sagittal.core.parameters.catalogue.entry import SWAY
-from sagittal.core.recording import GivenLimits, UniformRecording
-from sagittal.core.rest import QuietParams, Window, find_rest_windows, index_window
+from sagittal.core.signals.filtering import low_pass
+from sagittal.core.signals.recording import GivenLimits, UniformRecording
+from sagittal.core.signals.rest import QuietParams, Window, find_rest_windows, index_window
 
 NAMES: Final = list_names(SWAY, "take")
 

@@ -14,9 +14,9 @@ import numpy as np
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
 from sagittal.core.fusion.attitude import AttitudeParams, estimate_orientation
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import find_rest_windows, index_window
 from sagittal.core.rotation import exp, find_vertical
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import find_rest_windows, index_window
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 """Sensors that tell how the trunk moves, the better known first."""

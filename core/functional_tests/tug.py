@@ -19,7 +19,7 @@ from sagittal.core.functional_tests.trunk import TrunkMotion
 from sagittal.core.parameters.catalogue import list_names
 from sagittal.core.parameters.catalogue.entry import TUG
 from sagittal.core.plurals import plural
-from sagittal.core.recording import GivenLimits
+from sagittal.core.signals.recording import GivenLimits
 
 HALF_TURN: Final = radians(120.0)
 """Least angle of a turn around the mark, and of the one before the chair (our choice)."""

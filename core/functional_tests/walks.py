@@ -17,11 +17,11 @@ from sagittal.core.events.bouts import Bout
 from sagittal.core.events.result import Strides
 from sagittal.core.frames import SIDES, Floats
 from sagittal.core.functional_tests.result import FunctionalTest, TimedSegment, state_figures
-from sagittal.core.measure import MeasuredGait
 from sagittal.core.parameters.catalogue import list_names
 from sagittal.core.parameters.catalogue.entry import WALK_TESTS
+from sagittal.core.parameters.measure import MeasuredGait
 from sagittal.core.parameters.rows import Column
-from sagittal.core.recording import GivenLimits
+from sagittal.core.signals.recording import GivenLimits
 
 TEN: Final = tuple(n for n in list_names(WALK_TESTS, "take") if n.startswith("walk_10m_"))
 SIX: Final = tuple(n for n in list_names(WALK_TESTS, "take") if n.startswith("walk_6min_"))

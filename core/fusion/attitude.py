@@ -22,8 +22,8 @@ import numpy as np
 
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import Bools, Floats
-from sagittal.core.held_samples import SampleSeries, cut_blocks
 from sagittal.core.rotation import compiled, find_middle
+from sagittal.core.signals.held_samples import SampleSeries, cut_blocks
 
 
 @dataclass(frozen=True)

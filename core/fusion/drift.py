@@ -19,12 +19,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sagittal.core.calibration.result import Calibration
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Bools, Floats, Segment
-from sagittal.core.held_samples import cut_blocks
-from sagittal.core.rest import find_runs, index_window
 from sagittal.core.rotation import about, multiply, yaw
+from sagittal.core.signals.calibrated import Calibration
+from sagittal.core.signals.held_samples import cut_blocks
+from sagittal.core.signals.rest import find_runs, index_window
 
 ALIKE_DIGITS: Final = 6
 """Of drifts in rad that are equal."""

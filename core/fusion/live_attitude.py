@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numba
 import numpy as np
 
-from sagittal.core.calibration.result import SegmentCalibration
 from sagittal.core.frames import R_NEUTRAL, Bools, Floats
 from sagittal.core.fusion.attitude import AttitudeParams, attitude_kernel
 from sagittal.core.fusion.live_rest import LOST_TILT, RestLooks
 from sagittal.core.rotation import from_matrix
 from sagittal.core.rotation.compiled import multiply
+from sagittal.core.signals.calibrated import SegmentCalibration
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

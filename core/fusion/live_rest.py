@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from sagittal.core.frames import Bools
-from sagittal.core.rest import count_runs
+from sagittal.core.signals.rest import count_runs
 
 RESTED_S: Final = 0.1
 """Into a rest at which its tilt is looked at: a foot that lands or begins to roll is called still as well, up

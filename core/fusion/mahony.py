@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from sagittal.core.calibration.result import CalibratedRecording, SegmentCalibration
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import R_NEUTRAL, Bools, Floats, Segment
 from sagittal.core.fusion.attitude import AttitudeParams, estimate_orientation
 from sagittal.core.fusion.drift import DriftParams, remove_relative_drift
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.held_samples import HeldSeries, cut_blocks
-from sagittal.core.recording import SensorSignals
-from sagittal.core.rest import Window
 from sagittal.core.rotation import conjugate, from_matrix, multiply
+from sagittal.core.signals.calibrated import CalibratedRecording, SegmentCalibration
+from sagittal.core.signals.held_samples import HeldSeries, cut_blocks
+from sagittal.core.signals.recording import SensorSignals
+from sagittal.core.signals.rest import Window
 
 
 @dataclass(frozen=True)

@@ -17,18 +17,18 @@ from sagittal.core.body.model import BodyModel
 from sagittal.core.body.mounting import mount_sensors
 from sagittal.core.body.pose_params import PoseParams
 from sagittal.core.calibration import CalibrationParams
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.calibration.score import CalibrationScore, score_calibration
 from sagittal.core.errors import Notice
-from sagittal.core.filtering import low_pass
 from sagittal.core.frames import Segment
 from sagittal.core.fusion.attitude import compile_attitude_kernel
 from sagittal.core.fusion.mahony import MahonyParams, estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.online.frame import SegmentCheck
-from sagittal.core.peaks import compile_peak_kernel
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import compile_rest_kernels
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.filtering import low_pass
+from sagittal.core.signals.peaks import compile_peak_kernel
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import compile_rest_kernels
 
 
 @dataclass(frozen=True)

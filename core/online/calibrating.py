@@ -1,7 +1,7 @@
 """Calibration while the samples come: stand, walk, and the offline calibration as soon as there is enough.
 
 All is judged at fixed samples of the axis, every half second, so that it is a function of the samples and not
-of the blocks they came in. Standing and walking are told apart by the offline rules (core/rest.py,
+of the blocks they came in. Standing and walking are told apart by the offline rules (core/signals/rest.py,
 core/calibration/walking.py); that enough was walked is said by the offline calibration itself.
 """
 
@@ -24,14 +24,14 @@ from sagittal.core.calibration.live_standing import (
     find_upward_axes,
     judge_standing,
 )
-from sagittal.core.calibration.result import Calibration
 from sagittal.core.calibration.walking import moving_mask
 from sagittal.core.errors import Notice, SagittalError, SignalError
 from sagittal.core.frames import Bools, Floats, Segment
 from sagittal.core.online.calibrated import LiveCalibration, MountingParams, finish_calibration
 from sagittal.core.online.frame import CalibrationView, SegmentCheck, Stage
 from sagittal.core.plurals import plural
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.calibrated import Calibration
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.timeline.live import UniformBlock
 
 

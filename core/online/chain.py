@@ -40,7 +40,7 @@ from sagittal.core.parameters.live_history import MOST, SampleHistory
 from sagittal.core.parameters.live_stride import LiveStride
 from sagittal.core.parameters.live_strides import HistoryColumns, LiveStrides
 from sagittal.core.parameters.spatial import Surface
-from sagittal.core.rest import index_window
+from sagittal.core.signals.rest import index_window
 from sagittal.core.timeline.columns import find_columns, take_columns, take_mask
 
 NOT_LIVE: Final = (

@@ -15,7 +15,6 @@ from sagittal.core.body.live_still import StillnessDetector
 from sagittal.core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from sagittal.core.body.tree import PRESETS
 from sagittal.core.calibration.live_attempt import WornSensors
-from sagittal.core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
 from sagittal.core.calibration.score import CalibrationScore
 from sagittal.core.errors import Notice, SagittalError
 from sagittal.core.formats.live_log import Hello, SampleBatch
@@ -31,8 +30,9 @@ from sagittal.core.online.health import SensorHealthMonitor
 from sagittal.core.parameters.spatial import Surface
 from sagittal.core.quality.live_stuck import StuckSensors
 from sagittal.core.quality.stuck import compile_stuck_kernel
-from sagittal.core.recording import GivenLimits, SensorSignals, Subject, UniformRecording, check_belt
 from sagittal.core.rotation import from_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording, Calibration, SegmentCalibration
+from sagittal.core.signals.recording import GivenLimits, SensorSignals, Subject, UniformRecording, check_belt
 from sagittal.core.timeline.live import LiveAxis, LiveAxisParams, UniformBlock, compile_axis_kernels
 
 

@@ -13,7 +13,7 @@ from sagittal.core.parameters.catalogue import list_curve_figures
 from sagittal.core.parameters.kinematic import is_level, summarise_angles
 from sagittal.core.parameters.result import CycleCurves, Parameter
 from sagittal.core.parameters.uncertainty import state_uncertainty
-from sagittal.core.standing_angles import JOINTS, PELVIS, check_standing
+from sagittal.core.subject.standing_angles import JOINTS, PELVIS, check_standing
 
 
 def anatomical_curves(curves: CycleCurves, standing_deg: Mapping[str, float]) -> CycleCurves:
@@ -22,7 +22,7 @@ def anatomical_curves(curves: CycleCurves, standing_deg: Mapping[str, float]) ->
     Parameters
     ----------
     curves : from standing.
-    standing_deg : goniometer angles in standing, `sagittal.core.standing_angles.NAMES`.
+    standing_deg : goniometer angles in standing, `sagittal.core.subject.standing_angles.NAMES`.
 
     Raises
     ------

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sagittal.core.body.feet import FootTracks
 from sagittal.core.events.result import Strides
 from sagittal.core.frames import Side
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.rest import find_runs
 
 STANCE_SHARE: Final = 0.7
 """Part of the stride in which its flat is looked for when no foot-off was found."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagittal.core.frames import Floats
-from sagittal.core.held_samples import give_pages_back
+from sagittal.core.signals.held_samples import give_pages_back
 
 
 def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int = 101) -> list[Floats]:

@@ -17,7 +17,7 @@ from sagittal.core.frames import GRAVITY, Floats, Segment
 from sagittal.core.parameters.resample import resample
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.parameters.variability import summarise_values
-from sagittal.core.rest import Window
+from sagittal.core.signals.rest import Window
 
 NAME: Final = "stride_sparc"
 

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from sagittal.core.body.feet import FootTracks
 from sagittal.core.events.result import Strides
 from sagittal.core.frames import Bools, Floats, Protocol, Side
-from sagittal.core.held_samples import give_pages_back
 from sagittal.core.parameters.catalogue import list_names
 from sagittal.core.parameters.catalogue.entry import DISTANCES
 from sagittal.core.parameters.clearance import (
@@ -40,9 +39,10 @@ from sagittal.core.parameters.rows import (
     tell_figure,
 )
 from sagittal.core.parameters.variability import summarise_values
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import find_runs
 from sagittal.core.rotation import wrap_angle, yaw
+from sagittal.core.signals.held_samples import give_pages_back
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import find_runs
 
 NAMES: Final[tuple[str, ...]] = (*list_names(DISTANCES, of="stride"), "toe_out_deg")
 """Per-side parameters in the order of the tables."""

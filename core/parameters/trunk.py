@@ -21,7 +21,7 @@ from sagittal.core.frames import SIDES, Floats, Segment
 from sagittal.core.parameters.resample import resample
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.parameters.variability import STEADY_STRIDES, summarise_values
-from sagittal.core.rest import Window
+from sagittal.core.signals.rest import Window
 
 AXES: Final[Mapping[str, int]] = {"v": 2, "ap": 0, "ml": 1}
 """Ending of the name → column of the acceleration: vertical, forward, sideways."""

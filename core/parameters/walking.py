@@ -15,7 +15,7 @@ from sagittal.core.parameters.plausible import IMPOSSIBLE, is_impossible
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.parameters.temporal import cadence
 from sagittal.core.parameters.variability import summarise_values
-from sagittal.core.rest import Window
+from sagittal.core.signals.rest import Window
 
 
 def bout_parameters(bouts: Sequence[Bout]) -> tuple[Parameter, ...]:

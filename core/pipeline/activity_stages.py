@@ -13,8 +13,8 @@ from sagittal.core.pipeline.analysis import TakeAnalysis
 from sagittal.core.pipeline.config import PipelineConfig
 from sagittal.core.pipeline.stages import PipelineStage
 from sagittal.core.quality.assessment import Level, QualityReport
-from sagittal.core.recording import Recording, as_long_stream
-from sagittal.core.sample_blocks import LongStream
+from sagittal.core.signals.recording import Recording, as_long_stream
+from sagittal.core.signals.sample_blocks import LongStream
 
 TRUNK: Final[tuple[Segment, ...]] = ("chest", "pelvis")
 """Where the sensor of daily life is worn, the published place first."""

@@ -15,7 +15,6 @@ from sagittal.core.body.estimate import PoseEstimate
 from sagittal.core.body.feet import FootTracks
 from sagittal.core.body.mounting import MountedSensors
 from sagittal.core.body.poses import Poses
-from sagittal.core.calibration.result import CalibratedRecording, Calibration
 from sagittal.core.calibration.score import CalibrationScore
 from sagittal.core.errors import Notice, ParameterError
 from sagittal.core.events.result import GaitEvents, Strides
@@ -24,12 +23,13 @@ from sagittal.core.events.turns import Turn
 from sagittal.core.frames import Side
 from sagittal.core.functional_tests.result import FunctionalTest
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.measure import MeasuredGait, Tracks
+from sagittal.core.parameters.measure import MeasuredGait, Tracks
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.pipeline.config import PipelineConfig
 from sagittal.core.quality import QualityReport
-from sagittal.core.recording import Recording, UniformRecording
 from sagittal.core.setup import SetupRepair
+from sagittal.core.signals.calibrated import CalibratedRecording, Calibration
+from sagittal.core.signals.recording import Recording, UniformRecording
 from sagittal.core.squat.measures import SquatSide
 
 SCHEMA: Final = 1

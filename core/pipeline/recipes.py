@@ -33,7 +33,7 @@ from sagittal.core.pipeline.stages import (
     PipelineStage,
 )
 from sagittal.core.quality.stuck import drop_stuck_sensors
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 
 Progress = Callable[[str, float], None]
 """Called with the stage that starts and the share of the work done before it, 0 to 1."""

@@ -16,13 +16,13 @@ from sagittal.core import body, calibration, quality, timeline
 from sagittal.core.agreement import Agreement, check_agreement
 from sagittal.core.agreement.joints import LEG_JOINTS
 from sagittal.core.angles.measure import measure_angles
+from sagittal.core.angles.withheld import list_fixed, withhold, withhold_at_slips, withhold_distances
 from sagittal.core.body.estimate import estimate_poses
 from sagittal.core.body.l7s.inputs import remove_gravity
 from sagittal.core.body.mounting import mount_sensors
 from sagittal.core.body.poses import figure_precision
 from sagittal.core.body.walking_frame import in_walking_frame
 from sagittal.core.calibration.declared import propose_mountings
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.calibration.score import score_calibration
 from sagittal.core.errors import Notice
 from sagittal.core.events.alternation import tell_foot_lag
@@ -35,16 +35,16 @@ from sagittal.core.events.turns import body_yaw_rate, find_turns
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import LastReading, Orientations
-from sagittal.core.measure import Tracks, measure_gait
-from sagittal.core.memory import give_memory_back
+from sagittal.core.parameters.measure import Tracks, measure_gait
 from sagittal.core.parameters.spatial import surface_of
 from sagittal.core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
 from sagittal.core.pipeline.config import PipelineConfig
 from sagittal.core.quality.stuck import drop_stuck_sensors, mark_stuck
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import STANDING, Window, find_rest_windows
 from sagittal.core.setup.propose import propose_labels, propose_repair
-from sagittal.core.withheld import list_fixed, withhold, withhold_at_slips, withhold_distances
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.memory import give_memory_back
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import STANDING, Window, find_rest_windows
 
 CHAIN: Final[frozenset[Segment]] = frozenset(s for joint in LEG_JOINTS for s in joint)
 """With all of these worn the joints compare the clocks of both feet."""

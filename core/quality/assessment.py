@@ -15,9 +15,9 @@ from sagittal.core.plurals import plural
 from sagittal.core.quality.inspection import measure_losses
 from sagittal.core.quality.signals import magnetic_share, measure_stream, saturation
 from sagittal.core.quality.suspicion import list_suspicions
-from sagittal.core.recording import Recording, SensorSignals, UniformRecording
-from sagittal.core.rest import QuietParams, Window, find_rest_windows, find_runs, index_window
 from sagittal.core.rotation import find_lengths
+from sagittal.core.signals.recording import Recording, SensorSignals, UniformRecording
+from sagittal.core.signals.rest import QuietParams, Window, find_rest_windows, find_runs, index_window
 
 Level = Literal["good", "usable", "poor"]
 """Best first."""

@@ -14,9 +14,9 @@ from typing import Any, Final, Literal, Self
 import numpy as np
 
 from sagittal.core.frames import GRAVITY, Floats
-from sagittal.core.held_samples import is_complete
-from sagittal.core.recording import ImuStream, SensorSignals
-from sagittal.core.rest import (
+from sagittal.core.signals.held_samples import is_complete
+from sagittal.core.signals.recording import ImuStream, SensorSignals
+from sagittal.core.signals.rest import (
     RestParams,
     Window,
     find_windows,
@@ -115,7 +115,7 @@ def check_device(stream: ImuStream, params: RestParams | None = None) -> DeviceC
     Parameters
     ----------
     stream : as recorded; rows with a missing value and gaps are left out.
-    params : what counts as rest (core/rest.py); slow turns of the vertical do not.
+    params : what counts as rest (core/signals/rest.py); slow turns of the vertical do not.
 
     Notes
     -----

@@ -10,12 +10,12 @@ import numpy as np
 from sagittal.core.errors import Notice
 from sagittal.core.formats.aliases import segment_in
 from sagittal.core.frames import Segment
-from sagittal.core.held_samples import is_complete
 from sagittal.core.quality.signals import measure_signal, measure_stream
 from sagittal.core.quality.suggestion import Suggestion, suggest
 from sagittal.core.quality.suspicion import list_suspicions
-from sagittal.core.recording import ImuStream, Recording, Subject
-from sagittal.core.sample_blocks import LongStream
+from sagittal.core.signals.held_samples import is_complete
+from sagittal.core.signals.recording import ImuStream, Recording, Subject
+from sagittal.core.signals.sample_blocks import LongStream
 
 
 @dataclass(frozen=True)

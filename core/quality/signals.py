@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagittal.core.frames import GRAVITY, Floats
-from sagittal.core.held_samples import is_complete
-from sagittal.core.recording import ImuStream
-from sagittal.core.rest import find_runs
 from sagittal.core.rotation import find_lengths, find_squares
+from sagittal.core.signals.held_samples import is_complete
+from sagittal.core.signals.recording import ImuStream
+from sagittal.core.signals.rest import find_runs
 
 STILL: Final = 0.03
 """A second is still when acc varies less than this share of its mean (0.25 m/s²:

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from sagittal.core.errors import Notice
 from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
 from sagittal.core.quality.signals import RANGES
-from sagittal.core.recording import SensorSignals, UniformRecording
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
+from sagittal.core.signals.rest import find_runs
 
 CHANNELS: Final = 6
 """Of a sensor: three axes of the accelerometer, three of the gyroscope."""

@@ -16,9 +16,9 @@ import numpy as np
 
 from sagittal.core.formats.aliases import segment_in, segment_named, side_in
 from sagittal.core.frames import Floats, Segment
-from sagittal.core.held_samples import is_complete
 from sagittal.core.quality.sides import find_left_leg, smooth
-from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.signals.held_samples import is_complete
+from sagittal.core.signals.recording import ImuStream, Recording
 
 Part = Literal["foot", "shank", "thigh", "pelvis"]
 LEG_PARTS: Final[tuple[Part, ...]] = ("foot", "shank", "thigh")

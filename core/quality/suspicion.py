@@ -13,8 +13,8 @@ import numpy as np
 from sagittal.core import rotation
 from sagittal.core.errors import Notice, Severity
 from sagittal.core.frames import GRAVITY, Floats
-from sagittal.core.held_samples import is_complete
 from sagittal.core.quality.signals import Facts
+from sagittal.core.signals.held_samples import is_complete
 
 TOLERANCE: Final = 0.10
 FAR_OFF: Final = 0.25

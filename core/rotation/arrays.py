@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from sagittal.core.frames import Floats
-from sagittal.core.held_samples import AT_A_TIME, cut_blocks
+from sagittal.core.signals.held_samples import AT_A_TIME, cut_blocks
 
 _SMALL = 1e-8
 

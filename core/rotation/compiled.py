@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from sagittal.core.frames import Floats
-from sagittal.core.inner import inner_njit
+from sagittal.core.signals.inner import inner_njit
 
 SMALL = 1e-8
 """Below this angle in rad the series of one term replaces the sine."""

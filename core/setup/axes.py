@@ -18,10 +18,10 @@ import numpy as np
 from sagittal.core.agreement.terms import find_bias
 from sagittal.core.frames import Bools, Floats
 from sagittal.core.fusion.attitude import AttitudeParams, AttitudeState, advance
-from sagittal.core.recording import SensorSignals
-from sagittal.core.rest import find_runs, measure_quietness
 from sagittal.core.rotation import rotate
 from sagittal.core.setup.params import SetupParams
+from sagittal.core.signals.recording import SensorSignals
+from sagittal.core.signals.rest import find_runs, measure_quietness
 
 CHOICES: Final[Floats] = np.array(
     [

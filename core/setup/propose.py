@@ -17,15 +17,15 @@ import numpy as np
 from sagittal.core.agreement import Agreement, AgreementParams
 from sagittal.core.agreement.agree import compare_sensors
 from sagittal.core.agreement.exchange import find_exchange
-from sagittal.core.correction import AGAINST, AS_READ, SensorCorrection, name_axes
 from sagittal.core.frames import FOOT, GRAVITY, SHANK, SIDES, THIGH, Floats, Segment
 from sagittal.core.quality.sides import find_left_leg
 from sagittal.core.quality.signals import Facts, measure_signal, measure_stream
 from sagittal.core.quality.suspicion import list_suspicions
-from sagittal.core.recording import ImuStream, Recording, UniformRecording
 from sagittal.core.setup.axes import CHOICES, REVERSED, fit_axes, refuses_choice
 from sagittal.core.setup.params import SetupParams
 from sagittal.core.setup.repair import SetupRepair
+from sagittal.core.signals.correction import AGAINST, AS_READ, SensorCorrection, name_axes
+from sagittal.core.signals.recording import ImuStream, Recording, UniformRecording
 
 ACC_FACTORS: Final = (1.0, GRAVITY, 1e-3 * GRAVITY, 1.0 / GRAVITY)
 GYR_FACTORS: Final = (1.0, radians(1.0), degrees(1.0))

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from math import inf, isfinite
 from typing import Any, Literal
 
-from sagittal.core.correction import SensorCorrection
 from sagittal.core.errors import Notice
 from sagittal.core.formats.aliases import segment_named
 from sagittal.core.formats.manifest import manifest_of
 from sagittal.core.frames import Segment
+from sagittal.core.signals.correction import SensorCorrection
 
 SetupMistake = Literal["units", "axes", "labels", "mounting"]
 

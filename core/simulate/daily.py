@@ -19,9 +19,9 @@ import numpy as np
 from sagittal.core.errors import ParameterError
 from sagittal.core.formats.draft import signal_digest
 from sagittal.core.frames import GRAVITY, Floats
-from sagittal.core.recording import ImuStream, Recording, Subject
 from sagittal.core.rotation import about, conjugate, multiply, rotate
-from sagittal.core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.signals.recording import ImuStream, Recording, Subject
+from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 from sagittal.core.simulate.chest import (
     POSTURES,
     STEPPING,

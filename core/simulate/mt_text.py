@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.signals.recording import ImuStream, Recording
 
 COUNTER_RANGE = 1 << 16
 """The packet counter wraps at 16 bit."""

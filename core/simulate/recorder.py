@@ -11,7 +11,7 @@ import numpy as np
 
 from sagittal.core.formats.draft import signal_digest
 from sagittal.core.frames import Bools, Floats, Protocol, Segment
-from sagittal.core.recording import ImuStream, Recording, Subject
+from sagittal.core.signals.recording import ImuStream, Recording, Subject
 from sagittal.core.simulate.mems import DrawnErrors, add_sensor_errors, clip_signals
 from sagittal.core.simulate.sensors import SensorPath, SimulatedSignals, ideal_signals
 from sagittal.core.simulate.setup import RecordingSetup

@@ -19,7 +19,7 @@ from sagittal.core.parameters.catalogue import list_names, unit_of
 from sagittal.core.parameters.catalogue.entry import SQUAT
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.parameters.variability import summarise_values
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.squat.curves import CURVES, INWARD, KNEE, cut_curves
 from sagittal.core.squat.repetitions import FOOT_LIFTED, Repetition, RepetitionParams, find_repetitions
 

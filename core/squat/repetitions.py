@@ -14,7 +14,7 @@ import numpy as np
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Bools, Floats, Side
-from sagittal.core.peaks import find_peaks
+from sagittal.core.signals.peaks import find_peaks
 
 FOOT_LIFTED: Final = "foot_lifted"
 CODES: Final = (FOOT_LIFTED, "incomplete", "signal_lost", "foot_moved")

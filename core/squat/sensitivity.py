@@ -20,11 +20,11 @@ from sagittal.core.body.chain.geometry import LegGeometry
 from sagittal.core.body.chain.leg import read_leg_signals
 from sagittal.core.body.chain.model import build_leg_chain, leg_segments
 from sagittal.core.calibration.fixed_offset import BACK, FRONT
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.calibration.standing_leg import find_standing_legs
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import SUFFIX, Bools, Floats, Segment, Side
 from sagittal.core.rotation import about, from_matrix, to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.squat.joints import JOINTS, name_joint_angles
 
 UP, FORWARD, RIGHT = 1, 0, 2

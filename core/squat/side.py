@@ -5,7 +5,7 @@ from __future__ import annotations
 from sagittal.core.body.chain.model import leg_segments
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import SIDES, Side
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 
 
 def find_squat_sides(recording: UniformRecording) -> tuple[Side, ...]:

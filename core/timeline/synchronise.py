@@ -11,8 +11,8 @@ import numpy as np
 
 from sagittal.core.errors import Notice, SignalError
 from sagittal.core.frames import Bools, Floats, Segment
-from sagittal.core.held_samples import is_complete
-from sagittal.core.recording import ImuStream, Recording, SensorSignals, UniformRecording
+from sagittal.core.signals.held_samples import is_complete
+from sagittal.core.signals.recording import ImuStream, Recording, SensorSignals, UniformRecording
 from sagittal.core.timeline.grid import lay_signal
 from sagittal.core.timeline.params import TimelineParams
 

@@ -13,10 +13,12 @@ from sagittal.server.api.downloads import ANY_FILE, attachment
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import sessions
 from sagittal.server.context import Blobs, Db, Id, OpenTrail, Queue
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.jobs.queue import JobView
-from sagittal.server.services import analyses, recordings, sessions
+from sagittal.server.results import analyses
+from sagittal.server.uploads import recordings
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["analyses"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

@@ -13,19 +13,13 @@ from sagittal.server.api.downloads import BINARY
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.context import Blobs, Db, Id, OpenTrail, Reviewed
+from sagittal.server.downloads import archives
 from sagittal.server.report.tables import curves_csv, parameters_csv
-from sagittal.server.services import (
-    analyses,
-    archives,
-    controls,
-    edit_log,
-    patients,
-    recordings,
-    reports,
-    sessions,
-    signed_reports,
-)
+from sagittal.server.results import analyses, controls, edit_log, reports
+from sagittal.server.sharing import signed_reports
+from sagittal.server.uploads import recordings
 
 router = APIRouter(prefix="/sessions/{session_id}", tags=["report"])
 _PIECE = 1 << 20

@@ -12,7 +12,7 @@ from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.context import Db
-from sagittal.server.services.errors import NotFound
+from sagittal.server.errors import NotFound
 from sagittal.server.storage.high_water import read_newest
 
 router = APIRouter(prefix="/audit", tags=["audit"])

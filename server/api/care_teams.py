@@ -11,10 +11,11 @@ from sagittal.server.api.documents import refusals
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients
 from sagittal.server.context import Db, Failures, Id, OpenTrail, address_of
+from sagittal.server.errors import NotFound
 from sagittal.server.http.json_body import StrictJsonRoute
-from sagittal.server.services import care_teams, patients
-from sagittal.server.services.errors import NotFound
+from sagittal.server.sharing import care_teams
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["care teams"])
 Admin = Annotated[Identity, require(Action.MANAGE_USERS)]

@@ -15,11 +15,11 @@ from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.context import Db, Id, OpenTrail, Reviewed
-from sagittal.server.report.columns import reduce_to_plain
-from sagittal.server.report.comparison import comparison_csv
-from sagittal.server.services import comparisons
-from sagittal.server.services.comparisons import SessionPair
-from sagittal.server.services.histories import AnalysedSession
+from sagittal.server.report.files.columns import reduce_to_plain
+from sagittal.server.report.history.comparison import comparison_csv
+from sagittal.server.results import comparisons
+from sagittal.server.results.comparisons import SessionPair
+from sagittal.server.results.histories import AnalysedSession
 from sagittal.server.storage.db import Database
 from sagittal.server.trail import AuditTrail
 

@@ -14,11 +14,11 @@ from sagittal.server.api.downloads import BINARY, attachment
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import devices
+from sagittal.server.clinic.devices import DatedCheck, KnownDevice
 from sagittal.server.context import Db, DeviceId
-from sagittal.server.report.columns import write_csv
-from sagittal.server.report.device_words import judge_device
-from sagittal.server.services import devices
-from sagittal.server.services.devices import DatedCheck, KnownDevice
+from sagittal.server.report.files.columns import write_csv
+from sagittal.server.report.words.device_words import judge_device
 
 router = APIRouter(tags=["devices"])
 Reader = Annotated[Identity, require(Action.READ_DEVICE)]

@@ -12,11 +12,13 @@ from sagittal.server.api.documents import refusals
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.context import Db, Id, OpenTrail, Queue
+from sagittal.server.downloads import exports
 from sagittal.server.export.kinds import ExportName
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.jobs.queue import JobView
-from sagittal.server.services import analyses, exports, patients, sessions
+from sagittal.server.results import analyses
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["exports"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

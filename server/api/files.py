@@ -20,7 +20,7 @@ from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.context import Blobs, Config, Db, Id, OpenTrail
 from sagittal.server.http.problems import Problem
-from sagittal.server.services import recordings
+from sagittal.server.uploads import recordings
 
 router = APIRouter(prefix="/sessions/{session_id}/files", tags=["files"])
 

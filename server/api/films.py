@@ -16,7 +16,7 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.context import Films, Id
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.http.problems import Problem
-from sagittal.server.services import films
+from sagittal.server.live_takes import films
 
 router = APIRouter(
     route_class=StrictJsonRoute,

@@ -19,11 +19,13 @@ from sagittal.server.api.files import RAW_BODY, read_size, receive_body
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import sessions
 from sagittal.server.context import Blobs, Config, Db, Id, OpenTrail, Queue
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.jobs.queue import JobView
-from sagittal.server.report.filter_list import FILTERS
-from sagittal.server.services import filter_runs, recordings, reference_files, sessions
+from sagittal.server.report.words.filter_list import FILTERS
+from sagittal.server.results import filter_runs
+from sagittal.server.uploads import recordings, reference_files
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["filters"])
 references = APIRouter(prefix="/sessions/{session_id}/references", tags=["filters"])

@@ -11,10 +11,10 @@ from sagittal.server.api.documents import refusals
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import identities
+from sagittal.server.clinic.identities import PatientIdentity
 from sagittal.server.context import Config, Db, Id, OpenTrail
 from sagittal.server.http.json_body import StrictJsonRoute
-from sagittal.server.services import identities
-from sagittal.server.services.identities import PatientIdentity
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["patients"])
 

@@ -16,10 +16,10 @@ from sagittal.server import context
 from sagittal.server.auth.access import find_end, require, wait_for_end
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import jobs
 from sagittal.server.context import Db, Id, OpenTrail
 from sagittal.server.jobs.feed import JobFeed
 from sagittal.server.jobs.queue import JobView
-from sagittal.server.services import jobs
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 KEEP_ALIVE_S = 15.0

@@ -13,9 +13,10 @@ from sagittal.server.api.schemas import make_answer
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import sessions
 from sagittal.server.context import Db, Failures, Id, LiveHub, OpenTrail, address_of
 from sagittal.server.http.json_body import StrictJsonRoute
-from sagittal.server.services import live, sessions
+from sagittal.server.live_takes import live
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["live"])
 Therapist = Annotated[Identity, require(Action.RUN_LIVE)]

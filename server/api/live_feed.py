@@ -20,12 +20,12 @@ from sagittal.core.errors import SagittalError
 from sagittal.server.auth.access import find_end, require, wait_for_end
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import sessions
 from sagittal.server.context import Id
 from sagittal.server.live.hub import MIND_S, Hub
 from sagittal.server.live.room import BrowserQueue
 from sagittal.server.nodes.pins import Pin, find_owner
 from sagittal.server.nodes.registry import Nodes
-from sagittal.server.services import sessions
 
 router = APIRouter(include_in_schema=False)
 

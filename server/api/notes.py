@@ -10,9 +10,9 @@ from sagittal.server.api import schemas
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import notes, patients
 from sagittal.server.context import Db, Id, OpenTrail
 from sagittal.server.http.json_body import StrictJsonRoute
-from sagittal.server.services import notes, patients
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["patients"])
 Writer = Annotated[Identity, require(Action.WRITE_PATIENT)]

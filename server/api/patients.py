@@ -17,9 +17,12 @@ from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.auth.sight import may_open
+from sagittal.server.clinic import patients, programmes, sessions
 from sagittal.server.context import Blobs, Config, Db, Failures, Id, LiveHub, OpenTrail, Reviewed, address_of
+from sagittal.server.downloads import patient_export
 from sagittal.server.http.json_body import StrictJsonRoute
-from sagittal.server.services import care_teams, erasure, patient_export, patients, programmes, sessions
+from sagittal.server.safekeeping import erasure
+from sagittal.server.sharing import care_teams
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/patients", tags=["patients"])
 

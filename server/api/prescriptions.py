@@ -16,13 +16,14 @@ from sagittal.server.api.schemas import Side
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.context import Db, Id, OpenTrail, Reviewed
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.http.problems import Problem
-from sagittal.server.report.feedback_words import prescription_words
 from sagittal.server.report.tables import feedback_csv
-from sagittal.server.services import feedback, histories, patients, prescriptions, sessions, targets
-from sagittal.server.services.prescriptions import PatientPrescription
+from sagittal.server.report.words.feedback_words import prescription_words
+from sagittal.server.results import feedback, histories, prescriptions, targets
+from sagittal.server.results.prescriptions import PatientPrescription
 from sagittal.server.storage.db import Database
 from sagittal.server.trail import AuditTrail
 

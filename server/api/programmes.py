@@ -11,9 +11,9 @@ from sagittal.server.api.documents import refusals
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, programmes
 from sagittal.server.context import Db, Id, OpenTrail
 from sagittal.server.http.json_body import StrictJsonRoute
-from sagittal.server.services import patients, programmes
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["programmes"])
 Planner = Annotated[Identity, require(Action.WRITE_SESSION)]

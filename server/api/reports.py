@@ -12,20 +12,12 @@ from sagittal.server.api.downloads import BINARY, attachment
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.context import Db, Id, OpenTrail, Reviewed
-from sagittal.server.report.model import ReportModel
 from sagittal.server.report.tables import curves_csv, parameters_csv
-from sagittal.server.services import (
-    analyses,
-    comparisons,
-    controls,
-    edit_log,
-    histories,
-    patients,
-    reports,
-    sessions,
-)
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.report.view.model import ReportModel
+from sagittal.server.results import analyses, comparisons, controls, edit_log, histories, reports
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
 from sagittal.server.trail import AuditTrail
 

@@ -21,11 +21,11 @@ from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.context import Db, Id, OpenTrail, Reviewed
 from sagittal.server.http.json_body import StrictJsonRoute
-from sagittal.server.report.analysis_json import parameter_row
-from sagittal.server.report.exports import events_csv, strides_csv
-from sagittal.server.report.wording import explain_exclusion
-from sagittal.server.services import analyses, edit_log, reviews, signals
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.report.files.analysis_json import parameter_row
+from sagittal.server.report.files.exports import events_csv, strides_csv
+from sagittal.server.report.words.wording import explain_exclusion
+from sagittal.server.results import analyses, edit_log, reviews, signals
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
 from sagittal.server.trail import AuditTrail
 from sagittal.web.user_text import encode_user_text

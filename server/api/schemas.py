@@ -8,17 +8,17 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from sagittal.core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
 from sagittal.core.frames import Protocol
+from sagittal.core.subject.condition import Footwear, Orthosis, WalkingAid, WalkingPace
+from sagittal.server.clinic.identities import MOST
+from sagittal.server.clinic.notes import MOST_CHARACTERS
 from sagittal.server.jobs.queue import JobView
-from sagittal.server.report.behind import StrideValue
-from sagittal.server.services import report_links, signed_reports
-from sagittal.server.services.care_teams import REASON, EmergencyAccess, TeamMember
-from sagittal.server.services.identities import MOST
-from sagittal.server.services.notes import MOST_CHARACTERS
-from sagittal.server.services.recordings import RecordedFile, RecordingState
-from sagittal.server.services.tunings import MOST_OF_SWARM, Scheme
+from sagittal.server.report.view.behind import StrideValue
+from sagittal.server.results.tunings import MOST_OF_SWARM, Scheme
+from sagittal.server.sharing import report_links, signed_reports
+from sagittal.server.sharing.care_teams import REASON, EmergencyAccess, TeamMember
 from sagittal.server.storage.tables import now
+from sagittal.server.uploads.recordings import RecordedFile, RecordingState
 
 _HIDDEN = "\u00ad\u200b\u200e\u200f\u202a-\u202e\u2060-\u206f\ufeff"
 """What is not seen or turns the text beside it round (Unicode, category Cf)."""

@@ -17,7 +17,7 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.context import Blobs, Db, Id, OpenTrail, Queue
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.jobs.queue import JobView
-from sagittal.server.services import analyses, sensitivities
+from sagittal.server.results import analyses, sensitivities
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["sensitivities"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

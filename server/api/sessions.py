@@ -12,11 +12,13 @@ from sagittal.server.api.schemas import make_answer
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import sessions
 from sagittal.server.context import Blobs, Config, Db, Id, LiveHub, OpenTrail, Queue, Reviewed
+from sagittal.server.errors import NotFound
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.jobs.queue import JobView
-from sagittal.server.services import erasure, recordings, sessions, tables
-from sagittal.server.services.errors import NotFound
+from sagittal.server.safekeeping import erasure
+from sagittal.server.uploads import recordings, tables
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}", tags=["sessions"])
 

@@ -13,11 +13,12 @@ from sagittal.server.api.documents import refusals
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import sessions
 from sagittal.server.context import Db, Id, OpenTrail
 from sagittal.server.http.json_body import StrictJsonRoute
-from sagittal.server.services import report_links, sessions, signed_reports
-from sagittal.server.services.report_links import ReportLink
-from sagittal.server.services.signed_reports import SignedReport
+from sagittal.server.sharing import report_links, signed_reports
+from sagittal.server.sharing.report_links import ReportLink
+from sagittal.server.sharing.signed_reports import SignedReport
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["report"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

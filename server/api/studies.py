@@ -13,7 +13,7 @@ from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.context import Config, Db, OpenTrail, StudyVisits
-from sagittal.server.services import study_maker
+from sagittal.server.downloads import study_maker
 
 router = APIRouter(tags=["exports"])
 _ANSWERS: dict[int | str, dict[str, Any]] = refusals(409, 503) | {

@@ -14,8 +14,8 @@ from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.context import Blobs, Db, Id, OpenTrail
 from sagittal.server.http.json_body import StrictJsonRoute
-from sagittal.server.services import tables
-from sagittal.server.services.tables import TableReading, TableShape
+from sagittal.server.uploads import tables
+from sagittal.server.uploads.tables import TableReading, TableShape
 
 router = APIRouter(
     prefix="/sessions/{session_id}/tables",

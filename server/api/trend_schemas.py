@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from sagittal.core.change import Change
-from sagittal.core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
+from sagittal.core.subject.condition import Footwear, Orthosis, WalkingAid, WalkingPace
 
 
 @dataclass(frozen=True)

@@ -9,22 +9,23 @@ from fastapi import APIRouter, Query
 from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
-from sagittal.core.condition import WalkingCondition
 from sagittal.core.frames import Protocol
+from sagittal.core.subject.condition import WalkingCondition
 from sagittal.server.api import trend_schemas
 from sagittal.server.api.downloads import BINARY, attachment
 from sagittal.server.api.schemas import HexId
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients
 from sagittal.server.context import Db, Id, OpenTrail, Reviewed
-from sagittal.server.report.change_words import change_words
-from sagittal.server.report.columns import reduce_to_plain
+from sagittal.server.report.files.columns import reduce_to_plain
+from sagittal.server.report.history.trends import Trend, TrendSeries, follow_figures, names_in
 from sagittal.server.report.tables import trends_csv
-from sagittal.server.report.trends import Trend, TrendSeries, follow_figures, names_in
-from sagittal.server.services import histories, patients
-from sagittal.server.services.histories import PatientHistory
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.report.words.change_words import change_words
+from sagittal.server.results import histories
+from sagittal.server.results.histories import PatientHistory
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
 from sagittal.server.trail import AuditTrail
 

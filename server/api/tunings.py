@@ -14,7 +14,7 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.context import Db, Id, OpenTrail, Queue
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.jobs.queue import JobView
-from sagittal.server.services import tunings
+from sagittal.server.results import tunings
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["tunings"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

@@ -18,7 +18,7 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.context import Blobs, Config, Db, Id, OpenTrail
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.http.problems import Problem
-from sagittal.server.services import recordings, uploads
+from sagittal.server.uploads import recordings, uploads
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}/uploads", tags=["files"])
 

@@ -18,7 +18,7 @@ from sagittal.server.auth.roles import Action, Role
 from sagittal.server.context import Db, Failures, Id, OpenLogins
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.http.problems import Problem
-from sagittal.server.services import report_links
+from sagittal.server.sharing import report_links
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/users", tags=["users"])
 Admin = Annotated[Identity, require(Action.MANAGE_USERS)]

@@ -19,7 +19,7 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.context import Blobs, Config, Db, Id, OpenTrail
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.http.ranges import answer_range
-from sagittal.server.services import recordings, videos
+from sagittal.server.uploads import recordings, videos
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}/video", tags=["sessions"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

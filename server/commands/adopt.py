@@ -11,7 +11,7 @@ from sagittal.server.settings import Settings, load_settings
 
 def adopt(data_dir: Path | None, take: str | None, session: str | None) -> int:
     """List the logs, or make `take` a recording of `session`; 1 when that is not possible."""
-    from sagittal.server.services.errors import ServiceError
+    from sagittal.server.errors import ServiceError
     from sagittal.server.storage.migrate import MigrationError, require_current
 
     settings = load_settings({"data_dir": data_dir})
@@ -29,7 +29,7 @@ def adopt(data_dir: Path | None, take: str | None, session: str | None) -> int:
 
 
 def _list(settings: Settings) -> int:
-    from sagittal.server.services import live_logs
+    from sagittal.server.live_takes import live_logs
     from sagittal.server.storage.db import Database
 
     with closing(Database(settings.database_source)) as db, db.read() as c:
@@ -47,7 +47,7 @@ def _list(settings: Settings) -> int:
 
 def _adopt(settings: Settings, take: str, session: str) -> int:
     from sagittal.server.jobs.opening import open_queue
-    from sagittal.server.services import live_logs
+    from sagittal.server.live_takes import live_logs
     from sagittal.server.storage.blob_opening import open_blobs
     from sagittal.server.storage.db import Database
 

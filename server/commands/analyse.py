@@ -12,8 +12,8 @@ from typing import Any, Self
 from sagittal.core.errors import InputError, SagittalError
 from sagittal.core.formats.json_tree import read_json
 from sagittal.server.processes.compiling import OFFLINE, compile_filters_once, is_compiling
-from sagittal.server.report import activity_files
-from sagittal.server.report.estimator import estimator_view
+from sagittal.server.report.files import activity_files
+from sagittal.server.report.words.estimator import estimator_view
 from sagittal.server.storage import fs
 from sagittal.server.storage.compile_cache import has_compiled_filters
 
@@ -37,7 +37,7 @@ def analyse(
     0 when at least one parameter was found, 1 when nothing could be analysed.
     """
     from sagittal.core.formats import list_source_files, read_named_file
-    from sagittal.server.services import analysing
+    from sagittal.server.results import analysing
 
     try:
         overrides = read_overrides(config, estimator)

@@ -11,8 +11,8 @@ from sagittal.server.settings import load_settings
 
 def backup(data_dir: Path | None, target: Path, key: Path | None, prune: bool) -> int:
     """Make one backup; 1 when there is none, or when a stored file was already gone or damaged."""
-    from sagittal.server.services import backups
-    from sagittal.server.services.tombstones import TombstoneError
+    from sagittal.server.safekeeping import backups
+    from sagittal.server.safekeeping.tombstones import TombstoneError
     from sagittal.server.storage.archive import BackupFileError, read_key
     from sagittal.server.storage.db import Database
     from sagittal.server.storage.migrate import MigrationError, require_current

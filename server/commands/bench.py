@@ -133,7 +133,7 @@ def _table(rows: Sequence[Sequence[str]]) -> str:
 
 
 def _write(out: Path, rows: Sequence[Row]) -> None:
-    from sagittal.server.report.columns import write_csv
+    from sagittal.server.report.files.columns import write_csv
 
     fs.make_folder(out.parent)
     fs.write_file(out, write_csv(HEADER, [(a, b, *values, reason) for a, b, values, reason in rows]))

@@ -14,7 +14,7 @@ def check(data_dir: Path | None, head: Path | None = None) -> int:
 
     `head`: a file of the audit log's newest row as it once was, kept elsewhere.
     """
-    from sagittal.server.services import checks
+    from sagittal.server.safekeeping import checks
     from sagittal.server.storage.blob_opening import open_blobs
     from sagittal.server.storage.db import Database
     from sagittal.server.storage.migrate import MigrationError, require_current

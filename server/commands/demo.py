@@ -76,7 +76,7 @@ def demo(port: int | None) -> int:
 
 def _wait_for_live(database: Source, helper: subprocess.Popen[bytes]) -> bool:
     """Wait until the walk of a helper streams; False when the helper ended before."""
-    from sagittal.server.services import live
+    from sagittal.server.live_takes import live
 
     pause = threading.Event()
     with closing(Database(database)) as db:
@@ -91,8 +91,8 @@ def _wait_for_live(database: Source, helper: subprocess.Popen[bytes]) -> bool:
 def _report(database: Source) -> None:
     """Say on the console what is being waited for, until every session is analysed."""
     from sagittal.server.demo.clinic import VISITS
-    from sagittal.server.services.recordings import ANALYSE
     from sagittal.server.storage.tables import job
+    from sagittal.server.uploads.recordings import ANALYSE
 
     began, told = time.monotonic(), ""
     if is_compiling() or not has_compiled_filters():

@@ -18,7 +18,7 @@ def export(folder: Path, kind: str, out: Path | None, code: str) -> int:
     """
     from sagittal.server.export.content import VisitFacts, open_content
     from sagittal.server.export.kinds import EXPORTED, find_kind, write_export
-    from sagittal.server.services.provenance import CODE_VERSION
+    from sagittal.server.provenance import CODE_VERSION
     from sagittal.server.viewer import recorded_walk  # noqa: F401 - registers what is drawn
 
     try:

@@ -12,7 +12,7 @@ from sagittal.server.settings import load_settings
 def identity_key(data_dir: Path | None, what: str, really: bool, without_key: bool) -> int:
     """Make the key, change it, or list and remove what it does not open; 1 when that is not possible."""
     from sagittal.core.errors import SagittalError
-    from sagittal.server.services import identities
+    from sagittal.server.clinic import identities
     from sagittal.server.storage.db import Database
     from sagittal.server.storage.migrate import MigrationError, require_current
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from sagittal.core.errors import InputError, SagittalError
 
 if TYPE_CHECKING:
-    from sagittal.core.recording import Recording
+    from sagittal.core.signals.recording import Recording
     from sagittal.server.live.client import StreamReport
     from sagittal.server.live.playback import DueBatch
 

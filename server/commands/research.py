@@ -28,7 +28,7 @@ def research(
     who : a pseudonym; nothing is written.
     """
     from sagittal.core.errors import SagittalError
-    from sagittal.server.services import deidentified
+    from sagittal.server.downloads import deidentified
     from sagittal.server.storage import fs
     from sagittal.server.storage.blob_opening import open_blobs
     from sagittal.server.storage.db import Database

@@ -10,9 +10,9 @@ from sagittal.server.settings import Settings, load_settings
 
 def restore(data_dir: Path | None, archive: Path, key: Path | None, erased: Path | None, test: bool) -> int:
     """Restore a backup, everything verified first; 1 when nothing was put in place."""
-    from sagittal.server.services import restoring
-    from sagittal.server.services.restore_room import RestoreError
-    from sagittal.server.services.tombstones import TombstoneError, read_tombstones
+    from sagittal.server.safekeeping import restoring
+    from sagittal.server.safekeeping.restore_room import RestoreError
+    from sagittal.server.safekeeping.tombstones import TombstoneError, read_tombstones
     from sagittal.server.storage.archive import BackupFileError, read_key
 
     settings = load_settings({"data_dir": data_dir})
@@ -47,7 +47,7 @@ def restore(data_dir: Path | None, archive: Path, key: Path | None, erased: Path
 
 def _tell_names_key(settings: Settings) -> str:
     """What to do with the key of patients' names that came with the backup where its place is another."""
-    from sagittal.server.services.backups import IDENTITY_KEY
+    from sagittal.server.safekeeping.backups import IDENTITY_KEY
 
     came, place = settings.data_dir / IDENTITY_KEY, settings.identity_key_file
     if came == place or not came.is_file():

@@ -13,9 +13,9 @@ from sagittal.server.storage import fs
 
 if TYPE_CHECKING:
     from sagittal.core.body.chain.geometry import LegGeometry
-    from sagittal.core.calibration.result import CalibratedRecording
     from sagittal.core.frames import Floats, Segment
-    from sagittal.core.recording import UniformRecording
+    from sagittal.core.signals.calibrated import CalibratedRecording
+    from sagittal.core.signals.recording import UniformRecording
     from sagittal.core.squat.sensitivity import SensitivityTable, SquatCase
 
 Side = Literal["left", "right"]
@@ -36,7 +36,11 @@ def sensitivity(
     seed: int,
 ) -> int:
     """Analyse a take, against a reference where one is given, or a simulated one; 1 = not possible."""
-    from sagittal.server.report.sensitivity import sensitivity_csv, summarise_sensitivity, tell_sensitivity
+    from sagittal.server.report.view.sensitivity import (
+        sensitivity_csv,
+        summarise_sensitivity,
+        tell_sensitivity,
+    )
 
     try:
         if paths:
@@ -98,7 +102,7 @@ def _analyse_take(
     from sagittal.core.formats import read_named_file
     from sagittal.core.squat.sensitivity import analyse_legs
     from sagittal.core.squat.side import find_squat_sides
-    from sagittal.server.services.sensitivities import read_reference
+    from sagittal.server.results.sensitivities import read_reference
 
     take = _read_take(paths, manifest)
     sides = find_squat_sides(take) if side is None else (side,)

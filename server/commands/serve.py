@@ -46,7 +46,7 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
     from sagittal.server.log import start_log
     from sagittal.server.nodes.registry import Nodes
     from sagittal.server.processes.supervisor import Workers
-    from sagittal.server.services.custody import (
+    from sagittal.server.safekeeping.custody import (
         StrangersError,
         refuse_half_restored,
         refuse_strangers,

@@ -103,7 +103,7 @@ Made = tuple[dict[str, bytes], dict[str, object]]
 def _walk(truth: WalkTruth) -> Made:
     from sagittal.core.angles import JointAngles
     from sagittal.core.simulate import event_table, stride_table
-    from sagittal.server.report.exports import angles_parquet
+    from sagittal.server.report.files.exports import angles_parquet
 
     strides: dict[str, Sequence[object]] = dict(stride_table(truth))
     del strides["turn_rad"]
@@ -122,7 +122,7 @@ def _walk(truth: WalkTruth) -> Made:
 def _squats(truth: SquatTruth) -> Made:
     from sagittal.core.angles import JointAngles
     from sagittal.core.simulate import phase_table
-    from sagittal.server.report.exports import angles_parquet
+    from sagittal.server.report.files.exports import angles_parquet
 
     files = {
         "truth/angles.parquet": angles_parquet(
@@ -136,7 +136,7 @@ def _squats(truth: SquatTruth) -> Made:
 def _functional(truth: FunctionalTruth) -> Made:
     from sagittal.core.angles import JointAngles
     from sagittal.core.simulate import phase_table
-    from sagittal.server.report.exports import angles_parquet
+    from sagittal.server.report.files.exports import angles_parquet
 
     zero = {name: float(values[0]) for name, values in truth.angles.items()}
     from_standing = {name: values - zero[name] for name, values in truth.angles.items()}
@@ -179,6 +179,6 @@ def _chest(truth: ChestTruth) -> Made:
 
 
 def _csv(columns: Mapping[str, Sequence[object]]) -> bytes:
-    from sagittal.server.report.columns import write_csv
+    from sagittal.server.report.files.columns import write_csv
 
     return write_csv(tuple(columns), list(zip(*columns.values(), strict=True)))

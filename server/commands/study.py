@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sagittal.core.errors import SagittalError
 from sagittal.server.processes.compiling import OFFLINE, compile_filters_once
-from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.storage import fs
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def analyse_take(
 ) -> dict[str, Any]:
     """Analyse one take in a process of its own; its state last, so that what was cut off is done again."""
     from sagittal.core.formats.source import SourceFile
-    from sagittal.server.services import analysing
+    from sagittal.server.results import analysing
 
     state: dict[str, Any] = {"sha256": sha256, "config": config, "code_version": CODE_VERSION}
     state |= {"code": None, "message": None}

@@ -11,7 +11,7 @@ from sagittal.server.settings import load_settings
 
 def trash(data_dir: Path | None, restore: bool) -> int:
     """List the trash, or put back what the database refers to; 1 when the database cannot be used."""
-    from sagittal.server.services import sweep
+    from sagittal.server.safekeeping import sweep
     from sagittal.server.storage.blob_opening import open_blobs
     from sagittal.server.storage.db import Database
     from sagittal.server.storage.migrate import MigrationError, require_current, require_database

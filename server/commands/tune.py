@@ -23,7 +23,7 @@ def tune(folder: Path, out: Path, resume: Path | None, **order: Any) -> int:
     """
     from sagittal.core.errors import SagittalError
     from sagittal.core.formats import list_source_files, read_named_file
-    from sagittal.server.services.tunings import TuningOrder, prepare, search
+    from sagittal.server.results.tunings import TuningOrder, prepare, search
 
     checkpoint = out.with_name(f"{out.name}.checkpoint")
 

@@ -12,7 +12,7 @@ from sagittal.server.settings import load_settings
 
 def worker(data_dir: Path | None) -> int:
     """Work until SIGTERM or Ctrl-C; 1 when database or folder are not the server's."""
-    from sagittal.server.services.custody import StrangersError
+    from sagittal.server.safekeeping.custody import StrangersError
     from sagittal.server.storage import fs
     from sagittal.server.storage.migrate import MigrationError
     from sagittal.server.worker.worker import run_worker

@@ -13,19 +13,21 @@ from dataclasses import dataclass, replace
 from math import degrees, hypot, inf
 from typing import TYPE_CHECKING
 
-from sagittal.core.condition import USUAL, WalkingCondition
 from sagittal.core.frames import SEGMENTS, Segment, Side
+from sagittal.core.subject.condition import USUAL, WalkingCondition
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.jobs.opening import open_queue
-from sagittal.server.services import analyses, patients, prescriptions, recordings, sessions
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.results import analyses, prescriptions
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings, load_settings
 from sagittal.server.storage.blob_opening import open_blobs
 from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.tables import now
+from sagittal.server.uploads import recordings
 
 if TYPE_CHECKING:
-    from sagittal.core.recording import Recording
+    from sagittal.core.signals.recording import Recording
     from sagittal.core.simulate import Simulation
 
 GONIOMETER = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")

@@ -13,18 +13,19 @@ from contextlib import closing
 from math import pi
 from typing import TYPE_CHECKING, Any, Final
 
-from sagittal.core.condition import USUAL
+from sagittal.core.subject.condition import USUAL
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.demo.clinic import STROKE
 from sagittal.server.live.client import stream
 from sagittal.server.live.pairing import pair
 from sagittal.server.live.playback import DueBatch, cut, hello_of, pace_batches
-from sagittal.server.services import live, patients, sessions
+from sagittal.server.live_takes import live
 from sagittal.server.settings import Settings, load_settings
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.tables import now
 
 if TYPE_CHECKING:
-    from sagittal.core.recording import Recording
+    from sagittal.core.signals.recording import Recording
     from sagittal.core.simulate import Simulation
 
 TITLE: Final = "Gait training with feedback, live"

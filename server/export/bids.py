@@ -17,7 +17,7 @@ from sagittal.core.frames import SEGMENTS, Segment
 from sagittal.server.export.ages import OLDEST
 from sagittal.server.export.content import ExportContent
 from sagittal.server.export.zipping import zip_files
-from sagittal.server.report.columns import floats_of
+from sagittal.server.report.files.columns import floats_of
 
 VERSION: Final = "1.9.0"
 TRACKSYS: Final = "imu"

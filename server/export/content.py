@@ -13,17 +13,17 @@ from sagittal.core.body.poses import Poses
 from sagittal.core.errors import FormatError
 from sagittal.core.events.edits import Edit
 from sagittal.core.frames import Protocol, Side
-from sagittal.core.measure import measure_gait
 from sagittal.core.parameters.kinematic import cycle_curves
+from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.parameters.rows import Column
-from sagittal.server.report import signals, tracks
-from sagittal.server.report.analysis_json import parameter_row
-from sagittal.server.report.bundle import Bundle, apply_review, load_bundle, read_columns, read_poses
-from sagittal.server.report.columns import read_table
-from sagittal.server.report.estimator import list_estimated_angles, list_estimated_variables
-from sagittal.server.report.level import level_column, level_parameters
-from sagittal.server.report.numbers import numbers_of
+from sagittal.server.report.files import signals, tracks
+from sagittal.server.report.files.analysis_json import parameter_row
+from sagittal.server.report.files.bundle import Bundle, apply_review, load_bundle, read_columns, read_poses
+from sagittal.server.report.files.columns import read_table
+from sagittal.server.report.history.numbers import numbers_of
+from sagittal.server.report.view.level import level_column, level_parameters
+from sagittal.server.report.words.estimator import list_estimated_angles, list_estimated_variables
 
 POSES = "poses.parquet"
 LATER = (POSES, signals.NAME, tracks.NAME)
@@ -110,7 +110,8 @@ class ExportContent:
 
     Parameters
     ----------
-    files : of `sagittal.server.report.exports`, name → reader of its bytes. bundle : with the edits applied.
+    files : of `sagittal.server.report.files.exports`, name → reader of its bytes.
+    bundle : with the edits applied.
     columns : parameters of every stride of the list. edits : of a person, that count.
     signed : the report in force, None where none is or the format does not hand it on.
     """

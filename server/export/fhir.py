@@ -17,8 +17,8 @@ from sagittal.core.frames import Side
 from sagittal.core.parameters.catalogue import require_entries
 from sagittal.core.parameters.result import Parameter
 from sagittal.server.export.content import ExportContent, SignedForm
-from sagittal.server.report.level import define_parameter, label_parameter
-from sagittal.server.report.wording import reason_words
+from sagittal.server.report.view.level import define_parameter, label_parameter
+from sagittal.server.report.words.wording import reason_words
 
 CODES: Final = "urn:sagittal:gait-parameters"
 """System of our codes: names of the catalogue, which the bundle's CodeSystem defines."""

@@ -8,7 +8,7 @@ from typing import Final, Literal, get_args
 
 from sagittal.core.errors import InputError
 from sagittal.server.export.content import POSES, ExportContent
-from sagittal.server.report import signals
+from sagittal.server.report.files import signals
 
 ExportName = Literal["xlsx", "csv", "opensim", "c3d", "bids", "fhir", "walk"]
 

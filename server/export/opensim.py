@@ -20,7 +20,7 @@ from sagittal.core.rotation import about, multiply
 from sagittal.server.export import sheets
 from sagittal.server.export.content import ExportContent
 from sagittal.server.export.zipping import zip_files
-from sagittal.server.report.columns import write_csv
+from sagittal.server.report.files.columns import write_csv
 
 LEG: Final = (
     ("hip_flexion", "hip_flexion"),

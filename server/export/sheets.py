@@ -16,7 +16,7 @@ from sagittal.core.parameters.kinematic import POINTS, cycle_curves, mean_curve
 from sagittal.core.parameters.result import MeanCurve
 from sagittal.core.parameters.uncertainty import is_estimated
 from sagittal.server.export.content import ExportContent
-from sagittal.server.report.level import GROUP, define_parameter, from_standing, label_parameter
+from sagittal.server.report.view.level import GROUP, define_parameter, from_standing, label_parameter
 
 Row = tuple[object, ...]
 

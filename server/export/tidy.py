@@ -5,7 +5,7 @@ from __future__ import annotations
 from sagittal.server.export import sheets
 from sagittal.server.export.content import ExportContent
 from sagittal.server.export.zipping import zip_files
-from sagittal.server.report.columns import write_csv
+from sagittal.server.report.files.columns import write_csv
 
 
 def write_tidy(content: ExportContent) -> bytes:

@@ -21,8 +21,8 @@ from starlette.templating import Jinja2Templates
 
 from sagittal import web
 from sagittal.core.body.model import NOMINAL_HEIGHT_M
-from sagittal.core.condition import CHOICES
 from sagittal.core.plurals import plural
+from sagittal.core.subject.condition import CHOICES
 from sagittal.server.storage.compile_cache import VARIABLE
 from sagittal.web.language import LANGUAGES, SOURCE, choose_language, load_catalogue, script_texts
 from sagittal.web.shown import Shown

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Final
 
 from sagittal.server import audit
+from sagittal.server.errors import NotFound
 from sagittal.server.jobs.queue import JobQueue
 from sagittal.server.live import protocol
 from sagittal.server.live.intake import TakeEnd
@@ -21,8 +22,7 @@ from sagittal.server.live.pool import EstimatorPool
 from sagittal.server.live.protocol import CloseCode
 from sagittal.server.live.rows import Rows
 from sagittal.server.live.take import ActiveTake
-from sagittal.server.services import live, live_recordings
-from sagittal.server.services.errors import NotFound
+from sagittal.server.live_takes import live, live_recordings
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs
 from sagittal.server.storage.blobs import BlobStore

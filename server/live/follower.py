@@ -32,7 +32,7 @@ from sagittal.core.functional_tests.result import GuidedTestView
 from sagittal.core.online import OnlineSession
 from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame
 from sagittal.core.parameters.live_stride import LiveStride
-from sagittal.core.recording import Subject
+from sagittal.core.signals.recording import Subject
 from sagittal.server.live import wire
 from sagittal.server.live.messages import (
     STALE_S,
@@ -45,7 +45,7 @@ from sagittal.server.live.messages import (
     Picture,
     Report,
 )
-from sagittal.server.report.guided_words import tell_person
+from sagittal.server.report.words.guided_words import tell_person
 
 CHUNK_BYTES: Final = 1 << 14
 """Read and estimated in one turn, half a second of seven sensors: who catches up lets others through."""

@@ -17,6 +17,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from sagittal.core.formats.live_log import Hello
 from sagittal.server import audit
+from sagittal.server.errors import NODE_AWAY, Conflict
 from sagittal.server.jobs.queue import JobQueue
 from sagittal.server.live import protocol
 from sagittal.server.live.committer import Committer
@@ -38,10 +39,9 @@ from sagittal.server.live.recorder import open_recorder
 from sagittal.server.live.room import Room
 from sagittal.server.live.rows import Rows
 from sagittal.server.live.take import ActiveTake, TabletLink, describe_unjoined
+from sagittal.server.live_takes import live, live_recordings
 from sagittal.server.nodes.registry import Nodes
-from sagittal.server.services import live, live_recordings
-from sagittal.server.services.errors import NODE_AWAY, Conflict
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
 

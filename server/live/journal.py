@@ -14,7 +14,7 @@ from sqlalchemy import insert, select
 from sqlalchemy.exc import SQLAlchemyError
 
 from sagittal.core.feedback import Cue
-from sagittal.server.services.live_training import note_feedback
+from sagittal.server.live_takes.live_training import note_feedback
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.disk_log import DiskLog
 from sagittal.server.storage.live_tables import live_event, live_take

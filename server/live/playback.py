@@ -25,8 +25,8 @@ from sagittal.core.formats.live_log import (
     encode_batch,
 )
 from sagittal.core.frames import Floats
-from sagittal.core.recording import ImuStream, Recording
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.recording import ImuStream, Recording
+from sagittal.core.signals.rest import find_runs
 
 ON_GRID: Final = 0.01
 """Largest distance from the grid in samples, as core/timeline takes it."""

@@ -6,12 +6,12 @@ import contextlib
 from collections.abc import Collection
 
 from sagittal.server import audit
+from sagittal.server.errors import NotFound
 from sagittal.server.live.intake import TakeEnd
-from sagittal.server.services import live
-from sagittal.server.services.errors import NotFound
-from sagittal.server.services.live_claims import claim_take
-from sagittal.server.services.live_training import LiveTraining, training_of
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.live_takes import live
+from sagittal.server.live_takes.live_claims import claim_take
+from sagittal.server.live_takes.live_training import LiveTraining, training_of
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
 
 

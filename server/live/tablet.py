@@ -17,15 +17,15 @@ from sagittal.core.errors import InputError
 from sagittal.core.formats.live_log import PROTOCOL, Hello
 from sagittal.server.auth.access import require
 from sagittal.server.auth.roles import Action
+from sagittal.server.errors import NodeAway, NotFound
 from sagittal.server.live import protocol
 from sagittal.server.live.hub import Hub
 from sagittal.server.live.intake import IntakeAnswer
 from sagittal.server.live.protocol import HELLO_WITHIN_S, CloseCode, ProtocolError
 from sagittal.server.live.take import ActiveTake
+from sagittal.server.live_takes import live
 from sagittal.server.nodes.forwarding import UnreachableError, carry_tablet
 from sagittal.server.nodes.passage import ASKED_BY
-from sagittal.server.services import live
-from sagittal.server.services.errors import NodeAway, NotFound
 
 router = APIRouter(include_in_schema=False)
 

@@ -21,7 +21,7 @@ from sqlalchemy import delete, func, insert, select, update
 from sqlalchemy.exc import SQLAlchemyError
 
 from sagittal.server.nodes.passage import read_key, write_line
-from sagittal.server.services.custody import StrangersError
+from sagittal.server.safekeeping.custody import StrangersError
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.live_tables import live_take

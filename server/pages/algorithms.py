@@ -13,14 +13,16 @@ from starlette.responses import Response
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import jobs
 from sagittal.server.context import Blobs, Db, Id
 from sagittal.server.jobs.queue import COMPARE_FILTERS
 from sagittal.server.pages.job_views import view_job
 from sagittal.server.pages.session_context import lead_to_days, read_context
 from sagittal.server.pages.shell import record_opening, render_page
-from sagittal.server.report.filter_list import PROPOSED, list_engines
-from sagittal.server.report.filter_view import NAME, view_comparison
-from sagittal.server.services import analyses, filter_runs, jobs, reference_files
+from sagittal.server.report.view.filter_view import NAME, view_comparison
+from sagittal.server.report.words.filter_list import PROPOSED, list_engines
+from sagittal.server.results import analyses, filter_runs
+from sagittal.server.uploads import reference_files
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

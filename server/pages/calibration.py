@@ -15,11 +15,11 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.context import Blobs, Db, Id
 from sagittal.server.pages.session_context import lead_to_days, read_context
 from sagittal.server.pages.shell import record_opening, render_page
-from sagittal.server.report.body_lengths import view_lengths
-from sagittal.server.report.bundle import read_warnings
-from sagittal.server.report.calibration_checks import view_calibration_checks
-from sagittal.server.report.sensor_places import view_sensor_places
-from sagittal.server.services import analyses
+from sagittal.server.report.files.bundle import read_warnings
+from sagittal.server.report.view.body_lengths import view_lengths
+from sagittal.server.report.view.calibration_checks import view_calibration_checks
+from sagittal.server.report.view.sensor_places import view_sensor_places
+from sagittal.server.results import analyses
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -13,8 +13,8 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.context import Config
 from sagittal.server.http.headers import allow_camera
 from sagittal.server.http.templates import render
+from sagittal.server.live_takes.live import ALPHABET, CODE_LENGTH
 from sagittal.server.pages.words import CALIBRATIONS, SEGMENT_NAMES
-from sagittal.server.services.live import ALPHABET, CODE_LENGTH
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from sagittal.server.report.curves import cycle_svg
-from sagittal.server.report.panels import CurvePanel
+from sagittal.server.report.charts.curves import cycle_svg
+from sagittal.server.report.charts.panels import CurvePanel
 
 COLUMNS: Final = 3
 """Charts per row: sagittal, frontal, transverse."""

@@ -14,16 +14,17 @@ from sagittal.core.change import sort_changes
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients
 from sagittal.server.context import HEX_ID, Db, Id, Reviewed
 from sagittal.server.pages.charts import COLUMNS, PAGE_HEIGHTS, caption_chart
 from sagittal.server.pages.report_rows import SECONDARY
 from sagittal.server.pages.shell import record_opening, render_page
-from sagittal.server.report.comparison import ComparedRow
-from sagittal.server.report.curves import cycle_svg
-from sagittal.server.report.panels import CurvePanel, same_zero
-from sagittal.server.services import comparisons, patients, reports
-from sagittal.server.services.comparisons import SessionPair
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.report.charts.curves import cycle_svg
+from sagittal.server.report.charts.panels import CurvePanel, same_zero
+from sagittal.server.report.history.comparison import ComparedRow
+from sagittal.server.results import comparisons, reports
+from sagittal.server.results.comparisons import SessionPair
+from sagittal.server.results.reviewed import ReviewedAnalyses
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -6,8 +6,14 @@ from typing import Any, Final
 
 from sagittal.core.activity.parameters import WORN_H
 from sagittal.core.activity.result import KINDS
-from sagittal.server.report.daily_charts import bouts_svg, inclination_svg, kind_swatch, ribbon_svg, steps_svg
-from sagittal.server.report.daily_life import (
+from sagittal.server.report.view.daily_charts import (
+    bouts_svg,
+    inclination_svg,
+    kind_swatch,
+    ribbon_svg,
+    steps_svg,
+)
+from sagittal.server.report.view.daily_life import (
     EVENTS_SHOWN,
     KIND_LABELS,
     KIND_WORDS,

@@ -16,15 +16,17 @@ from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.context import Blobs, Db, Id
+from sagittal.server.downloads import exports
 from sagittal.server.export.kinds import EXPORTED
 from sagittal.server.pages.job_views import follow_few, view_job
 from sagittal.server.pages.session_context import read_context
 from sagittal.server.pages.shell import record_opening, render_page
 from sagittal.server.pages.words import SEGMENT_NAMES
-from sagittal.server.report.estimator import choice_label, estimator_view
-from sagittal.server.report.sensor_checks import sensor_checks
-from sagittal.server.services import analyses, exports, recordings, repairs, videos
+from sagittal.server.report.view.sensor_checks import sensor_checks
+from sagittal.server.report.words.estimator import choice_label, estimator_view
+from sagittal.server.results import analyses, repairs
 from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.uploads import recordings, videos
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

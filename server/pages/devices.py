@@ -24,14 +24,14 @@ from sagittal.core.quality.devices import DeviceCheck
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import devices
+from sagittal.server.clinic.devices import KnownDevice
 from sagittal.server.context import Db, DeviceId
 from sagittal.server.pages.shell import render_page
 from sagittal.server.pages.words import SEGMENT_NAMES
-from sagittal.server.report.device_chart import draw_device
-from sagittal.server.report.device_words import judge_device
-from sagittal.server.report.wording import format_number
-from sagittal.server.services import devices
-from sagittal.server.services.devices import KnownDevice
+from sagittal.server.report.history.device_chart import draw_device
+from sagittal.server.report.words.device_words import judge_device
+from sagittal.server.report.words.wording import format_number
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -8,12 +8,12 @@ from typing import Any, Final
 
 from sagittal.core.errors import SagittalError
 from sagittal.core.events.result import Strides
-from sagittal.server.report.bundle import read_poses
-from sagittal.server.report.model import ReportModel
-from sagittal.server.services import analyses
-from sagittal.server.services.histories import AnalysedSession
-from sagittal.server.services.patients import Patient
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.report.files.bundle import read_poses
+from sagittal.server.report.view.model import ReportModel
+from sagittal.server.results import analyses
+from sagittal.server.results.histories import AnalysedSession
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.viewer.client import client_version
 from sagittal.server.viewer.first_picture import draw_first_picture
 from sagittal.server.viewer.motion import prepare_motion

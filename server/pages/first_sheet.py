@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import ceil
 from typing import Any, Final
 
-from sagittal.server.services.signed_reports import ASSESSMENT_CHARACTERS
+from sagittal.server.sharing.signed_reports import ASSESSMENT_CHARACTERS
 
 MOST_PARAGRAPHS: Final = 3
 MOST_BARS: Final = 6

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.clinic.sessions import Session
 from sagittal.server.pages.words import PROTOCOL_NAMES
-from sagittal.server.report.functional import MEANT, norm_words
-from sagittal.server.report.guided_words import HINTS, TOTAL, tell_person
-from sagittal.server.services.patients import Patient
-from sagittal.server.services.sessions import Session
+from sagittal.server.report.view.functional import MEANT, norm_words
+from sagittal.server.report.words.guided_words import HINTS, TOTAL, tell_person
 
 
 def view_guided_test(session: Session, patient: Patient) -> dict[str, Any] | None:

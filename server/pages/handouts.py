@@ -13,19 +13,20 @@ from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.context import Config, Db, Id, OpenTrail, Reviewed
+from sagittal.server.errors import Conflict
 from sagittal.server.pages.paper import print_pdf
 from sagittal.server.pages.shell import render_sheets
 from sagittal.server.pages.trends import view_trends
 from sagittal.server.pages.words import describe_person
-from sagittal.server.report.comparison import compare_figures
-from sagittal.server.report.feedback_words import side_words
-from sagittal.server.report.leaflet import list_figures
-from sagittal.server.report.numbers import Numbers
-from sagittal.server.services import comparisons, histories, patients, prescriptions, sessions
-from sagittal.server.services.errors import Conflict
-from sagittal.server.services.provenance import CODE_VERSION
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.provenance import CODE_VERSION
+from sagittal.server.report.history.comparison import compare_figures
+from sagittal.server.report.history.leaflet import list_figures
+from sagittal.server.report.history.numbers import Numbers
+from sagittal.server.report.words.feedback_words import side_words
+from sagittal.server.results import comparisons, histories, prescriptions
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.tables import now
 from sagittal.web.words import day

@@ -11,9 +11,9 @@ from starlette.responses import Response
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import identities, patients
 from sagittal.server.context import Config, Db, Id
 from sagittal.server.pages.shell import render_page
-from sagittal.server.services import identities, patients
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
 from sagittal.server.trail import AuditTrail

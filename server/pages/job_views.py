@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from sqlalchemy import Connection
 
+from sagittal.server.clinic import jobs
 from sagittal.server.jobs.queue import BESIDE, JobView
-from sagittal.server.services import jobs
 
 FOLLOWED: Final = 3
 

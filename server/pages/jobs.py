@@ -13,10 +13,10 @@ from starlette.responses import Response
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import jobs
 from sagittal.server.context import Db
 from sagittal.server.pages.job_views import follow_few, view_job
 from sagittal.server.pages.shell import record_listing, render_page
-from sagittal.server.services import jobs
 from sagittal.web.words import seconds
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)

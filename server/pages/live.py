@@ -14,14 +14,15 @@ from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.clinic.sessions import Session
 from sagittal.server.context import Db, Id
 from sagittal.server.pages.guided_test import view_guided_test
 from sagittal.server.pages.shell import record_opening, render_page
 from sagittal.server.pages.words import PROTOCOL_NAMES, SEGMENT_NAMES
-from sagittal.server.report.wording import VARIABLES, ZERO_WORDS, Variable
-from sagittal.server.services import patients, prescriptions, sessions
-from sagittal.server.services.patients import Patient
-from sagittal.server.services.sessions import Session
+from sagittal.server.report.words.wording import VARIABLES, ZERO_WORDS, Variable
+from sagittal.server.results import prescriptions
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -8,14 +8,14 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from sagittal.core.condition import USUAL
+from sagittal.core.subject.condition import USUAL
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, programmes
 from sagittal.server.context import Db, Id
 from sagittal.server.pages.shell import record_opening, render_page
 from sagittal.server.pages.words import PROTOCOLS, TEST_PROTOCOLS
-from sagittal.server.services import patients, programmes
 from sagittal.server.storage.tables import now
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)

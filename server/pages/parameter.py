@@ -14,7 +14,7 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.context import Db, Id, Reviewed
 from sagittal.server.pages.session_context import read_measured_context
 from sagittal.server.pages.shell import record_opening, render_page
-from sagittal.server.services import analyses, edit_log, reports
+from sagittal.server.results import analyses, edit_log, reports
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

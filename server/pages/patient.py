@@ -17,7 +17,10 @@ from sagittal.core.parameters.result import Parameter
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import consents, notes, patients, sessions
+from sagittal.server.clinic.programmes import PlannedVisit
 from sagittal.server.context import Config, Db, Id, Reviewed
+from sagittal.server.live_takes import live
 from sagittal.server.pages.identity import offers_identity
 from sagittal.server.pages.job_views import find_active_jobs, follow_few
 from sagittal.server.pages.patients import view_patient
@@ -26,25 +29,14 @@ from sagittal.server.pages.programme import view_programme
 from sagittal.server.pages.shell import record_opening, render_page
 from sagittal.server.pages.trends import draw_figures
 from sagittal.server.pages.visit_state import describe_live, judge_visit
-from sagittal.server.report.change_words import change_words
-from sagittal.server.report.takes_chart import find_scale, takes_svg
-from sagittal.server.report.trends import VisitKind
-from sagittal.server.services import (
-    care_teams,
-    consents,
-    edit_log,
-    histories,
-    live,
-    notes,
-    patients,
-    prescriptions,
-    sessions,
-    visits,
-)
-from sagittal.server.services.histories import AnalysedSession
-from sagittal.server.services.programmes import PlannedVisit
-from sagittal.server.services.reviewed import UNREADABLE, ReviewedAnalyses
-from sagittal.server.services.visits import SPEED, ClinicVisit, TakesFigure
+from sagittal.server.report.history.takes_chart import find_scale, takes_svg
+from sagittal.server.report.history.trends import VisitKind
+from sagittal.server.report.words.change_words import change_words
+from sagittal.server.results import edit_log, histories, prescriptions, visits
+from sagittal.server.results.histories import AnalysedSession
+from sagittal.server.results.reviewed import UNREADABLE, ReviewedAnalyses
+from sagittal.server.results.visits import SPEED, ClinicVisit, TakesFigure
+from sagittal.server.sharing import care_teams
 from sagittal.server.storage.blobs import StoreAway
 from sagittal.server.storage.tables import now
 from sagittal.web.words import number

@@ -15,24 +15,18 @@ from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, programmes, sessions
+from sagittal.server.clinic.patients import Patient
 from sagittal.server.context import Db, Reviewed
+from sagittal.server.live_takes import live
 from sagittal.server.pages.job_views import find_active_jobs, follow_few
 from sagittal.server.pages.shell import record_listing, render_page
 from sagittal.server.pages.visit_state import describe_live, judge_visit
 from sagittal.server.pages.words import describe_person
-from sagittal.server.report.change_words import change_words
-from sagittal.server.services import (
-    analyses,
-    care_teams,
-    edit_log,
-    live,
-    patients,
-    programmes,
-    sessions,
-    visits,
-)
-from sagittal.server.services.patients import Patient
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.report.words.change_words import change_words
+from sagittal.server.results import analyses, edit_log, visits
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.server.sharing import care_teams
 from sagittal.server.storage.tables import now
 from sagittal.web.user_text import UserText
 from sagittal.web.words import number

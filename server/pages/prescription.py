@@ -16,11 +16,12 @@ from sagittal.core.parameters.catalogue import CATALOGUE, list_trainable
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients
 from sagittal.server.context import Db, Id
 from sagittal.server.pages.shell import record_opening, render_page
-from sagittal.server.report.feedback_words import name_target, prescription_words
-from sagittal.server.services import patients, prescriptions
-from sagittal.server.services.prescriptions import PatientPrescription
+from sagittal.server.report.words.feedback_words import name_target, prescription_words
+from sagittal.server.results import prescriptions
+from sagittal.server.results.prescriptions import PatientPrescription
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

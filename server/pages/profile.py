@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from sagittal.core.frames import SIDES
-from sagittal.server.report.change_words import NO_LIMIT, ChangeWords, find_term, format_difference
-from sagittal.server.report.model import ReportModel
-from sagittal.server.report.profile import ProfileBar, bar_svg
-from sagittal.server.report.wording import format_number
-from sagittal.server.services import reports
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.report.view.model import ReportModel
+from sagittal.server.report.view.profile import ProfileBar, bar_svg
+from sagittal.server.report.words.change_words import NO_LIMIT, ChangeWords, find_term, format_difference
+from sagittal.server.report.words.wording import format_number
+from sagittal.server.results import reports
+from sagittal.server.results.reviewed import ReviewedAnalyses
 
 
 def view_profile(

@@ -14,12 +14,12 @@ from sagittal.core.plurals import plural
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, programmes, sessions
+from sagittal.server.clinic.course import SIX_WEEKS
+from sagittal.server.clinic.programmes import PlannedVisit, Programme
 from sagittal.server.context import Db, Id
 from sagittal.server.pages.shell import record_opening, render_page
-from sagittal.server.report.wording import format_number
-from sagittal.server.services import patients, programmes, sessions
-from sagittal.server.services.course import SIX_WEEKS
-from sagittal.server.services.programmes import PlannedVisit, Programme
+from sagittal.server.report.words.wording import format_number
 from sagittal.server.storage.tables import now
 from sagittal.web.words import day
 

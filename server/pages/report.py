@@ -13,6 +13,7 @@ from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.auth.sight import find_emergency
 from sagittal.server.context import Blobs, Config, Db, Failures, Id, OpenTrail, Reviewed, address_of
+from sagittal.server.errors import NotFound
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.http.templates import language_of
 from sagittal.server.pages.identity import name_on_paper
@@ -20,11 +21,11 @@ from sagittal.server.pages.paper import hide_person, print_pdf, show_document, s
 from sagittal.server.pages.session import PAPER, choose_template, gather_report
 from sagittal.server.pages.session_context import read_context
 from sagittal.server.pages.shell import record_opening, render_page
-from sagittal.server.services import analyses, pdfs, report_links, signed_reports
-from sagittal.server.services.errors import NotFound
-from sagittal.server.services.report_links import LinkNotFound
-from sagittal.server.services.reviewed import ReviewedAnalyses
-from sagittal.server.services.signed_reports import DOCUMENT, PSEUDONYMISED
+from sagittal.server.results import analyses
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.server.sharing import pdfs, report_links, signed_reports
+from sagittal.server.sharing.report_links import LinkNotFound
+from sagittal.server.sharing.signed_reports import DOCUMENT, PSEUDONYMISED
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.tables import new_id
 

@@ -8,9 +8,9 @@ from typing import Any, Final
 from sagittal.core.parameters.catalogue import require_entries
 from sagittal.core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
 from sagittal.core.plurals import plural
-from sagittal.server.report import level
-from sagittal.server.report.model import ReportModel
-from sagittal.server.report.table import BEYOND_SD, ParameterRow
+from sagittal.server.report.view import level
+from sagittal.server.report.view.model import ReportModel
+from sagittal.server.report.view.table import BEYOND_SD, ParameterRow
 
 SECONDARY: Final = (
     "Parts of stance and swing",

@@ -13,13 +13,15 @@ from starlette.responses import Response
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import jobs
 from sagittal.server.context import Blobs, Db, Id
 from sagittal.server.jobs.queue import SENSITIVITY
 from sagittal.server.pages.job_views import view_job
 from sagittal.server.pages.session_context import read_context
 from sagittal.server.pages.shell import record_opening, render_page
-from sagittal.server.report.sensitivity import view_sensitivity
-from sagittal.server.services import analyses, jobs, reference_files, sensitivities
+from sagittal.server.report.view.sensitivity import view_sensitivity
+from sagittal.server.results import analyses, sensitivities
+from sagittal.server.uploads import reference_files
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

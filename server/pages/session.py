@@ -17,6 +17,8 @@ from sagittal.core.parameters.catalogue.entry import SQUAT
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.clinic.sessions import Session
 from sagittal.server.context import Config, Db, Id, Reviewed
 from sagittal.server.pages import daily
 from sagittal.server.pages.charts import (
@@ -43,28 +45,20 @@ from sagittal.server.pages.session_context import lead_to_days, read_measured_co
 from sagittal.server.pages.shell import FRAGMENT, record_opening, render_page, render_sheets
 from sagittal.server.pages.takes import view_takes
 from sagittal.server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
-from sagittal.server.report.curves import GLANCE_STRIDES, strip_svg
-from sagittal.server.report.model import ReportModel
-from sagittal.server.report.profile import BAR_HEIGHT, PAPER_BAR_HEIGHT
-from sagittal.server.report.trend_strip import LEAST_VISITS, TrendStrip, trend_strip
-from sagittal.server.report.trends import AnalysedVisit, VisitKind
-from sagittal.server.report.wording import speak_places
-from sagittal.server.services import (
-    comparisons,
-    feedback,
-    histories,
-    repairs,
-    reports,
-    signed_reports,
-    videos,
-)
-from sagittal.server.services.controls import ControlVisit
-from sagittal.server.services.histories import AnalysedSession
-from sagittal.server.services.patients import Patient
-from sagittal.server.services.reviewed import ReviewedAnalyses
-from sagittal.server.services.sessions import Session
+from sagittal.server.report.charts.curves import GLANCE_STRIDES, strip_svg
+from sagittal.server.report.history.trend_strip import LEAST_VISITS, TrendStrip, trend_strip
+from sagittal.server.report.history.trends import AnalysedVisit, VisitKind
+from sagittal.server.report.view.model import ReportModel
+from sagittal.server.report.view.profile import BAR_HEIGHT, PAPER_BAR_HEIGHT
+from sagittal.server.report.words.wording import speak_places
+from sagittal.server.results import comparisons, feedback, histories, repairs, reports
+from sagittal.server.results.controls import ControlVisit
+from sagittal.server.results.histories import AnalysedSession
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.server.sharing import signed_reports
 from sagittal.server.storage.blobs import IntegrityError
 from sagittal.server.storage.db import Database
+from sagittal.server.uploads import videos
 from sagittal.web.words import day, seconds
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)

@@ -8,10 +8,12 @@ from typing import Any, Final
 from sqlalchemy import Connection
 from starlette.responses import RedirectResponse
 
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.clinic.sessions import Session
+from sagittal.server.live_takes import live
 from sagittal.server.pages.job_views import find_newest_job, view_job
 from sagittal.server.pages.words import TEST_NAMES
-from sagittal.server.services import analyses, controls, live, patients, sessions
-from sagittal.server.services.sessions import Session
+from sagittal.server.results import analyses, controls
 
 STAGE_NAMES: Final[Mapping[str, str]] = {
     "reading": "Read the files",

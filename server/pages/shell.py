@@ -7,9 +7,9 @@ from starlette.responses import Response
 
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import jobs
 from sagittal.server.http.templates import render
-from sagittal.server.services import jobs
-from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.storage.db import Database
 from sagittal.server.trail import AuditTrail
 

@@ -13,13 +13,14 @@ from starlette.responses import Response
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients
+from sagittal.server.clinic.calendar_days import move_years
+from sagittal.server.clinic.patients import Patient
 from sagittal.server.context import Config, Db
 from sagittal.server.nodes.registry import Nodes, WebNode
 from sagittal.server.pages.shell import render_page
-from sagittal.server.services import backup_schedule, patients
-from sagittal.server.services.backup_schedule import BackupState, Outcome
-from sagittal.server.services.calendar_days import move_years
-from sagittal.server.services.patients import Patient
+from sagittal.server.safekeeping import backup_schedule
+from sagittal.server.safekeeping.backup_schedule import BackupState, Outcome
 from sagittal.server.storage.high_water import read_newest
 from sagittal.server.storage.tables import now
 

@@ -7,13 +7,13 @@ from typing import Any
 
 from sagittal.core.frames import SIDES
 from sagittal.core.parameters.result import Parameter
-from sagittal.server.report import level
-from sagittal.server.report.change_words import find_term
-from sagittal.server.report.table import ParameterRow
-from sagittal.server.report.wording import format_number
-from sagittal.server.services import visits
-from sagittal.server.services.histories import AnalysedSession
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.report.view import level
+from sagittal.server.report.view.table import ParameterRow
+from sagittal.server.report.words.change_words import find_term
+from sagittal.server.report.words.wording import format_number
+from sagittal.server.results import visits
+from sagittal.server.results.histories import AnalysedSession
+from sagittal.server.results.reviewed import ReviewedAnalyses
 
 
 def view_takes(

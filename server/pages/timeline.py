@@ -19,9 +19,9 @@ from sagittal.server.pages.report_rows import select_first
 from sagittal.server.pages.session import explain_emptiness
 from sagittal.server.pages.session_context import lead_to_days, read_measured_context
 from sagittal.server.pages.shell import FRAGMENT, record_opening, render_page
-from sagittal.server.report.model import ReportModel
-from sagittal.server.services import analyses, edit_log, reports, signals
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.report.view.model import ReportModel
+from sagittal.server.results import analyses, edit_log, reports, signals
+from sagittal.server.results.reviewed import ReviewedAnalyses
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -15,16 +15,24 @@ from sagittal.core.parameters.catalogue import require_entries
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients
 from sagittal.server.context import HEX_ID, Db, Id, Reviewed
 from sagittal.server.pages.shell import record_opening, render_page
-from sagittal.server.report.change_words import SCORE_TERMS, change_words, find_term
-from sagittal.server.report.daily_life import format_hours
-from sagittal.server.report.daily_trend import PerformanceDay, draw_daily_trend
-from sagittal.server.report.trend_chart import PlannedAssessment, trend_svg
-from sagittal.server.report.trends import PRIMARY, AnalysedVisit, Trend, TrendSeries, follow_figures, names_in
-from sagittal.server.report.wording import GROUPS, format_number
-from sagittal.server.services import histories, patients
-from sagittal.server.services.histories import PatientHistory
+from sagittal.server.report.history.daily_trend import PerformanceDay, draw_daily_trend
+from sagittal.server.report.history.trend_chart import PlannedAssessment, trend_svg
+from sagittal.server.report.history.trends import (
+    PRIMARY,
+    AnalysedVisit,
+    Trend,
+    TrendSeries,
+    follow_figures,
+    names_in,
+)
+from sagittal.server.report.view.daily_life import format_hours
+from sagittal.server.report.words.change_words import SCORE_TERMS, change_words, find_term
+from sagittal.server.report.words.wording import GROUPS, format_number
+from sagittal.server.results import histories
+from sagittal.server.results.histories import PatientHistory
 from sagittal.web.words import day
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)

@@ -11,22 +11,24 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
-from sagittal.core.anthropometry import LIMITS
 from sagittal.core.frames import SEGMENTS
 from sagittal.core.plurals import plural
+from sagittal.core.subject.anthropometry import LIMITS
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.clinic.devices import NO_PLACES, LastPlaces, recall_places
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.clinic.sessions import Session
 from sagittal.server.context import Blobs, Db, Id
 from sagittal.server.pages.job_views import view_job
 from sagittal.server.pages.shell import record_opening, render_page
 from sagittal.server.pages.words import PROTOCOLS, SEGMENT_NAMES, TEST_PROTOCOLS
-from sagittal.server.report.bundle import ABOUT_FILES
-from sagittal.server.services import histories, patients, recordings, sessions, uploads
-from sagittal.server.services.devices import NO_PLACES, LastPlaces, recall_places
-from sagittal.server.services.patients import Patient
-from sagittal.server.services.recordings import StoredRecording
-from sagittal.server.services.sessions import Session
+from sagittal.server.report.files.bundle import ABOUT_FILES
+from sagittal.server.results import histories
+from sagittal.server.uploads import recordings, uploads
+from sagittal.server.uploads.recordings import StoredRecording
 from sagittal.web.user_text import UserText
 from sagittal.web.user_text import quote as quote_text
 from sagittal.web.words import number, seconds
@@ -62,7 +64,7 @@ GONIOMETER: Final = (
     ("ankle_dorsiflexion_l", "Dorsiflexion, left"),
     ("ankle_dorsiflexion_r", "Dorsiflexion, right"),
 )
-"""Standing angles that the page asks for; the manifest takes the others too (core/standing_angles.py)."""
+"""Standing angles that the page asks for; the manifest takes all of `core.subject.standing_angles`."""
 
 TAPE: Final = (
     ("leg_m", "Leg", "Front upper iliac spine to inner ankle, standing."),

@@ -16,7 +16,7 @@ from sagittal.server.auth.roles import Action, Role
 from sagittal.server.context import Db
 from sagittal.server.pages.shell import render_page
 from sagittal.server.pages.words import ROLE_WORDS
-from sagittal.server.services import care_teams
+from sagittal.server.sharing import care_teams
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from sagittal.server.services import analyses, edit_log, live, sessions
-from sagittal.server.services.reviewed import UNREADABLE, ReviewedAnalyses
+from sagittal.server.clinic import sessions
+from sagittal.server.live_takes import live
+from sagittal.server.results import analyses, edit_log
+from sagittal.server.results.reviewed import UNREADABLE, ReviewedAnalyses
 
 STATES: Final[Mapping[str, tuple[str, str]]] = {
     "empty": ("none", "No recording yet"),

@@ -1,7 +1,7 @@
 """A document that stands alone as PDF, by WeasyPrint (BSD-3-Clause; needs the system's Pango).
 
 Nothing is fetched: styles are in the document, pictures in `data:` addresses; any other address is refused.
-Imported by a process of its own only (server/services/paper_child.py): the library takes a second and 130 MB.
+Imported by a process of its own only (server/sharing/paper_child.py): the library takes a second and 130 MB.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
 from sagittal.core.errors import SagittalError
-from sagittal.server.report.paper_charts import prepare_figures, read_chart_styles
+from sagittal.server.report.charts.paper_charts import prepare_figures, read_chart_styles
 
 STYLES: Final = Path(__file__).parents[2] / "web" / "static" / "css" / "pdf.css"
 

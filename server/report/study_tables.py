@@ -16,8 +16,8 @@ from typing import Any, Final
 
 from sagittal.core.errors import SagittalError
 from sagittal.core.events.result import MANUAL
-from sagittal.server.report.columns import write_csv
-from sagittal.server.report.estimator import list_estimated_angles
+from sagittal.server.report.files.columns import write_csv
+from sagittal.server.report.words.estimator import list_estimated_angles
 
 PROVENANCE: Final = "provenance.json"
 FAILURES: Final = "failures.csv"

@@ -10,10 +10,10 @@ from sagittal.core.events.result import COMPARED
 from sagittal.core.feedback.summary import classify_stride
 from sagittal.core.parameters.catalogue import unit_of
 from sagittal.core.parameters.kinematic import AT_BOUND, POINTS
-from sagittal.server.report.columns import write_csv
-from sagittal.server.report.feedback import FeedbackView
-from sagittal.server.report.model import ReportModel
-from sagittal.server.report.trends import AnalysedVisit, Trend
+from sagittal.server.report.files.columns import write_csv
+from sagittal.server.report.history.trends import AnalysedVisit, Trend
+from sagittal.server.report.view.feedback import FeedbackView
+from sagittal.server.report.view.model import ReportModel
 
 SYMMETRY = {
     "ratio": "ratio_left_right",

@@ -105,7 +105,7 @@ session = Table(
     Column("performed_on", Date, nullable=False),
     Column("protocol", String(32), nullable=False),
     Column("height_m", Float),
-    # how it was walked (core/condition.py); None: nobody stated it
+    # how it was walked (core/subject/condition.py); None: nobody stated it
     Column("pace", String(32)),
     Column("aid", String(32)),
     Column("orthosis", String(32)),

@@ -25,9 +25,10 @@ from sagittal.core.norms import look_up_norms
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.context import Db, Id, OpenTrail
 from sagittal.server.live.hub import Hub
-from sagittal.server.services import live, patients, sessions
+from sagittal.server.live_takes import live
 from sagittal.server.storage.db import Database
 from sagittal.server.viewer.live_figure import LiveFigure
 from sagittal.server.viewer.live_reference import LiveReference, NormAt

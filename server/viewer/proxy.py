@@ -41,16 +41,17 @@ from sagittal.core.formats.json_tree import read_json
 from sagittal.server.auth.access import find_end, opens, require, wait_for_end
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.clinic.patients import Patient
 from sagittal.server.http.carrying import carry_messages
 from sagittal.server.http.compression import accepts
 from sagittal.server.http.headers import KEPT
 from sagittal.server.http.problems import Problem, as_problem
 from sagittal.server.nodes.registry import Nodes
-from sagittal.server.report.bundle import read_poses
-from sagittal.server.report.no_figure import explain_no_figure
-from sagittal.server.services import analyses, comparisons, edit_log, patients, sessions
-from sagittal.server.services.histories import AnalysedSession
-from sagittal.server.services.patients import Patient
+from sagittal.server.report.files.bundle import read_poses
+from sagittal.server.report.view.no_figure import explain_no_figure
+from sagittal.server.results import analyses, comparisons, edit_log
+from sagittal.server.results.histories import AnalysedSession
 from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.viewer.client import client_page, client_version, find_packed_page
 from sagittal.server.viewer.ghost import match_ghost

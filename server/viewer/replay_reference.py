@@ -9,10 +9,10 @@ import numpy as np
 
 from sagittal.core.frames import SIDES, Floats, Side
 from sagittal.core.parameters.kinematic import cycle_curves, mean_curve
-from sagittal.server.services.comparisons import find_norms
-from sagittal.server.services.histories import AnalysedSession
-from sagittal.server.services.patients import Patient
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.results.comparisons import find_norms
+from sagittal.server.results.histories import AnalysedSession
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.viewer.ghost import match_reference
 from sagittal.server.viewer.motion import GhostMotion, GhostName, ReplayMotion
 from sagittal.server.viewer.reference import SAGITTAL, ReferenceWalk, add_standing_angles

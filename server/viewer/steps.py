@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sagittal.core import rotation
 from sagittal.core.frames import Bools, Floats
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.rest import find_runs
 
 PIECE_M = 0.05
 """A trail is drawn in pieces of about this length: some 30 per stride, none while the foot stands."""

@@ -19,8 +19,8 @@ from sqlalchemy.exc import SQLAlchemyError
 from sagittal.server.log import start_log
 from sagittal.server.processes.child import FAR_BEHIND, end_process, start_module
 from sagittal.server.processes.lifeline import call_when_parent_ends
-from sagittal.server.services import backup_schedule
-from sagittal.server.services.tombstones import TombstoneError, find_tombstones, keep_tombstones
+from sagittal.server.safekeeping import backup_schedule
+from sagittal.server.safekeeping.tombstones import TombstoneError, find_tombstones, keep_tombstones
 from sagittal.server.settings import Settings, load_settings
 from sagittal.server.storage.db import Database
 

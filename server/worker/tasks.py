@@ -12,19 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection
 
+from sagittal.server.clinic import devices
+from sagittal.server.downloads import exports
 from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import COMPARE_FILTERS, EXPORT, SENSITIVITY, TUNE, Claim
-from sagittal.server.services import (
-    analyses,
-    analysing,
-    devices,
-    exports,
-    filter_runs,
-    recordings,
-    sensitivities,
-    tunings,
-)
+from sagittal.server.results import analyses, analysing, filter_runs, sensitivities, tunings
 from sagittal.server.storage.blobs import Blob
+from sagittal.server.uploads import recordings
 from sagittal.server.worker.task import Task, register
 
 if TYPE_CHECKING:
@@ -103,7 +97,7 @@ def _publish_export(
 
 def _warm() -> None:
     """Import readers and pipeline, compile the kernels or load them from the cache."""
-    import sagittal.server.report.exports  # noqa: F401
+    import sagittal.server.report.files.exports  # noqa: F401
     from sagittal.core.agreement.slips import compile_agreement_kernels
     from sagittal.core.body import estimate
     from sagittal.core.events import foot_contact

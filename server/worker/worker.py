@@ -26,10 +26,10 @@ from sagittal.server.jobs.opening import open_queue
 from sagittal.server.jobs.queue import Claim, JobQueue, LeaseState, Wait
 from sagittal.server.log import start_log
 from sagittal.server.processes.lifeline import call_when_parent_ends
-from sagittal.server.services import custody, erasure
-from sagittal.server.services.sweep import sweep
+from sagittal.server.safekeeping import custody
+from sagittal.server.safekeeping.sweep import sweep
 from sagittal.server.settings import Settings, load_settings
-from sagittal.server.storage import fs
+from sagittal.server.storage import fs, references
 from sagittal.server.storage.blob_opening import open_blobs, require_use
 from sagittal.server.storage.blobs import Blob, BlobStore, StoreAway
 from sagittal.server.storage.db import Database
@@ -251,7 +251,7 @@ class Worker:
         if idle is None:
             return
         try:
-            erasure.discard(self._db, self._blobs, space, [idle])
+            references.discard(self._db, self._blobs, space, [idle])
         except (OSError, SagittalError, SQLAlchemyError):
             log.exception("job %s: a former checkpoint stays for the sweep", claim.job_id)
 
@@ -292,7 +292,7 @@ class Worker:
         elif blobs and self._queue.get(claim.job_id) is None:
             # erased while it was computed: nothing of it may wait in the trash
             names = [blob.sha256 for blob in blobs.values()]
-            erasure.discard(self._db, self._blobs, str(claim.params["space"]), names)
+            references.discard(self._db, self._blobs, str(claim.params["space"]), names)
 
     def _store(self, task: Task, claim: Claim, files: Mapping[str, bytes]) -> dict[str, Blob]:
         if not task.keeps_files:

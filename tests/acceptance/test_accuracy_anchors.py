@@ -20,7 +20,7 @@ from sagittal.core.events.result import EventKind
 from sagittal.core.frames import SIDES, Floats
 from sagittal.core.fusion.algorithms.benchmark import read_trial, run_own, score_orientation
 from sagittal.core.pipeline import analyse
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 from sagittal.core.simulate import RecordingSetup, SoftTissue, Squats, simulate_scenario, simulate_squats
 from sagittal.core.simulate.squat_chain import place_as_agreed
 from tests.data import data_folder

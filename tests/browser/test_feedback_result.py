@@ -8,8 +8,8 @@ import pytest
 from playwright.sync_api import expect
 
 from sagittal.core.feedback import FeedbackEngine
-from sagittal.server.services import analyses, edit_log, prescriptions
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.results import analyses, edit_log, prescriptions
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.blob_folder import FolderBlobs
 from sagittal.server.storage.db import Database
 from tests.browser import filling

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from sagittal.core.recording import ImuStream
+from sagittal.core.signals.recording import ImuStream
 from sagittal.core.simulate.scripts import ON_SKIN
 from sagittal.core.simulate.tug import ChairSimulation, simulate_tug
 from sagittal.server.demo import live as demo_live

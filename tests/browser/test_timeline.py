@@ -10,7 +10,7 @@ from uuid import uuid4
 import pytest
 from playwright.sync_api import APIResponse, Browser, Locator, Page, Route, expect
 
-from sagittal.server.report.svg import find_round_ticks
+from sagittal.server.report.charts.svg import find_round_ticks
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
 from tests.browser.design import layout_faults, text_faults

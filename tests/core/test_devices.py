@@ -11,7 +11,7 @@ import pytest
 from sagittal.core.frames import GRAVITY, Floats
 from sagittal.core.quality.device_course import follow_device
 from sagittal.core.quality.devices import DeviceCheck, check_device, is_serial
-from sagittal.core.recording import ImuStream
+from sagittal.core.signals.recording import ImuStream
 from sagittal.core.simulate.mems import SensorNoise, add_sensor_errors
 from sagittal.core.simulate.sensors import SimulatedSignals
 from tests.core.formats.making import stream

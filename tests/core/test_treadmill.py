@@ -13,7 +13,7 @@ import pytest
 from sagittal.core.errors import ParameterError
 from sagittal.core.parameters.spatial import NAMES
 from sagittal.core.pipeline import TakeAnalysis, analyse
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 from sagittal.core.simulate import simulate_scenario
 
 BELT = 1.1

@@ -16,11 +16,11 @@ from pathlib import Path
 import pytest
 from sqlalchemy import insert
 
-from sagittal.server.services import checks, recordings
-from sagittal.server.services.backups import BackupError, list_backups, make_backup
-from sagittal.server.services.custody import StrangersError, refuse_strangers
-from sagittal.server.services.restore_room import RestoreError
-from sagittal.server.services.restoring import restore, try_restore
+from sagittal.server.safekeeping import checks
+from sagittal.server.safekeeping.backups import BackupError, list_backups, make_backup
+from sagittal.server.safekeeping.custody import StrangersError, refuse_strangers
+from sagittal.server.safekeeping.restore_room import RestoreError
+from sagittal.server.safekeeping.restoring import restore, try_restore
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs
 from sagittal.server.storage.archive import make_key, read_key
@@ -29,6 +29,7 @@ from sagittal.server.storage.blobs import Blob
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.migrate import exists
 from sagittal.server.storage.tables import now, recording_file
+from sagittal.server.uploads import recordings
 from tests.data import ROOT
 from tests.faults.clinic import Clinic, find_room
 from tests.faults.failing import Dying, FailingSystem, PowerError

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from sagittal.server import audit, trail
-from sagittal.server.services import patients, sessions
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs
 from sagittal.server.storage.db import Database
@@ -23,11 +23,11 @@ from sagittal.server.storage.readiness import Readiness
 from sagittal.server.storage.tables import now
 from tests.faults.failing import FailingSystem
 from tests.faults.small_disk import full, mounted, on_small_disk, run
+from tests.helpers.clinic import PASSWORD, Clinic, open_clinic
 from tests.helpers.engines import on_both_engines
 from tests.helpers.marks import sqlite_only
 from tests.helpers.postgres import run_sql
 from tests.server import analysed, walk
-from tests.server.clinic import PASSWORD, Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -15,8 +15,9 @@ import pytest
 from sagittal.server.live import client
 from sagittal.server.live.client import StreamReport, stream
 from sagittal.server.live.pairing import pair
-from sagittal.server.services import live, recordings
-from sagittal.server.services.live_recordings import log_path
+from sagittal.server.live_takes import live
+from sagittal.server.live_takes.live_recordings import log_path
+from sagittal.server.uploads import recordings
 from tests.faults.clinic import Clinic
 from tests.faults.forking import Forker
 from tests.helpers.engines import on_both_engines

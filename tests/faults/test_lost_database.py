@@ -15,16 +15,18 @@ from pathlib import Path
 import pytest
 
 from sagittal.server import audit
+from sagittal.server.clinic import sessions
 from sagittal.server.main import main
-from sagittal.server.services import checks, custody, erasure, recordings, sessions
-from sagittal.server.services.reviewed import ReviewedAnalyses
-from sagittal.server.services.sweep import sweep
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.server.safekeeping import checks, custody, erasure
+from sagittal.server.safekeeping.sweep import sweep
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.high_water import raise_mark
 from sagittal.server.storage.migrate import copy_database, exists, upgrade
 from sagittal.server.storage.trash import KEPT, FolderTrash
+from sagittal.server.uploads import recordings
 from sagittal.server.worker.task import load
 from sagittal.server.worker.worker import Worker
 from tests.data import ROOT

@@ -10,8 +10,8 @@ import pytest
 
 from sagittal.server.processes.supervisor import Workers
 from tests.faults.clinic import Clinic, until
+from tests.helpers.clinic import open_clinic
 from tests.helpers.postgres import stopped_server
-from tests.server.clinic import open_clinic
 
 pytestmark = pytest.mark.postgres
 

@@ -10,9 +10,10 @@ from dataclasses import replace
 import pytest
 
 from sagittal.core.errors import SagittalError
-from sagittal.server.services import checks, recordings
-from sagittal.server.services.sweep import sweep
+from sagittal.server.safekeeping import checks
+from sagittal.server.safekeeping.sweep import sweep
 from sagittal.server.storage import fs
+from sagittal.server.uploads import recordings
 from sagittal.server.worker.task import load
 from sagittal.server.worker.worker import Worker
 from tests.faults.clinic import Clinic

@@ -24,7 +24,7 @@ from sagittal.server.auth.passwords import hash_password
 from sagittal.server.auth.roles import Role
 from sagittal.server.auth.sessions import Logins
 from sagittal.server.processes.environment import make_environment
-from sagittal.server.services import recordings
+from sagittal.server.uploads import recordings
 from tests.data import ROOT
 from tests.faults.clinic import Clinic, alive, until
 from tests.faults.forking import ForkedServer, Forker

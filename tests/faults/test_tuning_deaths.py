@@ -14,12 +14,15 @@ import pytest
 from sqlalchemy import select
 
 from sagittal.core.formats.source import SourceFile
+from sagittal.server.clinic import sessions
 from sagittal.server.jobs.queue import JobView
 from sagittal.server.processes.supervisor import Workers
-from sagittal.server.services import erasure, recordings, sessions, tunings
-from sagittal.server.services.references import list_referenced
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.results import tunings
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.server.safekeeping import erasure
+from sagittal.server.storage.references import list_referenced
 from sagittal.server.storage.tables import job
+from sagittal.server.uploads import recordings
 from tests.core.fusion.algorithms.motion import trial_bytes
 from tests.faults.clinic import Clinic, until
 from tests.helpers.engines import on_both_engines

@@ -19,7 +19,7 @@ from sagittal.core.errors import SignalError
 from sagittal.core.formats.source import SourceFile
 from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import Claim
-from sagittal.server.services import analyses
+from sagittal.server.results import analyses
 from sagittal.server.storage.blobs import Blob
 from sagittal.server.worker.task import Task, register
 

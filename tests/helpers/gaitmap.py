@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfiltfilt
 from sagittal.core.formats import SourceFile, parse_manifest, read_recording
 from sagittal.core.frames import SIDES, Floats, Side
 from sagittal.core.pipeline import TakeAnalysis, analyse
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 from tests.data import data_folder
 from tests.helpers.kept import keep_recorded
 

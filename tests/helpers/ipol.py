@@ -15,7 +15,7 @@ import numpy as np
 from sagittal.core.formats import SourceFile, parse_manifest, read_recording
 from sagittal.core.frames import FOOT, SIDES, Floats, Segment, Side
 from sagittal.core.pipeline import TakeAnalysis, analyse
-from sagittal.core.recording import Recording, Subject
+from sagittal.core.signals.recording import Recording, Subject
 from tests.data import data_folder
 from tests.helpers.kept import keep_recorded
 

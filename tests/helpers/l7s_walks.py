@@ -21,13 +21,13 @@ from sagittal.core.body.model import BodyModel
 from sagittal.core.body.poses import Poses
 from sagittal.core.body.still import FOOT_STILL, still_samples
 from sagittal.core.calibration import calibrate
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.held_samples import SampleSeries
-from sagittal.core.recording import UniformRecording
 from sagittal.core.rotation import about, angle_between, multiply, rotate, to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.held_samples import SampleSeries
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.simulate import SCRIPTS, WalkTruth, simulate
 from sagittal.core.simulate.script import Arc, Pivot, Script, Stand, Straight, scale_script
 from sagittal.core.simulate.walker import Walker

@@ -22,7 +22,7 @@ from sagittal.core.formats.live_log import (
     hello_json,
     record,
 )
-from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.signals.recording import ImuStream, Recording
 
 Samples = NDArray[np.float32]
 

@@ -11,7 +11,7 @@ from sagittal.core.calibration.live_attempt import WornSensors
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Floats
 from sagittal.core.online.calibrating import LiveCalibrator
-from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
 from sagittal.core.timeline.live import UniformBlock
 
 

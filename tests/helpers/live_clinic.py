@@ -14,10 +14,10 @@ import websockets
 from websockets.asyncio.client import ClientConnection
 
 from sagittal.core.formats.live_log import PROTOCOL, Hello, hello_json
-from sagittal.server.services import patients, sessions
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.storage.tables import new_id
+from tests.helpers.clinic import Clinic
 from tests.helpers.live_takes import HELLO
-from tests.server.clinic import Clinic
 
 PATIENCE_S = 20.0
 

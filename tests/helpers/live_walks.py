@@ -14,7 +14,7 @@ from sagittal.core.frames import Floats, Side
 from sagittal.core.online import LiveFrame, LiveStride, OnlineSession
 from sagittal.core.online.chain import LiveChain
 from sagittal.core.parameters.live_history import SampleHistory
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 
 
 def hello_of(recording: UniformRecording) -> Hello:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.io import loadmat
 
 from sagittal.core.frames import GRAVITY, Floats
-from sagittal.core.recording import ImuStream, Recording, UniformRecording
+from sagittal.core.signals.recording import ImuStream, Recording, UniformRecording
 from sagittal.core.timeline import synchronise
 from tests.data import data_folder
 from tests.helpers.kept import keep_recorded

@@ -21,12 +21,12 @@ from sagittal.core.body.erkf.poses import ErkfRun, foot_tracks, replace_orientat
 from sagittal.core.body.pose_params import PoseParams
 from sagittal.core.body.tree import PRESETS
 from sagittal.core.calibration import calibrate
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.events.result import StrideFlag
 from sagittal.core.frames import SIDES, SUFFIX, Floats, Segment, Side
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.rotation import from_matrix, multiply, rotate
+from sagittal.core.signals.calibrated import CalibratedRecording
 from tests.data import data_folder
 from tests.helpers.kept import keep_recorded
 from tests.helpers.walks import neura_walk

@@ -26,10 +26,10 @@ from sagittal.core.events.turns import find_turns
 from sagittal.core.frames import GRAVITY, Floats, Segment
 from sagittal.core.pipeline import PipelineConfig
 from sagittal.core.quality.stuck import mark_stuck
-from sagittal.core.recording import SensorSignals, Subject, UniformRecording
-from sagittal.core.rest import drop_false_rests
 from sagittal.core.rotation import exp
 from sagittal.core.setup.axes import fit_axes
+from sagittal.core.signals.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.signals.rest import drop_false_rests
 from sagittal.core.squat.repetitions import find_repetitions
 from tests.core.calibration.test_table_top import carried
 from tests.core.events.foot_signal import foot_pitch, orientation, orientations

@@ -14,7 +14,7 @@ from sagittal.core.errors import SagittalError
 from sagittal.core.pipeline import PipelineConfig, TakeAnalysis
 from sagittal.core.pipeline.recipes import ACTIVITY, SIGNALS, choose_recipe, run_stages, say_nothing
 from sagittal.core.pipeline.stages import PipelineStage
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 
 Path = tuple[str, ...]
 """Names of fields, `[key]` of mappings and `[place]` in tuples, from the configuration down to one value."""

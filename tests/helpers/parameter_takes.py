@@ -12,7 +12,7 @@ import numpy as np
 
 from sagittal.core.frames import Floats, Segment
 from sagittal.core.pipeline import PipelineConfig
-from sagittal.core.recording import GivenLimits, Recording, UniformRecording
+from sagittal.core.signals.recording import GivenLimits, Recording, UniformRecording
 from sagittal.core.simulate import (
     SwingsAndBows,
     simulate,

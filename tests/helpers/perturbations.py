@@ -9,8 +9,8 @@ import numpy as np
 from sagittal.core.agreement.repair import take_lag_out
 from sagittal.core.agreement.strides import find_main_axis
 from sagittal.core.frames import Floats, Segment
-from sagittal.core.recording import UniformRecording
 from sagittal.core.rotation import exp, rotate
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.timeline import TimelineParams
 
 SLIP_S = 0.3

@@ -10,7 +10,7 @@ from scipy.io import loadmat
 
 from sagittal.core.frames import Segment
 from sagittal.core.pipeline import TakeAnalysis, analyse
-from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.signals.recording import ImuStream, Recording
 from tests.data import data_folder
 from tests.helpers.gaitmap import RATE, analysed, recording_of, signals
 from tests.helpers.ipol import WALKS, ipol_analysis, ipol_recording

@@ -13,9 +13,9 @@ from sagittal.core.agreement.agree import compare_sensors
 from sagittal.core.agreement.exchange import SensorExchange, find_exchange
 from sagittal.core.formats.reader import correct_streams
 from sagittal.core.frames import Floats, Segment
-from sagittal.core.recording import Recording
 from sagittal.core.setup import SetupRepair, propose_repair
 from sagittal.core.setup.propose import propose_labels
+from sagittal.core.signals.recording import Recording
 from sagittal.core.timeline import synchronise
 
 SIGNED: tuple[Floats, ...] = tuple(

@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 
 from sagittal.core.frames import Segment
-from sagittal.core.recording import ImuStream, Recording, Subject
 from sagittal.core.rotation import multiply
+from sagittal.core.signals.recording import ImuStream, Recording, Subject
 from tests.core.body.chain.squats import HEIGHT_M, squat_on
 from tests.core.calibration.test_table_top import RATE, WORN, carry
 

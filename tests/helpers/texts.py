@@ -14,7 +14,7 @@ from typing import Final
 from babel.messages.catalog import Catalog
 from babel.messages.pofile import read_po, write_po
 
-from sagittal.server.report.level import ANATOMICAL, STANDING
+from sagittal.server.report.view.level import ANATOMICAL, STANDING
 from sagittal.web.language import CITED, LANGUAGES, SOURCE, catalogue_path
 from sagittal.web.template_texts import has_words, list_texts, reads_like_text
 from tests.data import ROOT
@@ -30,7 +30,7 @@ WHOLE: Final = (
     "core/agreement/tell_live.py",
     "core/calibration/score.py",
     "core/change",
-    "core/condition.py",
+    "core/subject/condition.py",
     "core/estimators.py",
     "core/flags/rules.py",
     "core/fusion/algorithms/choice.py",
@@ -47,11 +47,11 @@ WHOLE: Final = (
     "server/live/wire.py",
     "server/pages",
     "server/report",
-    "server/services/comparisons.py",
-    "server/services/course.py",
-    "server/services/errors.py",
-    "server/services/signals.py",
-    "server/services/targets.py",
+    "server/results/comparisons.py",
+    "server/clinic/course.py",
+    "server/errors.py",
+    "server/results/signals.py",
+    "server/results/targets.py",
     "web/words.py",
 )
 """Files and folders of which every text is shown on a page."""
@@ -69,10 +69,10 @@ STAYS_ENGLISH: Final[Mapping[str, str]] = {
     "server/export/fhir.py": "files that leave the server are English",
     "server/export/opensim.py": "why a file was refused; shown as English",
     "server/export/sheets.py": "files that leave the server are English",
-    "server/report/analysis_json.py": "files that leave the server are English",
-    "server/report/exports.py": "files that leave the server are English",
-    "server/report/activity_files.py": "files that leave the server are English",
-    "server/report/filter_files.py": "files that leave the server are English",
+    "server/report/files/analysis_json.py": "files that leave the server are English",
+    "server/report/files/exports.py": "files that leave the server are English",
+    "server/report/files/activity_files.py": "files that leave the server are English",
+    "server/report/files/filter_files.py": "files that leave the server are English",
     "server/report/tables.py": "files that leave the server are English",
     "server/web_server": "what is answered before a request reaches a page, or is read in the log",
     "server/viewer": "what the 3D figure says inside its frame comes from the viewer",
@@ -213,7 +213,7 @@ def list_messages() -> dict[str, list[str]]:
         found.setdefault(word, []).append("tests/helpers/texts.py")
     for phrase in PHRASES:
         found.setdefault(phrase, ["tests/helpers/texts.py"])
-    # what a figure is, where a goniometer gave the zero (server/report/level.py)
+    # what a figure is, where a goniometer gave the zero (server/report/view/level.py)
     for message in [m for m in found if m.endswith(f", {STANDING}.")]:
         found.setdefault(message.replace(STANDING, ANATOMICAL), found[message])
     for beginning in UNMEASURED:

@@ -10,12 +10,12 @@ from sagittal.core.angles import JointAngles
 from sagittal.core.body.feet import FootTracks
 from sagittal.core.events.result import GaitEvent, GaitEvents
 from sagittal.core.frames import FOOT, SIDES
-from sagittal.core.measure import MeasuredGait, Tracks, measure_gait
+from sagittal.core.parameters.measure import MeasuredGait, Tracks, measure_gait
 from sagittal.core.pipeline import PipelineConfig, analyse
-from sagittal.core.shoe import Shoe
 from sagittal.core.simulate import WalkTruth, simulate_scenario
 from sagittal.core.simulate.sensors import PLACES
 from sagittal.core.simulate.walker import Anatomy
+from sagittal.core.subject.shoe import Shoe
 from tests.helpers.kept import keep
 
 _ANATOMY = Anatomy()

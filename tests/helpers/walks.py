@@ -15,8 +15,8 @@ from sagittal.core.formats import SourceFile, parse_manifest, read_recording
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.pipeline import TakeAnalysis, analyse
-from sagittal.core.recording import Recording, SensorSignals, UniformRecording
 from sagittal.core.rotation import rotate
+from sagittal.core.signals.recording import Recording, SensorSignals, UniformRecording
 from sagittal.core.simulate import SCRIPTS, WalkTruth, simulate, simulate_scenario
 from sagittal.core.simulate.script import Script, SingleSteps
 from sagittal.core.simulate.walker import SIGN, Walker

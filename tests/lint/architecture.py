@@ -13,7 +13,12 @@ from tests.data import ROOT
 
 ALLOWED_IN_CORE = {"numpy", "scipy", "numba", "sagittal"}
 ALLOWED_IN_FORMATS = ALLOWED_IN_CORE | {"pyarrow", "defusedxml", "h5py"}
-DATED = ("core/sample_blocks.py", "core/activity/result.py", "core/activity/totals.py", "core/formats/cwa.py")
+DATED = (
+    "core/signals/sample_blocks.py",
+    "core/activity/result.py",
+    "core/activity/totals.py",
+    "core/formats/cwa.py",
+)
 """They handle dates read from a device's file; none reads the clock."""
 COMPILER = "core/body/erkf/lanes.py"
 """It extends Numba's compiler, llvmlite, by a vector type."""

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from sagittal.core.parameters.catalogue import CATALOGUE
-from sagittal.server.report.wording import NO_NORM, REASONS
+from sagittal.server.report.words.wording import NO_NORM, REASONS
 from tests.data import ROOT
 
 MOST_WORDS: Final = 25

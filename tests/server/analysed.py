@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from sagittal.core.body.estimate import PoseEstimate
-from sagittal.core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
 from sagittal.core.errors import Notice
 from sagittal.core.events.foot_pitch import pitch_signal
 from sagittal.core.filter_comparison.result import (
@@ -23,19 +22,22 @@ from sagittal.core.filter_comparison.result import (
 from sagittal.core.frames import FOOT, SIDES, Segment
 from sagittal.core.fusion.algorithms.benchmark import OrientationScore
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.measure import measure_gait
+from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.pipeline import TakeAnalysis
 from sagittal.core.quality import QualityReport
-from sagittal.core.recording import Recording, SensorSignals, Subject, UniformRecording
 from sagittal.core.rotation import about
+from sagittal.core.signals.calibrated import CalibratedRecording, Calibration, SegmentCalibration
+from sagittal.core.signals.recording import Recording, SensorSignals, Subject, UniformRecording
+from sagittal.server.clinic import sessions
 from sagittal.server.commands.sensitivity import analyse_simulated
 from sagittal.server.jobs.queue import COMPARE_FILTERS, SENSITIVITY
-from sagittal.server.report.exports import analysis_files
-from sagittal.server.report.filter_files import filter_run_files
-from sagittal.server.report.sensitivity import sensitivity_files, summarise_sensitivity
-from sagittal.server.services import analyses, filter_runs, recordings, sensitivities, sessions
+from sagittal.server.report.files.exports import analysis_files
+from sagittal.server.report.files.filter_files import filter_run_files
+from sagittal.server.report.view.sensitivity import sensitivity_files, summarise_sensitivity
+from sagittal.server.results import analyses, filter_runs, sensitivities
+from sagittal.server.uploads import recordings
+from tests.helpers.clinic import Clinic
 from tests.server import walk
-from tests.server.clinic import Clinic
 
 
 def analysis(*, duration_s: float = 12.0, reached: bool = True) -> TakeAnalysis:

@@ -10,7 +10,8 @@ from typing import Any, Final
 from sqlalchemy import insert
 
 from sagittal.server.auth.tokens import token_hash
-from sagittal.server.services import identities, prescriptions, programmes
+from sagittal.server.clinic import identities, programmes
+from sagittal.server.results import prescriptions
 from sagittal.server.storage.care_tables import emergency_access
 from sagittal.server.storage.field_cipher import make_keys
 from sagittal.server.storage.live_tables import live_take
@@ -30,8 +31,8 @@ from sagittal.server.storage.tables import (
     session,
     tuning,
 )
+from tests.helpers.clinic import Clinic
 from tests.server import analysed, crowd
-from tests.server.clinic import Clinic
 
 TRAINING: Final = {
     "parameter": "stance_pct",

@@ -12,7 +12,7 @@ from sqlalchemy import Engine, Table, event, insert
 
 from sagittal.core.frames import SEGMENTS
 from sagittal.core.quality.devices import DeviceCheck
-from sagittal.server.services.provenance import CODE_VERSION
+from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.storage.blobs import Blob
 from sagittal.server.storage.tables import (
     analysis,
@@ -25,7 +25,7 @@ from sagittal.server.storage.tables import (
     recording_file,
     session,
 )
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 FIRST_DAY = dt.date(2024, 1, 1)
 MORNING = dt.datetime(2024, 1, 1, 8, tzinfo=dt.UTC)

@@ -22,8 +22,8 @@ from sagittal.core.activity.totals import sum_days, sum_hours
 from sagittal.core.frames import Floats
 from sagittal.core.pipeline import TakeAnalysis
 from sagittal.core.quality import QualityReport
-from sagittal.core.recording import Recording
-from sagittal.server.report.exports import analysis_files
+from sagittal.core.signals.recording import Recording
+from sagittal.server.report.files.exports import analysis_files
 
 STARTED: Final = dt.datetime.fromisoformat("2026-11-16T18:00:00")
 """A Monday at six in the evening."""

@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from typing import Any
 
 from sagittal.core.feedback import Cue
-from sagittal.server.services import live, live_training, patients, sessions
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.live_takes import live, live_training
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.live_tables import live_take
 from sagittal.server.storage.tables import new_id
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 DAY = dt.date(2026, 3, 2)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from fastapi import FastAPI
 
-from tests.server.clinic import ORIGIN
+from tests.helpers.clinic import ORIGIN
 
 
 async def ask_websocket(app: FastAPI, path: str, headers: Mapping[str, str]) -> int:

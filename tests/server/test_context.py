@@ -12,7 +12,7 @@ from fastapi import FastAPI, Request
 
 from sagittal.server import context
 from sagittal.server.context import DeviceId, Id, StudyVisits, address_of
-from sagittal.server.services.studies import StudyChoice
+from sagittal.server.downloads.studies import StudyChoice
 
 pytestmark = pytest.mark.anyio
 

@@ -11,11 +11,11 @@ import pytest
 from fastapi import FastAPI
 from sqlalchemy import select
 
+from sagittal.server.clinic import patients
 from sagittal.server.lifespan import _say_estimators, _say_workers, run_installation
 from sagittal.server.metrics import RequestMetrics
 from sagittal.server.processes.supervisor import Workers
-from sagittal.server.services import patients
-from sagittal.server.services.custody import StrangersError
+from sagittal.server.safekeeping.custody import StrangersError
 from sagittal.server.settings import Settings
 from sagittal.server.storage.blob_folder import FolderBlobs
 from sagittal.server.storage.db import Database

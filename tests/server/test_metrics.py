@@ -11,11 +11,13 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from sqlalchemy import update
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.jobs.table import TableQueue
+from sagittal.server.live_takes import live
 from sagittal.server.metrics import BUCKETS_S, RequestMetrics, StateCollector
 from sagittal.server.nodes.registry import Nodes
-from sagittal.server.services import backup_schedule, live, patients, sessions
-from sagittal.server.services.backup_schedule import BackupState, Outcome
+from sagittal.server.safekeeping import backup_schedule
+from sagittal.server.safekeeping.backup_schedule import BackupState, Outcome
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.tables import job, now

@@ -15,7 +15,7 @@ from sagittal.core.body.model import BodyModel
 from sagittal.core.body.poses import Poses
 from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents, Stride, Strides
 from sagittal.core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
-from sagittal.core.measure import Tracks
+from sagittal.core.parameters.measure import Tracks
 
 BODY = BodyModel(hip_width=0.2, thigh=0.43, shank=0.43, ankle_height=0.07, foot=0.26, estimated=True)
 PHASE: Mapping[Side, float] = {"left": 0.0, "right": 0.5}

@@ -20,7 +20,7 @@ from scipy.io import loadmat
 from sagittal.core.activity.monitor import monitor_activity
 from sagittal.core.activity.result import KINDS, ActivityResult
 from sagittal.core.frames import Segment
-from sagittal.core.recording import ImuStream, as_long_stream
+from sagittal.core.signals.recording import ImuStream, as_long_stream
 from sagittal.core.simulate.chest import ChestStyle, Day, PostureHold, simulate_day
 from sagittal.core.simulate.daily import KIND_OF, DailySimulation, plan_daily_life, simulate_daily_life
 from sagittal.core.simulate.scripts import ON_SKIN

@@ -16,8 +16,8 @@ from sagittal.core.body.erkf.poses import ErkfRun, foot_tracks, replace_orientat
 from sagittal.core.body.mounting import MountedSensors
 from sagittal.core.body.tree import PRESETS
 from sagittal.core.frames import FOOT, SHANK, SIDES, Bools, Floats
-from sagittal.core.rest import index_window
 from sagittal.core.rotation import wrap_angle
+from sagittal.core.signals.rest import index_window
 from sagittal.core.simulate import WalkTruth, simulate_scenario
 from tests.helpers.neura import SHIPPED, Chain, chain, take
 from tests.helpers.neura_angles import scores

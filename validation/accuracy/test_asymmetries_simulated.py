@@ -10,7 +10,7 @@ from typing import Final
 
 import pytest
 
-from sagittal.core.measure import MeasuredGait
+from sagittal.core.parameters.measure import MeasuredGait
 from sagittal.core.parameters.symmetry import compare_sides
 from tests.helpers.true_walks import measured_walk
 from validation.figures import record

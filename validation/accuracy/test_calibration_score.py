@@ -17,14 +17,14 @@ import numpy as np
 from sagittal.core.agreement import check_agreement
 from sagittal.core.body.mounting import mount_sensors
 from sagittal.core.calibration import calibrate
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.calibration.score import RULES, CalibrationScore, score_calibration
 from sagittal.core.frames import SHANK, SIDES, THIGH, Segment
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.pipeline import PipelineConfig
 from sagittal.core.quality.stuck import drop_stuck_sensors
-from sagittal.core.recording import UniformRecording
 from sagittal.core.rotation import about, to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.simulate import RecordingSetup, SwingsAndBows, simulate_swings_and_bows
 from sagittal.core.simulate.scripts import ON_SKIN
 from sagittal.core.timeline import synchronise

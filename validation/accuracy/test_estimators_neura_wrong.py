@@ -29,13 +29,13 @@ from sagittal.core.body.erkf.params import ErkfParams
 from sagittal.core.body.erkf.start import start_state
 from sagittal.core.calibration import calibrate
 from sagittal.core.calibration.gyro_pca import about_vertical
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.calibration.standing import vertical_frame
 from sagittal.core.frames import FOOT, SIDES, Floats, Segment, Side
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.recording import SensorSignals, UniformRecording
-from sagittal.core.rest import index_window
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
+from sagittal.core.signals.rest import index_window
 from tests.helpers.neura import (
     BODY,
     RATE,

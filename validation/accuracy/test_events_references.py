@@ -23,7 +23,7 @@ from sagittal.core.events.result import EventKind, GaitEvents, Stride
 from sagittal.core.events.strides import stride_list
 from sagittal.core.frames import SIDES, Floats, Side
 from sagittal.core.fusion.mahony import estimate_orientations
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 from tests.helpers import force_plate
 from tests.helpers.event_scoring import match
 from tests.helpers.gaitmap import COPIES, RATE, recording_of, resampled

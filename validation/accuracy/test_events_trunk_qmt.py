@@ -20,7 +20,7 @@ from sagittal.core.events.result import GaitEvents
 from sagittal.core.events.turns import find_turns
 from sagittal.core.frames import SIDES, Segment, Side
 from sagittal.core.fusion.mahony import estimate_orientations
-from sagittal.core.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.signals.recording import SensorSignals, Subject, UniformRecording
 from tests.data import data_folder
 from tests.helpers.event_scoring import Score, match
 from validation.figures import record

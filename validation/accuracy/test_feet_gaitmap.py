@@ -16,9 +16,9 @@ import numpy as np
 from sagittal.core.body import nominal_body
 from sagittal.core.events.result import Stride
 from sagittal.core.frames import FOOT, SIDES, Floats, Side
-from sagittal.core.measure import MeasuredGait, Tracks, measure_gait
+from sagittal.core.parameters.measure import MeasuredGait, Tracks, measure_gait
 from sagittal.core.parameters.stance import FLAT_RAD, NAMES, find_stances
-from sagittal.core.shoe import Shoe
+from sagittal.core.subject.shoe import Shoe
 from tests.helpers.gaitmap import MARKERS, MOCAP_RATE, analysed, table
 from validation.figures import record, record_in_short
 

@@ -15,13 +15,13 @@ from scipy.spatial.transform import Rotation
 
 from sagittal.core.angles.measure import measure_angles
 from sagittal.core.calibration import calibrate
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.frames import R_NEUTRAL, Floats
 from sagittal.core.fusion.drift import DriftParams, remove_relative_drift
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.fusion.self_calibrating import SelfCalibratingFilter
 from sagittal.core.rotation import conjugate, from_matrix, multiply, normalise, rotate
+from sagittal.core.signals.calibrated import CalibratedRecording
 from tests.data import data_folder
 from tests.helpers.neura_angles import reference as neura_reference
 from tests.helpers.neura_angles import scores

@@ -14,11 +14,11 @@ import pytest
 
 from sagittal.core.flags import Flag, judge_flags
 from sagittal.core.frames import Side
-from sagittal.core.measure import MeasuredGait, measure_gait
+from sagittal.core.norms.scores import Scores, score_curves
 from sagittal.core.parameters import cycle_curves
+from sagittal.core.parameters.measure import MeasuredGait, measure_gait
 from sagittal.core.parameters.result import CycleCurves
 from sagittal.core.pipeline import analyse
-from sagittal.core.scores import Scores, score_curves
 from sagittal.core.simulate import simulate_scenario
 from tests.helpers.true_walks import standing_width, true_tracks
 from validation.figures import record

@@ -17,9 +17,9 @@ import numpy as np
 
 from sagittal.core.calibration import calibrate
 from sagittal.core.frames import FOOT, SHANK, THIGH, Segment
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import index_window
 from sagittal.core.rotation import to_matrix, wrap_angle, yaw
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import index_window
 from sagittal.core.simulate import WalkTruth
 from sagittal.core.simulate.patients import PATIENTS
 from tests.helpers.walks import only, simulated

@@ -11,11 +11,11 @@ import pytest
 from sagittal.core.calibration import calibrate
 from sagittal.core.calibration.anterior import Method
 from sagittal.core.calibration.calibrate import CalibrationParams
-from sagittal.core.calibration.result import Calibration
 from sagittal.core.formats import SourceFile, parse_manifest, read_recording
 from sagittal.core.frames import Floats
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.rotation import rotate
+from sagittal.core.signals.calibrated import Calibration
 from sagittal.core.timeline import synchronise
 from tests.data import data_folder
 

@@ -25,12 +25,12 @@ from sagittal.core.body.erkf.poses import ErkfRun, run_erkf
 from sagittal.core.body.erkf.start import start_state
 from sagittal.core.body.still import FOOT_STILL, still_samples
 from sagittal.core.body.tree import person_tree
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.frames import FOOT, GRAVITY, SIDES, Floats, Side
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.parameters import measure_distances
 from sagittal.core.rotation import rotate
+from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.timeline import synchronise
 from tests.helpers.gaitmap import COPIES, RATE, analysed, block_mean, recording_of, signals, true_strides
 from validation.figures import record, record_in_short

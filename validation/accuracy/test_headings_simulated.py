@@ -23,7 +23,7 @@ from sagittal.core.body.tree import PRESETS
 from sagittal.core.calibration import calibrate
 from sagittal.core.frames import Segment
 from sagittal.core.fusion.mahony import estimate_orientations
-from sagittal.core.rest import index_window
+from sagittal.core.signals.rest import index_window
 from tests.helpers.walks import rms_deg, simulated
 from validation.figures import record
 from validation.marks import WHOLE

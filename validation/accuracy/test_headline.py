@@ -8,10 +8,10 @@ from __future__ import annotations
 import pytest
 
 from sagittal.core.simulate import PATIENTS
-from sagittal.server.report.bundle import load_bundle
-from sagittal.server.report.exports import analysis_files
-from sagittal.server.report.headline import Headline
-from sagittal.server.report.model import report_model
+from sagittal.server.report.files.bundle import load_bundle
+from sagittal.server.report.files.exports import analysis_files
+from sagittal.server.report.view.headline import Headline
+from sagittal.server.report.view.model import report_model
 from tests.helpers.walks import analysed
 from validation.marks import sample
 

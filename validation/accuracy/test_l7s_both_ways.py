@@ -21,12 +21,12 @@ from sagittal.core.body.l7s.inputs import free_acceleration
 from sagittal.core.body.l7s.poses import l7s_poses
 from sagittal.core.body.model import BodyModel
 from sagittal.core.calibration import calibrate
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.frames import FOOT, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.parameters.uncertainty import ESTIMATED_DEG, FEET_ALONE_DEG
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.simulate import WalkTruth
 from tests.data import data_folder
 from tests.helpers.l7s_walks import FLEXION, steps_of

@@ -23,10 +23,10 @@ from sagittal.core.body.l7s.inputs import free_acceleration
 from sagittal.core.body.l7s.poses import l7s_poses
 from sagittal.core.body.model import BodyModel
 from sagittal.core.calibration import calibrate
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.frames import FOOT, SIDES, SUFFIX, Floats, Side
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.simulate import WalkTruth
 from tests.data import data_folder
 from tests.helpers.l7s_walks import steps_of

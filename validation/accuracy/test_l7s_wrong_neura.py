@@ -28,7 +28,7 @@ from sagittal.core.estimators import Estimator
 from sagittal.core.frames import SIDES, Segment
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
 from tests.helpers.l7s_walks import FLEXION
 from tests.helpers.neura import BODY, angles_deg
 from tests.helpers.neura_angles import scores

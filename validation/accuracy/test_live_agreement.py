@@ -16,7 +16,7 @@ from sagittal.core.agreement import check_agreement
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Segment
 from sagittal.core.pipeline import PipelineConfig
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.simulate import PATIENTS, SCRIPTS, simulate_scenario
 from sagittal.core.timeline import synchronise
 from tests.helpers.live_agreement import find_standings, listen, walk_again

@@ -19,13 +19,13 @@ from sagittal.core.body.erkf.params import ErkfParams
 from sagittal.core.body.tree import PRESETS
 from sagittal.core.calibration import calibrate
 from sagittal.core.calibration.live_attempt import WornSensors
-from sagittal.core.calibration.result import CalibratedRecording, Calibration
 from sagittal.core.frames import Segment
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.online.calibrated import LiveCalibration, compile_calibration_kernels
 from sagittal.core.online.calibrating import LiveCalibrator
-from sagittal.core.recording import UniformRecording
 from sagittal.core.rotation import from_matrix, log
+from sagittal.core.signals.calibrated import CalibratedRecording, Calibration
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.timeline.live import UniformBlock
 from tests.helpers.walks import neura_walk, simulated
 from validation.figures import record

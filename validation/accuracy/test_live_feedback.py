@@ -12,8 +12,8 @@ from functools import cache
 import pytest
 
 from sagittal.core.feedback import AnalysedStride, Cue, FeedbackEngine, FeedbackSplit, Prescription, split
-from sagittal.core.measure import MeasuredGait
 from sagittal.core.online import LiveFrame
+from sagittal.core.parameters.measure import MeasuredGait
 from tests.helpers.live_walks import live
 from tests.helpers.walks import analysed, simulated
 from validation.figures import record, record_in_short

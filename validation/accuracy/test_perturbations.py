@@ -18,8 +18,8 @@ from sagittal.core.agreement.exchange import LEGS, SWAPS, Swap, undo_exchange
 from sagittal.core.frames import Floats, Segment
 from sagittal.core.pipeline import PipelineConfig, TakeAnalysis, analyse, resume
 from sagittal.core.quality.stuck import mark_stuck
-from sagittal.core.recording import Recording, UniformRecording
 from sagittal.core.rotation import exp, rotate
+from sagittal.core.signals.recording import Recording, UniformRecording
 from sagittal.core.simulate import PATIENTS, simulate_scenario
 from sagittal.core.timeline import synchronise
 from tests.helpers.perturbations import delay_sensor, find_middle, slip_sensor

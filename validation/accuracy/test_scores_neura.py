@@ -17,9 +17,9 @@ from sagittal.core.angles import JointAngles
 from sagittal.core.events.result import Strides
 from sagittal.core.frames import SIDES
 from sagittal.core.norms.profile import NINE, SAGITTAL
+from sagittal.core.norms.scores import Scores, score_curves
 from sagittal.core.parameters import cycle_curves
 from sagittal.core.parameters.result import CycleCurves
-from sagittal.core.scores import Scores, score_curves
 from tests.data import data_folder
 from tests.helpers.neura import STRAIGHT
 from tests.helpers.walks import neura_analysis

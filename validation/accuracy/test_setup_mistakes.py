@@ -17,7 +17,7 @@ import pytest
 from sagittal.core.agreement.exchange import LEGS, SWAPS, undo_exchange
 from sagittal.core.frames import GRAVITY, Floats, Segment
 from sagittal.core.pipeline import TakeAnalysis, analyse
-from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.signals.recording import ImuStream, Recording
 from sagittal.core.simulate import PATIENTS, simulate_scenario
 from tests.helpers.ipol import WALKS, ipol_recording
 from tests.helpers.kept import keep_recorded

@@ -19,8 +19,8 @@ import pytest
 
 from sagittal.core.frames import FOOT, Segment
 from sagittal.core.pipeline import TakeAnalysis, analyse
-from sagittal.core.recording import Recording
-from sagittal.core.rest import find_rest_windows, index_window
+from sagittal.core.signals.recording import Recording
+from sagittal.core.signals.rest import find_rest_windows, index_window
 from sagittal.core.timeline import synchronise
 from tests.helpers import mobgap
 from tests.helpers.ipol import WALKS

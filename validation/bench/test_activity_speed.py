@@ -15,8 +15,8 @@ import pytest
 from sagittal.core.activity.monitor import monitor_activity
 from sagittal.core.formats import cwa, write_recording
 from sagittal.core.formats.draft import signal_digest
-from sagittal.core.recording import ImuStream, Recording
-from sagittal.core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.signals.recording import ImuStream, Recording
+from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 from sagittal.core.simulate.daily import plan_daily_life, simulate_daily_life
 from tests.data import ROOT
 from tests.helpers.pairs import cpu_s, in_pairs, plain_python

@@ -10,7 +10,7 @@ from sagittal.core.agreement import check_agreement
 from sagittal.core.calibration import calibrate
 from sagittal.core.frames import Floats
 from sagittal.core.fusion.mahony import estimate_orientations
-from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
 from tests.helpers.pairs import in_pairs
 from tests.helpers.perturbations import delay_sensor
 from tests.helpers.walks import only, simulated

@@ -9,11 +9,11 @@ from typing import Any, Final
 
 import pytest
 
-from sagittal.server.services import patients, sessions
+from sagittal.server.clinic import patients, sessions
+from tests.helpers.clinic import open_clinic
 from tests.server import analysed, crowd
 from tests.server.api.test_files import API, new_session
 from tests.server.api.test_tables import table
-from tests.server.clinic import open_clinic
 from tests.server.pages.test_statements import MOST
 from validation.figures import record_goal
 

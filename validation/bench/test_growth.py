@@ -21,10 +21,10 @@ import pytest
 
 from sagittal.core.online import OnlineSession, compile_live_kernels
 from tests.data import ROOT
+from tests.helpers.clinic import open_clinic
 from tests.helpers.live_walks import batches, hello_of
 from tests.helpers.walks import simulated
 from tests.server import crowd
-from tests.server.clinic import open_clinic
 from validation.figures import record_goal, record_speed
 from validation.marks import WHOLE, whole_only
 
@@ -82,7 +82,7 @@ from statistics import median
 from sagittal.server.processes.memory import share_allocator
 share_allocator()
 from sagittal.core.formats import list_source_files
-from sagittal.server.services import analysing
+from sagittal.server.results import analysing
 
 def analysed(path):
     stages, began = [], time.process_time()

@@ -16,8 +16,9 @@ from sqlalchemy import func, select
 
 from sagittal.core.formats.live_log import Hello, SampleBatch, SensorInfo, StreamInfo, encode_batch
 from sagittal.core.frames import SEGMENTS
+from sagittal.server.clinic import sessions
 from sagittal.server.live.client import StreamReport, stream
-from sagittal.server.services import live, sessions
+from sagittal.server.live_takes import live
 from sagittal.server.storage.live_tables import live_take
 from tests.faults.clinic import Clinic
 from tests.faults.test_server_deaths import serving

@@ -11,7 +11,7 @@ import pytest
 from sagittal.core.calibration import calibrate
 from sagittal.core.fusion.attitude import AttitudeParams, AttitudeState, advance, compile_attitude_kernel
 from sagittal.core.fusion.mahony import estimate_orientations
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from tests.helpers.walks import simulated
 
 N = 60_000

@@ -25,7 +25,7 @@ from sagittal.core.formats.live_log import SampleBatch
 from sagittal.core.frames import Segment
 from sagittal.core.online import LiveStride, OnlineSession, compile_live_kernels
 from sagittal.core.parameters.live_strides import LiveStrides
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from tests.helpers.live_walks import batches, hello_of
 from tests.helpers.walks import only, simulated
 

@@ -10,8 +10,8 @@ from math import pi
 
 import numpy as np
 
-from sagittal.core.measure import measure_gait
 from sagittal.core.parameters import take_figures
+from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.simulate import Arc, Stand, Straight, simulate
 from tests.helpers.true_walks import true_tracks
 

@@ -17,12 +17,12 @@ from typing import Any
 import pytest
 
 from sagittal.core.events.edits import Edit
-from sagittal.core.measure import Tracks, measure_gait
+from sagittal.core.parameters.measure import Tracks, measure_gait
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.pages.shell import FRAGMENT
-from sagittal.server.services import patients, sessions
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.helpers.pairs import cpu_s, in_pairs, plain_python
 from tests.server import analysed, walk
-from tests.server.clinic import Clinic, open_clinic
 from validation.figures import record_goal
 
 TAKE_S = 600.0

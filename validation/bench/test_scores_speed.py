@@ -12,9 +12,9 @@ from sagittal.core.flags import judge_flags
 from sagittal.core.frames import SIDES
 from sagittal.core.norms import look_up_norms
 from sagittal.core.norms.profile import NINE
+from sagittal.core.norms.scores import score_curves
 from sagittal.core.parameters.result import CycleCurves
-from sagittal.core.scores import score_curves
-from sagittal.core.standing_angles import NAMES
+from sagittal.core.subject.standing_angles import NAMES
 
 STRIDES = 280
 """Per side: ten minutes with turns and rests at 110 steps a minute leave fewer."""

@@ -12,8 +12,8 @@ from sqlalchemy import update
 
 from sagittal.server.storage.db import Source
 from sagittal.server.storage.tables import job
+from tests.helpers.clinic import open_clinic
 from tests.server import crowd
-from tests.server.clinic import open_clinic
 
 PEOPLE, VISITS = 2000, 5
 WAITING: Final = 1000

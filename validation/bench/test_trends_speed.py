@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from sagittal.server.report.trends import follow_figures, names_in
-from sagittal.server.services import histories, patients, sessions
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.report.history.trends import follow_figures, names_in
+from sagittal.server.results import histories
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic, open_clinic
 
 VISITS = 24
 LIMIT_S = 0.3

@@ -9,7 +9,7 @@ import pytest
 from sagittal.core.fusion.algorithms.benchmark import ReferenceTrial, read_trial
 from sagittal.core.fusion.algorithms.swarm import SwarmRules
 from sagittal.core.fusion.algorithms.tuning import GainTuner, TrialSplit
-from sagittal.server.services import tunings
+from sagittal.server.results import tunings
 from tests.core.fusion.algorithms.motion import trial_bytes
 from validation.bench.test_mahony import best
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagittal.core.frames import GRAVITY, Bools, Floats
-from sagittal.core.inner import inner_njit
 from sagittal.core.rotation.compiled import cross, exp_so3, multiply3, transform
+from sagittal.core.signals.inner import inner_njit
 
 LOST_TURN = 2.0
 """rad²/s by which an angle becomes uncertain while its sensor is silent, up to `MOST_TURN`, rad²."""

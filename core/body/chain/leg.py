@@ -13,13 +13,13 @@ from sagittal.core.body.chain.filter import ChainFilter, ChainFilterParams, Chai
 from sagittal.core.body.chain.geometry import LegGeometry
 from sagittal.core.body.chain.model import RevoluteChain, build_leg_chain, leg_segments, require_leg
 from sagittal.core.body.corrected import correct_signals
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import EstimationError
 from sagittal.core.estimators import SQUAT_CHAIN
 from sagittal.core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.rest import index_window
 from sagittal.core.rotation import from_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.rest import index_window
 
 UNCERTAIN: Final = radians(5.0)
 """Angles with a larger standard deviation are withheld: after a silence of a sensor (our choice)."""

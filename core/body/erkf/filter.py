@@ -43,8 +43,8 @@ from sagittal.core.body.still import AT_REST, contact_samples, still_samples
 from sagittal.core.body.tree import ImuTree
 from sagittal.core.errors import EstimationError, ParameterError, SignalError
 from sagittal.core.frames import Bools, Floats
-from sagittal.core.held_samples import SampleSeries
-from sagittal.core.memory import make_pages
+from sagittal.core.signals.held_samples import SampleSeries
+from sagittal.core.signals.memory import make_pages
 
 HEADING_SD: Final = radians(10.0)
 """Of a measured heading, rad (our choice). No stage measures one, so it is no parameter."""

@@ -24,12 +24,12 @@ from sagittal.core.body.erkf.start import start_state
 from sagittal.core.body.health import HealthFinding
 from sagittal.core.body.model import BodyModel
 from sagittal.core.body.tree import person_tree
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import Notice, Severity
 from sagittal.core.frames import Segment
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.rest import index_window
 from sagittal.core.rotation import about, from_matrix, multiply, to_matrix, wrap_angle, yaw
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.rest import index_window
 
 LOOKED_AT_S: Final = 120.0
 """Part of the take that is filtered for this, from the standing zero on: some fifty strides."""

@@ -11,8 +11,8 @@ from sagittal.core.body.erkf.poses import ErkfRun
 from sagittal.core.body.erkf.start import find_parts
 from sagittal.core.body.health import LONGEST_MOVING_S, HealthFinding, longest_run_s
 from sagittal.core.errors import Notice, Severity
-from sagittal.core.held_samples import cut_blocks
 from sagittal.core.rotation import conjugate, multiply, wrap_angle, yaw
+from sagittal.core.signals.held_samples import cut_blocks
 
 RESIDUAL_MM: Final = (25.0, 80.0)
 """RMS distance of the two ends of a joint while moving. A right set-up has 3 to 19 (simulation, neura_walk),

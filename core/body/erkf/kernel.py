@@ -29,8 +29,8 @@ from sagittal.core.body.erkf.updates import (
     velocity_rows,
 )
 from sagittal.core.frames import Bools, Floats
-from sagittal.core.inner import inner_njit
 from sagittal.core.rotation.compiled import to_matrix, turn
+from sagittal.core.signals.inner import inner_njit
 
 INVALID, CONTACT, STILL, PATCHED = 1, 2, 4, 8
 """Bits of a sample's flags."""

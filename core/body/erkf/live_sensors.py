@@ -14,10 +14,10 @@ from sagittal.core.body.live_estimator import FootBlock, MeasuredBlock
 from sagittal.core.body.live_still import StillnessDetector
 from sagittal.core.body.model import BodyModel
 from sagittal.core.body.tree import person_tree
-from sagittal.core.calibration.result import SegmentCalibration
 from sagittal.core.frames import GRAVITY, R_NEUTRAL, Floats, Segment
-from sagittal.core.rest import count_runs
 from sagittal.core.rotation import from_matrix, multiply
+from sagittal.core.signals.calibrated import SegmentCalibration
+from sagittal.core.signals.rest import count_runs
 from sagittal.core.timeline.columns import find_columns, take_columns, take_mask
 
 

@@ -27,14 +27,14 @@ from sagittal.core.body.model import BodyModel
 from sagittal.core.body.places import joint_places, sensor_place
 from sagittal.core.body.poses import Poses, figure_precision
 from sagittal.core.body.tree import ImuTree, person_tree
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.estimators import ERKF, LINKED_PATHS, SINGLE_PATHS
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.held_samples import cut_blocks
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import find_runs
 from sagittal.core.rotation import from_matrix, multiply, rotate
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.held_samples import cut_blocks
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import find_runs
 
 NEAR_START_S = 1.0
 """Rest that begins so early is a standing start."""

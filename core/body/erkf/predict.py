@@ -12,7 +12,6 @@ import numba
 
 from sagittal.core.body.erkf.lanes import IN_LINE, mix, read_columns, read_lanes, write_columns, write_lanes
 from sagittal.core.frames import GRAVITY
-from sagittal.core.inner import inner_njit
 from sagittal.core.rotation.compiled import (
     multiply3,
     sine_quotients,
@@ -21,6 +20,7 @@ from sagittal.core.rotation.compiled import (
     to_matrix,
     turn,
 )
+from sagittal.core.signals.inner import inner_njit
 
 A, S, D, GAMMA, C = range(5)
 """Blocks of F per IMU, δv'=δv+A δθ+D δb_g+C δb_a, δp'=δp+Δt δv+½Δt(δv'−δv), δθ'=S δθ+Γ δb_g."""

@@ -27,7 +27,7 @@ from sagittal.core.body.erkf.kernel import filter_segments, row_length
 from sagittal.core.body.erkf.params import ErkfParams
 from sagittal.core.body.tree import ImuTree
 from sagittal.core.errors import ParameterError
-from sagittal.core.memory import make_pages
+from sagittal.core.signals.memory import make_pages
 
 SEGMENT = 128
 """Samples per segment, at least: 21 MB of kept states for ten minutes of seven sensors, and a record of 8 MB.

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from sagittal.core.body.erkf.predict import propagate_back, propagate_error
 from sagittal.core.body.erkf.updates import back_correct
-from sagittal.core.inner import inner_njit
 from sagittal.core.rotation.compiled import turn
+from sagittal.core.signals.inner import inner_njit
 
 
 @inner_njit(_nrt=False)

@@ -13,8 +13,8 @@ from math import atan2, sqrt
 import numba
 
 from sagittal.core.body.erkf.lanes import IN_LINE, mix, read_lanes, spread, write_lanes
-from sagittal.core.inner import inner_njit
 from sagittal.core.rotation.compiled import skew, times_cross, wrap_angle
+from sagittal.core.signals.inner import inner_njit
 
 FIRST, SECOND, UNIT, TURNS = range(4)
 """A block's place: first error of its IMUs (SECOND is −1 for one IMU), offset of the ±1 (−1: none), whether

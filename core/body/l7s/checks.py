@@ -19,8 +19,8 @@ from sagittal.core.body.health import longest_run_s
 from sagittal.core.body.l7s.filter import L7sInputs, L7sTrack
 from sagittal.core.body.l7s.legs import LegModel
 from sagittal.core.frames import Bools, Floats, Segment
-from sagittal.core.held_samples import cut_blocks
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.held_samples import cut_blocks
+from sagittal.core.signals.rest import find_runs
 
 OUTWARD: Final = (-0.5, 2.0)
 """Left foot left of the right one, in hip widths; healthy walks stay within 0 to 1.3, scissoring aside."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from sagittal.core.body.l7s.updates import WIDTH, inject
 from sagittal.core.body.se3 import move_pose
-from sagittal.core.inner import inner_njit
+from sagittal.core.signals.inner import inner_njit
 
 MOST: Final = 4
 """Rows: two of a leg."""

@@ -23,9 +23,9 @@ from sagittal.core.body.l7s.filter import L7sInputs
 from sagittal.core.body.l7s.inputs import L7sTake
 from sagittal.core.body.l7s.legs import LEGS, LegModel
 from sagittal.core.frames import Bools, Floats
-from sagittal.core.held_samples import cut_blocks, is_complete
-from sagittal.core.inner import inner_njit
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.held_samples import cut_blocks, is_complete
+from sagittal.core.signals.inner import inner_njit
+from sagittal.core.signals.rest import find_runs
 
 ROLLS: Final = radians(20.0)
 """Rise of the heel up to which the ball is taken to stay. Later the foot rolls on over its toes: up to 30° a

@@ -13,13 +13,13 @@ import numpy as np
 
 from sagittal.core.body.l7s.filter import L7sInputs, Worn
 from sagittal.core.body.l7s.legs import BODIES, LEGS, LegModel
-from sagittal.core.calibration.result import CalibratedRecording, SegmentCalibration
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import FOOT, GRAVITY, Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.held_samples import SampleSeries
-from sagittal.core.recording import SensorSignals
 from sagittal.core.rotation.compiled import multiply3, to_matrix, transform
+from sagittal.core.signals.calibrated import CalibratedRecording, SegmentCalibration
+from sagittal.core.signals.held_samples import SampleSeries
+from sagittal.core.signals.recording import SensorSignals
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

@@ -7,8 +7,8 @@ import numpy as np
 
 from sagittal.core.body.l7s.constraints import make_scratch, project
 from sagittal.core.body.l7s.updates import VELOCITY, WIDTH, N, apply_rows, inject, make_form, reset
-from sagittal.core.inner import inner_njit
 from sagittal.core.rotation.compiled import log_so3
+from sagittal.core.signals.inner import inner_njit
 
 
 @inner_njit(_nrt=False)

@@ -20,10 +20,10 @@ from sagittal.core.body.l7s.inputs import KnownSamples, arrange_inputs, bodies_o
 from sagittal.core.body.l7s.legs import FIGURE, LegModel, solve_legs
 from sagittal.core.body.live_estimator import BodyBlock, MeasuredBlock
 from sagittal.core.body.model import BodyModel
-from sagittal.core.calibration.result import SegmentCalibration
 from sagittal.core.errors import EstimationError, Notice
 from sagittal.core.estimators import L7S_2I, L7S_3I, LIVE_SINGLE_PATHS, LiveMethod
 from sagittal.core.frames import Bools, Segment
+from sagittal.core.signals.calibrated import SegmentCalibration
 
 
 class LiveL7s:

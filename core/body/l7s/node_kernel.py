@@ -15,7 +15,7 @@ from typing import Final
 import numba
 import numpy as np
 
-from sagittal.core.inner import inner_njit
+from sagittal.core.signals.inner import inner_njit
 
 SIZE: Final = 9
 """Places of a node: pelvis, left foot, right foot."""

@@ -25,8 +25,8 @@ from sagittal.core.errors import Notice
 from sagittal.core.estimators import L7S_2I, L7S_3I
 from sagittal.core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.held_samples import SampleSeries, cut_blocks, give_pages_back, make_room
 from sagittal.core.rotation import angle_between, from_matrix
+from sagittal.core.signals.held_samples import SampleSeries, cut_blocks, give_pages_back, make_room
 
 STRETCHED_M: Final = 1e-6
 """A leg this close to its full length is at the bound: the knee is within .2° of straight. The projection

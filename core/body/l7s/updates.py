@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from sagittal.core.body.se3 import move_pose, right_jacobian
-from sagittal.core.inner import inner_njit
+from sagittal.core.signals.inner import inner_njit
 
 N = 27
 """Length of the error vector."""

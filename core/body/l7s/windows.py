@@ -20,7 +20,7 @@ from sagittal.core.body.l7s.inputs import L7sTake
 from sagittal.core.body.l7s.legs import LEGS
 from sagittal.core.body.l7s.smoother import NODE_S, find_hop, smooth_track
 from sagittal.core.frames import Bools, Floats
-from sagittal.core.held_samples import SHORT
+from sagittal.core.signals.held_samples import SHORT
 
 WHOLE: Final = SHORT
 """Samples up to which a take is one window, and 200 MB."""

@@ -16,8 +16,8 @@ from sagittal.core.activity.result import ActivityResult
 from sagittal.core.errors import SignalError
 from sagittal.core.frames import GRAVITY
 from sagittal.core.pipeline import analyse
-from sagittal.core.recording import Recording, Subject, as_long_stream
-from sagittal.core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.signals.recording import Recording, Subject, as_long_stream
+from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 from sagittal.core.simulate import MOVEMENTS
 from sagittal.core.simulate.chest import ChestSimulation, ChestStyle, Day, PostureHold, simulate_day
 from sagittal.core.simulate.daily import DailyItem, DailySimulation, plan_daily_life, simulate_daily_life

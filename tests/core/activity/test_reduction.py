@@ -13,7 +13,7 @@ from sagittal.core.activity.reduction import follow_up, reduce_stream, working_r
 from sagittal.core.errors import SignalError
 from sagittal.core.frames import GRAVITY, Floats
 from sagittal.core.rotation import about, conjugate, rotate
-from sagittal.core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 
 PARAMS = ActivityParams(slab_s=60, margin_s=5)
 

@@ -12,7 +12,7 @@ from sagittal.core.agreement import Agreement, AgreementParams, check_agreement
 from sagittal.core.agreement.agree import compare_sensors
 from sagittal.core.agreement.exchange import LEGS, SWAPS, Swap, find_exchange, undo_exchange
 from sagittal.core.agreement.params import ExchangeParams
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from tests.helpers.walks import only, simulated
 
 

@@ -14,7 +14,7 @@ from sagittal.core.agreement.lags import find_drifts, find_sensor_lags
 from sagittal.core.agreement.params import JointParams, LagParams
 from sagittal.core.agreement.windows import JointWindows, compare_at_joint
 from sagittal.core.frames import Segment
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from tests.helpers.perturbations import delay_sensor
 from tests.helpers.walks import only, simulated
 

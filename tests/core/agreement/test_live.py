@@ -14,7 +14,7 @@ from sagittal.core.agreement.live_terms import LiveTerms, RawSecond
 from sagittal.core.agreement.params import JointParams
 from sagittal.core.agreement.terms import find_terms
 from sagittal.core.errors import Notice
-from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
 from tests.helpers.live_agreement import find_standings, listen
 from tests.helpers.perturbations import delay_sensor, slip_sensor
 from tests.helpers.walks import only, simulated

@@ -11,7 +11,7 @@ import pytest
 from sagittal.core.agreement.live_comparison import SensorComparison, Verdict
 from sagittal.core.agreement.live_terms import RawSecond
 from sagittal.core.agreement.params import LiveAgreementParams
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from tests.helpers.perturbations import delay_sensor
 from tests.helpers.walks import only, simulated
 

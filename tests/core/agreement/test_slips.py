@@ -12,11 +12,11 @@ from sagittal.core.agreement.params import SlipParams
 from sagittal.core.agreement.repair import turn_back
 from sagittal.core.agreement.slips import SensorSlip
 from sagittal.core.agreement.strides import find_main_axis
+from sagittal.core.angles.withheld import withhold_at_slips
 from sagittal.core.frames import Floats, Segment
 from sagittal.core.pipeline import resume
-from sagittal.core.recording import SensorSignals, UniformRecording
 from sagittal.core.rotation import exp, rotate
-from sagittal.core.withheld import withhold_at_slips
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
 from tests.helpers.perturbations import find_middle, slip_sensor
 from tests.helpers.walks import analysed, only, simulated
 

@@ -11,7 +11,7 @@ from sagittal.core.agreement import AgreementParams, check_agreement
 from sagittal.core.agreement.params import SlipParams
 from sagittal.core.frames import Segment
 from sagittal.core.pipeline import resume
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from tests.helpers.perturbations import slip_sensor
 from tests.helpers.walks import analysed, cut, neura_walk, only, simulated
 

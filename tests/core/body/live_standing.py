@@ -8,9 +8,9 @@ import numpy as np
 
 from sagittal.core.body import BodyModel
 from sagittal.core.body.live_estimator import MeasuredBlock
-from sagittal.core.calibration.result import SegmentCalibration
 from sagittal.core.frames import GRAVITY, R_NEUTRAL, Floats, Segment
 from sagittal.core.rotation import from_matrix
+from sagittal.core.signals.calibrated import SegmentCalibration
 
 RATE: Final = 100.0
 BODY: Final = BodyModel.from_height(1.7)

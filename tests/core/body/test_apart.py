@@ -10,7 +10,7 @@ import pytest
 
 from sagittal.core.frames import SIDES, Floats, Side
 from sagittal.core.pipeline import TakeAnalysis, analyse
-from sagittal.core.recording import Recording, Subject
+from sagittal.core.signals.recording import Recording, Subject
 from sagittal.core.simulate import simulate_scenario
 from sagittal.core.timeline import synchronise
 

@@ -15,11 +15,11 @@ from sagittal.core.body.model import BodyModel
 from sagittal.core.body.places import joint_places, sensor_place
 from sagittal.core.body.tree import PRESETS, person_tree
 from sagittal.core.calibration import calibrate
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.frames import Floats, Segment
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.rotation import about, conjugate, multiply, rotate, to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.simulate.soft_tissue import SoftTissue, skin_motion
 from tests.helpers.walks import simulated
 

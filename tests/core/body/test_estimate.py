@@ -21,7 +21,7 @@ from sagittal.core.errors import EstimationError
 from sagittal.core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import LastReading
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.simulate import WalkTruth
 from tests.helpers.walks import only, simulated
 

@@ -11,8 +11,8 @@ from sagittal.core.body.estimate import PoseEstimate
 from sagittal.core.body.health import HealthFinding, find_worst_verdict, longest_run_s
 from sagittal.core.frames import FOOT, Segment
 from sagittal.core.pipeline import TakeAnalysis, analyse
-from sagittal.core.recording import Recording, UniformRecording
 from sagittal.core.rotation import about, rotate
+from sagittal.core.signals.recording import Recording, UniformRecording
 from sagittal.core.simulate import simulate_scenario
 from tests.core.body.test_estimate import estimated
 from tests.helpers.marks import sweep_after

@@ -6,7 +6,7 @@ import numpy as np
 
 from sagittal.core.body.still import FOOT_STILL, contact_samples, still_samples
 from sagittal.core.frames import GRAVITY, Bools, Floats
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.rest import find_runs
 
 RATE = 100.0
 

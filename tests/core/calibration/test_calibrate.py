@@ -9,11 +9,11 @@ import pytest
 
 from sagittal.core.calibration import CalibrationParams, calibrate
 from sagittal.core.calibration.anterior import Method
-from sagittal.core.calibration.result import Calibration
 from sagittal.core.errors import CalibrationError, SignalError
 from sagittal.core.frames import SEGMENTS, Floats, Segment
-from sagittal.core.recording import UniformRecording
 from sagittal.core.rotation import exp, from_matrix, log, normalise, rotate, to_matrix
+from sagittal.core.signals.calibrated import Calibration
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.simulate import Arc, Pivot, Stand, Straight, WalkTruth
 from tests.helpers.walks import TOGETHER, cut, only, scripted, simulated, turned
 

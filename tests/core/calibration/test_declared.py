@@ -11,9 +11,9 @@ import pytest
 from sagittal.core.calibration.declared import propose_mountings
 from sagittal.core.calibration.mounting import WAYS, Way, say_other_way
 from sagittal.core.frames import SEGMENTS, Segment
-from sagittal.core.recording import UniformRecording
 from sagittal.core.rotation import rotate
 from sagittal.core.setup.repair import SetupRepair
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.simulate import WalkTruth
 from tests.helpers.walks import cut, only, simulated
 

@@ -13,8 +13,8 @@ from sagittal.core.calibration.sensor_in_walk import WalkRungParams, find_flat_m
 from sagittal.core.errors import CalibrationError
 from sagittal.core.frames import Floats, Segment
 from sagittal.core.fusion.mahony import estimate_orientations
-from sagittal.core.recording import UniformRecording
 from sagittal.core.rotation import angle_between, exp, rotate, wrap_angle, yaw
+from sagittal.core.signals.recording import UniformRecording
 from tests.helpers.walks import cut, only, simulated, turned
 
 START_S, END_S = 8.0, 20.0

@@ -14,15 +14,15 @@ from sagittal.core.angles.measure import measure_angles
 from sagittal.core.calibration import calibrate
 from sagittal.core.calibration.functional import FunctionalParams, find_functional_movements
 from sagittal.core.calibration.live_attempt import WornSensors
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.calibration.score import score_calibration
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import SEGMENTS, Segment
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.online.calibrating import LiveCalibrator
-from sagittal.core.recording import UniformRecording
-from sagittal.core.rest import find_runs
 from sagittal.core.rotation import to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.recording import UniformRecording
+from sagittal.core.signals.rest import find_runs
 from sagittal.core.simulate import FunctionalTruth, RecordingSetup, SwingsAndBows, simulate_swings_and_bows
 from sagittal.core.timeline import synchronise
 from tests.helpers.live_agreement import cut_blocks

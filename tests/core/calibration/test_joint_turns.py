@@ -9,8 +9,8 @@ import pytest
 
 from sagittal.core.calibration.joint_turns import JointTurnParams, measure_joint_turns
 from sagittal.core.frames import Floats, Segment
-from sagittal.core.recording import UniformRecording
 from sagittal.core.rotation import about, multiply, wrap_angle
+from sagittal.core.signals.recording import UniformRecording
 from tests.helpers.walks import only, simulated
 
 WALK: tuple[int, int] = (700, 1500)

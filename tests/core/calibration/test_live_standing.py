@@ -7,8 +7,8 @@ import pytest
 
 from sagittal.core.calibration.live_standing import cut_last_part, find_upward_axes, judge_standing
 from sagittal.core.frames import GRAVITY, Bools, Segment
-from sagittal.core.recording import SensorSignals, Subject, UniformRecording
-from sagittal.core.rest import RestParams
+from sagittal.core.signals.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.signals.rest import RestParams
 
 RATE = 50.0
 N = 500

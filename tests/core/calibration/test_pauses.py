@@ -12,7 +12,7 @@ from sagittal.core.calibration.standing import LEG_AHEAD, drop_pauses, measure_l
 from sagittal.core.errors import CalibrationError, SignalError
 from sagittal.core.frames import Segment
 from sagittal.core.pipeline import analyse
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.simulate import Stand, Straight, simulate_scenario
 from tests.helpers.real_takes import NAMES, cut_recording, read_take
 from tests.helpers.walks import TOGETHER, cut, only, scripted, simulated

@@ -9,10 +9,10 @@ from sagittal.core.angles.measure import measure_angles
 from sagittal.core.body import forward_kinematics, nominal_body
 from sagittal.core.calibration import CalibrationParams, calibrate
 from sagittal.core.calibration.anterior import Method
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import SagittalError
 from sagittal.core.fusion.mahony import estimate_orientations
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.simulate import simulate_scenario
 from sagittal.core.timeline import synchronise
 from tests.helpers.walks import cut, only, rms_deg, simulated

@@ -11,7 +11,6 @@ import pytest
 from sagittal.core.agreement import Agreement
 from sagittal.core.calibration import calibrate
 from sagittal.core.calibration.knee_axis import find_knee_axes
-from sagittal.core.calibration.result import CalibratedRecording, SegmentCalibration
 from sagittal.core.calibration.score import (
     RULES,
     CalibrationCheck,
@@ -21,8 +20,9 @@ from sagittal.core.calibration.score import (
     score_calibration,
 )
 from sagittal.core.frames import Floats, Segment
-from sagittal.core.rest import index_window
 from sagittal.core.rotation import about, exp, multiply, rotate, to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording, SegmentCalibration
+from sagittal.core.signals.rest import index_window
 from tests.helpers.walks import only, simulated
 
 

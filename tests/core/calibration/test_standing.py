@@ -18,8 +18,8 @@ from sagittal.core.calibration.standing import (
 )
 from sagittal.core.errors import SignalError
 from sagittal.core.frames import Floats
-from sagittal.core.recording import SensorSignals, Subject, UniformRecording
-from sagittal.core.rest import RestParams
+from sagittal.core.signals.recording import SensorSignals, Subject, UniformRecording
+from sagittal.core.signals.rest import RestParams
 
 RATE = 100.0
 

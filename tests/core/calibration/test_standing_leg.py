@@ -10,10 +10,10 @@ import pytest
 
 from sagittal.core.calibration.fixed_offset import make_fixed_mounts
 from sagittal.core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.calibration.standing_leg import find_standing_legs
 from sagittal.core.frames import FOOT, SIDES, Segment
 from sagittal.core.rotation import about, to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.simulate import SquatSimulation, simulate_movement
 from sagittal.core.timeline import synchronise
 

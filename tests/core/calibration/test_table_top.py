@@ -13,8 +13,8 @@ from sagittal.core.calibration.fixed_offset import make_fixed_mounts
 from sagittal.core.calibration.table_top import TableTopParams, calibrate_table_top
 from sagittal.core.errors import CalibrationError
 from sagittal.core.frames import R_NEUTRAL, Floats, Segment
-from sagittal.core.recording import SensorSignals, Subject, UniformRecording
 from sagittal.core.rotation import angle_between, conjugate, exp, from_matrix, log, multiply
+from sagittal.core.signals.recording import SensorSignals, Subject, UniformRecording
 from sagittal.core.simulate.mems import MEMS, SensorNoise, add_sensor_errors
 from sagittal.core.simulate.sensors import SensorPath, SimulatedSignals, ideal_signals
 from sagittal.core.simulate.shapes import smoothstep

@@ -15,8 +15,8 @@ from sagittal.core.calibration.walking import (
     turning_mask,
 )
 from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
-from sagittal.core.recording import SensorSignals, Subject, UniformRecording
 from sagittal.core.rotation import about, exp, multiply
+from sagittal.core.signals.recording import SensorSignals, Subject, UniformRecording
 
 RATE = 50.0
 N = 1000

@@ -17,10 +17,10 @@ from sagittal.core.change import (
 )
 from sagittal.core.frames import SIDES, Side
 from sagittal.core.norms import NormValue
+from sagittal.core.norms.scores import Score
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.parameters.symmetry import compare_sides
 from sagittal.core.parameters.variability import summarise_values
-from sagittal.core.scores import Score
 
 
 def parameter(name: str, mean: float | None, side: Side | None = None, unit: str = "deg") -> Parameter:

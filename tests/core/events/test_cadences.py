@@ -10,7 +10,7 @@ from sagittal.core.events.consensus import agree_on_contacts, all_detectors
 from sagittal.core.events.lumbar import detect_steps
 from sagittal.core.frames import SIDES
 from sagittal.core.fusion.mahony import estimate_orientations
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.simulate.script import Stand, Straight
 from sagittal.core.simulate.truth import WalkTruth
 from tests.helpers.event_scoring import match

@@ -14,8 +14,8 @@ from sagittal.core.events.lumbar import detect_steps
 from sagittal.core.events.periodicity import step_times
 from sagittal.core.events.steps import Steps
 from sagittal.core.frames import GRAVITY, SIDES, Floats
-from sagittal.core.recording import SensorSignals, Subject, UniformRecording
 from sagittal.core.rotation import normalise
+from sagittal.core.signals.recording import SensorSignals, Subject, UniformRecording
 from sagittal.core.simulate import SCRIPTS
 from tests.helpers.event_scoring import match
 from tests.helpers.marks import slow_after

@@ -10,7 +10,7 @@ import pytest
 from sagittal.core.flags import judge_flags
 from sagittal.core.frames import SIDES
 from sagittal.core.parameters.result import CycleCurves
-from sagittal.core.standing_angles import NAMES
+from sagittal.core.subject.standing_angles import NAMES
 from tests.helpers.wbds import people
 
 OFTEN = {"knee_hyperextension": 0.15}

@@ -11,7 +11,7 @@ import numpy as np
 from sagittal.core.formats import SourceFile
 from sagittal.core.formats.draft import signal_digest
 from sagittal.core.frames import Floats, Segment
-from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.signals.recording import ImuStream, Recording
 
 HEAD = "// Start Time: Unknown\n// Update Rate: {rate:.1f}Hz\n// Filter Profile: human (46.1)\n"
 

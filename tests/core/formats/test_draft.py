@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sagittal.core.formats.draft import has_whole_row, signal_digest
-from sagittal.core.held_samples import AT_A_TIME
+from sagittal.core.signals.held_samples import AT_A_TIME
 
 
 @settings(max_examples=60, deadline=None)

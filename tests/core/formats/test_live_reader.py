@@ -22,7 +22,7 @@ from sagittal.core.formats.live_log import (
     scan,
 )
 from sagittal.core.formats.live_reader import read_live_log
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 from sagittal.core.timeline import synchronise
 from tests.helpers.live import SMALL_HELLO, LiveTake, send, shared, small, small_batch
 from tests.helpers.walks import neura_recording

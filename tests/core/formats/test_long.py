@@ -10,8 +10,8 @@ import pytest
 from sagittal.core.errors import ManifestError, SignalError
 from sagittal.core.formats import SourceFile, manifest_of, read_recording, reader, table, write_recording
 from sagittal.core.quality import describe
-from sagittal.core.recording import Recording
-from sagittal.core.sample_blocks import LongStream
+from sagittal.core.signals.recording import Recording
+from sagittal.core.signals.sample_blocks import LongStream
 from sagittal.core.simulate.daily import DailyItem, record_daily_life, simulate_daily_life
 from sagittal.core.timeline import synchronise
 

@@ -12,7 +12,7 @@ from sagittal.core.errors import ManifestError
 from sagittal.core.formats.aliases import segment_in, segment_named
 from sagittal.core.formats.manifest import manifest_of, parse_manifest
 from sagittal.core.formats.source_spec import Channels
-from sagittal.core.shoe import Shoe
+from sagittal.core.subject.shoe import Shoe
 
 SOURCE = {"file": "a.csv", "acc_unit": "g", "columns": {"foot_l": {"acc": ["x", "y", "z"]}}}
 

@@ -16,8 +16,8 @@ from sagittal.core.errors import FormatError, Notice
 from sagittal.core.formats import SourceFile, read_recording, write_recording
 from sagittal.core.formats.manifest import manifest_of
 from sagittal.core.quality import describe
-from sagittal.core.recording import ImuStream, Recording, Subject
-from sagittal.core.shoe import Shoe
+from sagittal.core.signals.recording import ImuStream, Recording, Subject
+from sagittal.core.subject.shoe import Shoe
 from tests.core.formats.making import mt_file, signals, source, stream
 
 

@@ -10,7 +10,7 @@ import pytest
 from sagittal.core import rotation
 from sagittal.core.errors import FormatError, InputError
 from sagittal.core.formats import SourceFile, parse_manifest, read_recording, write_recording
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 from tests.data import data_folder
 from tests.helpers.ipol import ipol_recording
 

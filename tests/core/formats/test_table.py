@@ -9,7 +9,7 @@ from sagittal.core.errors import FormatError, ManifestError
 from sagittal.core.formats import manifest_of, read_recording
 from sagittal.core.formats.table import open_long_table
 from sagittal.core.formats.text import describe_columns, number_columns
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 from tests.core.formats.making import signals, source
 
 ACC, GYR = signals(300)

@@ -9,7 +9,7 @@ import pytest
 
 from sagittal.core.errors import FormatError
 from sagittal.core.formats import SourceFile, parse_manifest, read_recording
-from sagittal.core.recording import ImuStream
+from sagittal.core.signals.recording import ImuStream
 from tests.core.formats.making import HEAD, mt_file, mt_text, signals, source
 
 ACC, GYR = signals(300, still=100)

@@ -6,7 +6,7 @@ import pytest
 
 from sagittal.core.errors import InputError
 from sagittal.core.formats import SourceFile, read_recording
-from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.signals.recording import ImuStream, Recording
 
 
 def read(data: bytes, name: str = "x.bin") -> Recording:

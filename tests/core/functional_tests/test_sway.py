@@ -10,7 +10,7 @@ import pytest
 from sagittal.core.frames import Segment
 from sagittal.core.functional_tests.result import FunctionalTest
 from sagittal.core.functional_tests.sway import measure_sway
-from sagittal.core.recording import GivenLimits
+from sagittal.core.signals.recording import GivenLimits
 from sagittal.core.simulate import RecordingSetup
 from sagittal.core.simulate.mems import MEMS
 from sagittal.core.simulate.standing import Sway, SwaySimulation, simulate_sway

@@ -16,7 +16,7 @@ from sagittal.core.functional_tests.result import FunctionalTest
 from sagittal.core.functional_tests.rising import find_changes
 from sagittal.core.functional_tests.trunk import TrunkMotion, follow_trunk
 from sagittal.core.functional_tests.tug import measure_tug
-from sagittal.core.recording import GivenLimits, Recording, UniformRecording
+from sagittal.core.signals.recording import GivenLimits, Recording, UniformRecording
 from sagittal.core.simulate import PostureHold, simulate_day
 from sagittal.core.simulate.scripts import ON_SKIN
 from sagittal.core.simulate.tug import ChairTruth, simulate_chair_rises, simulate_tug

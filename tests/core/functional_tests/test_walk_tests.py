@@ -10,8 +10,8 @@ from sagittal.core.events.turns import Turn
 from sagittal.core.frames import SIDES
 from sagittal.core.functional_tests.result import FunctionalTest
 from sagittal.core.functional_tests.walks import measure_six_minutes, measure_ten_metres
-from sagittal.core.measure import MeasuredGait
-from sagittal.core.recording import GivenLimits
+from sagittal.core.parameters.measure import MeasuredGait
+from sagittal.core.signals.recording import GivenLimits
 
 
 def walk(

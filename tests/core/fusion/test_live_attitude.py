@@ -12,13 +12,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sagittal.core.calibration.result import SegmentCalibration
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import GRAVITY, R_NEUTRAL, Bools, Floats
 from sagittal.core.fusion.attitude import AttitudeParams, AttitudeState, advance
 from sagittal.core.fusion.live_attitude import AttitudeTracker
 from sagittal.core.fusion.live_rest import RESTED_S
 from sagittal.core.rotation import about, angle_between, conjugate, from_matrix, multiply, rotate, to_matrix
+from sagittal.core.signals.calibrated import SegmentCalibration
 
 RATE, N = 100.0, 300
 BIAS = np.array([0.02, -0.01, 0.03])

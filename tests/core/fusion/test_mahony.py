@@ -10,14 +10,14 @@ import pytest
 
 from sagittal.core.angles.measure import measure_angles
 from sagittal.core.calibration import calibrate
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import R_NEUTRAL, Floats, Segment
 from sagittal.core.fusion.attitude import attitude_kernel, compile_attitude_kernel
 from sagittal.core.fusion.drift import DriftParams
 from sagittal.core.fusion.mahony import MahonyParams, estimate_orientations
-from sagittal.core.rest import index_window
 from sagittal.core.rotation import about, angle_between, from_matrix, mean, multiply, normalise, rotate, yaw
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.rest import index_window
 from tests.helpers.walks import lost, only, rms_deg, simulated, turned
 
 NO_DRIFT = MahonyParams(drift=DriftParams(reference_s=1e9))

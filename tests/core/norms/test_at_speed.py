@@ -24,10 +24,10 @@ from sagittal.core.norms.at_speed import (
     walkway_values_at_speed,
 )
 from sagittal.core.norms.profile import NINE, SAGITTAL
+from sagittal.core.norms.scores import score_curves
 from sagittal.core.norms.speed import COMFORTABLE, NORM_LEG_M, SLOWEST, walking_speed
 from sagittal.core.norms.tables import read_rows
-from sagittal.core.scores import score_curves
-from tests.core.test_scores import session
+from tests.core.norms.test_scores import session
 
 FIGURES = {
     "knee_flexion_peak_swing": "knee_flexion_max_swing_deg",

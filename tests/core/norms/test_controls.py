@@ -11,10 +11,10 @@ import pytest
 from sagittal.core.frames import SIDES, Floats, Side
 from sagittal.core.norms.controls import ControlSession, control_group, mean_curves
 from sagittal.core.norms.profile import NINE
+from sagittal.core.norms.scores import score_curves
 from sagittal.core.norms.values import Sex
 from sagittal.core.parameters.kinematic import MEAN_ZERO
 from sagittal.core.parameters.result import CycleCurves, Parameter
-from sagittal.core.scores import score_curves
 from tests.helpers.wbds import people
 
 

@@ -10,7 +10,7 @@ from sagittal.core.norms.functional import (
     find_six_minute_norm,
     find_test_norm,
 )
-from sagittal.server.report.functional import NO_AGE, NO_SEX, OTHER_AGE, norm_words
+from sagittal.server.report.view.functional import NO_AGE, NO_SEX, OTHER_AGE, norm_words
 
 
 @pytest.mark.parametrize(

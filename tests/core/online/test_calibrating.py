@@ -21,8 +21,8 @@ from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.online.calibrated import LiveCalibration
 from sagittal.core.online.calibrating import LiveCalibrator
 from sagittal.core.online.frame import CalibrationView, Stage
-from sagittal.core.recording import Subject, UniformRecording
 from sagittal.core.rotation import conjugate, exp, multiply, rotate
+from sagittal.core.signals.recording import Subject, UniformRecording
 from sagittal.core.simulate import Arc, Pivot, Stand, Straight
 from sagittal.core.timeline.live import UniformBlock
 from tests.helpers.walks import TOGETHER, cut, lost, neura_walk, only, scripted, simulated

@@ -17,11 +17,11 @@ from sagittal.core.events.result import GaitEvent, GaitEvents
 from sagittal.core.formats.live_log import FILE_MARK, decode_batch, encode_batch, record, scan
 from sagittal.core.frames import FOOT, SIDES, Segment
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.measure import MeasuredGait, Tracks, measure_gait
 from sagittal.core.online import LiveFrame, LiveStride, OnlineSession
 from sagittal.core.online.chain import COURSES
 from sagittal.core.parameters.live_stride import NOT_YET
-from sagittal.core.recording import UniformRecording
+from sagittal.core.parameters.measure import MeasuredGait, Tracks, measure_gait
+from sagittal.core.signals.recording import UniformRecording
 from tests.helpers.live_walks import Run, batches, hello_of, live, recorded
 from tests.helpers.marks import sweep_after
 from tests.helpers.walks import cut, lost, neura_walk, only, simulated

@@ -11,7 +11,7 @@ import pytest
 
 from sagittal.core.frames import FOOT, SIDES, Segment
 from sagittal.core.online import LiveStride
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.simulate.script import Arc, Script, Stand, Straight
 from tests.helpers.live_walks import live
 from tests.helpers.walks import cut, only, scripted, simulated

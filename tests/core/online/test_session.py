@@ -15,7 +15,7 @@ from sagittal.core.frames import SIDES, Segment
 from sagittal.core.online import LiveFrame, LiveStride
 from sagittal.core.online.session import OnlineSession
 from sagittal.core.parameters.spatial import NAMES as SPATIAL
-from sagittal.core.recording import SensorSignals, UniformRecording
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
 from tests.helpers.live_walks import batches, hello_of, live, recorded
 from tests.helpers.perturbations import delay_sensor
 from tests.helpers.walks import cut, lost, only, simulated

@@ -11,7 +11,6 @@ import pytest
 from sagittal.core.activity.parameters import MEASURES as DAILY
 from sagittal.core.events.result import Stride
 from sagittal.core.functional_tests import chair, sway, tug, walks
-from sagittal.core.measure import measure_gait
 from sagittal.core.norms.values import angle_values, temporal_values
 from sagittal.core.parameters.catalogue import (
     CATALOGUE,
@@ -33,10 +32,11 @@ from sagittal.core.parameters.catalogue.support import ENTRIES as SUPPORT
 from sagittal.core.parameters.catalogue.times import ENTRIES as TIMES
 from sagittal.core.parameters.catalogue.trunk import ENTRIES as OF_TRUNK
 from sagittal.core.parameters.catalogue.walking import ENTRIES as WALKS
+from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.parameters.temporal import stride_values
 from sagittal.core.simulate import simulate_scenario
 from sagittal.core.squat.measures import MEASURES
-from sagittal.server.report.wording import REASONS
+from sagittal.server.report.words.wording import REASONS
 from tests.helpers.parameter_page import PAGE, render_page
 from tests.helpers.true_walks import true_tracks
 

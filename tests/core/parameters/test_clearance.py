@@ -11,7 +11,6 @@ from sagittal.core.body.feet import FootTracks
 from sagittal.core.body.kinematics import nominal_body
 from sagittal.core.body.model import BodyModel
 from sagittal.core.frames import FOOT, R_NEUTRAL, SIDES, Floats, Side
-from sagittal.core.measure import measure_gait
 from sagittal.core.parameters.clearance import (
     SoleHeights,
     lay_out,
@@ -19,9 +18,10 @@ from sagittal.core.parameters.clearance import (
     sole_heights,
     toe_clearance,
 )
+from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.rotation import about, from_matrix, multiply, rotate
-from sagittal.core.shoe import Shoe
 from sagittal.core.simulate import simulate_scenario
+from sagittal.core.subject.shoe import Shoe
 from tests.helpers.true_walks import true_tracks
 
 ANKLE = 0.08

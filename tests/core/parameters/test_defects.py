@@ -12,9 +12,9 @@ from sagittal.core.body.feet import FootTracks
 from sagittal.core.body.model import BodyModel
 from sagittal.core.events.result import Stride, Strides
 from sagittal.core.frames import SIDES, Floats, Side
-from sagittal.core.measure import measure_gait
 from sagittal.core.parameters import stride_values, summarise_times
 from sagittal.core.parameters.catalogue import unit_of
+from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.parameters.rows import read_row
 from sagittal.core.parameters.spatial import measure_distances

@@ -12,7 +12,7 @@ from sagittal.core.body.model import BodyModel
 from sagittal.core.events.result import Stride, Strides
 from sagittal.core.frames import SIDES, Side
 from sagittal.core.parameters.flats import OTHER, STANCE_SHARE, find_flats
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.rest import find_runs
 
 N = 3000
 BODY = BodyModel(hip_width=0.18, thigh=0.42, shank=0.42, ankle_height=0.08, foot=0.26, estimated=True)

@@ -13,7 +13,7 @@ from sagittal.core.body.feet import FootTracks
 from sagittal.core.body.model import BodyModel
 from sagittal.core.events.result import Stride, Strides
 from sagittal.core.frames import SIDES, Floats, Segment, Side
-from sagittal.core.measure import measure_gait
+from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.parameters.phases import NAMES, measure_phases
 from sagittal.core.parameters.rows import Row, read_row, side_parameters
 from sagittal.core.parameters.stance import find_stances

@@ -10,7 +10,7 @@ import pytest
 from sagittal.core.events.result import Strides
 from sagittal.core.events.strides import stride_list
 from sagittal.core.frames import SIDES
-from sagittal.core.measure import Tracks
+from sagittal.core.parameters.measure import Tracks
 from sagittal.core.parameters.spatial import NAMES as SPATIAL
 from sagittal.core.parameters.spatial import Surface
 from sagittal.core.parameters.stance import NAMES as STANCE

@@ -12,7 +12,7 @@ from sagittal.core.events.bouts import Bout
 from sagittal.core.events.result import Stride, Strides
 from sagittal.core.events.steps import Step, Steps
 from sagittal.core.frames import Floats
-from sagittal.core.measure import measure_gait
+from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.parameters.trunk import NAMES, choose_foot, harmonic_ratios, trunk_regularity
 from sagittal.core.parameters.walking import step_strides

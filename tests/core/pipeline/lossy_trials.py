@@ -13,8 +13,8 @@ from sagittal.core.estimators import Requested
 from sagittal.core.frames import Bools, Floats, Protocol, Segment
 from sagittal.core.pipeline import PipelineConfig
 from sagittal.core.pipeline.config import Detector
-from sagittal.core.recording import ImuStream, Recording, Subject
-from sagittal.core.rest import find_runs
+from sagittal.core.signals.recording import ImuStream, Recording, Subject
+from sagittal.core.signals.rest import find_runs
 from sagittal.core.simulate import (
     RecordingSetup,
     Walker,

@@ -14,7 +14,7 @@ from sagittal.core.frames import Segment
 from sagittal.core.pipeline.activity_stages import find_trunk_stream, judge_activity, list_doubts, share_known
 from sagittal.core.pipeline.analysis import TakeAnalysis
 from sagittal.core.pipeline.config import PipelineConfig
-from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.signals.recording import ImuStream, Recording
 from tests.core.formats.making import signals, stream
 
 ACC, GYR = signals(200)

@@ -11,12 +11,12 @@ from sagittal.core.agreement import Agreement
 from sagittal.core.errors import Notice, ParameterError
 from sagittal.core.events.result import GaitEvents, Strides
 from sagittal.core.functional_tests.result import FunctionalTest
-from sagittal.core.measure import MeasuredGait
+from sagittal.core.parameters.measure import MeasuredGait
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.pipeline.analysis import SCHEMA, DetectedContacts, TakeAnalysis, require_stage
 from sagittal.core.pipeline.config import PipelineConfig
 from sagittal.core.quality import QualityReport
-from sagittal.core.recording import Recording, Subject, UniformRecording
+from sagittal.core.signals.recording import Recording, Subject, UniformRecording
 
 SAID = Notice("said_twice", "Both say so.")
 

@@ -11,13 +11,13 @@ import pytest
 from sagittal.core import calibration
 from sagittal.core.body.erkf.headings import turn_forward_axes
 from sagittal.core.calibration import CalibrationParams, calibrate
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.parameters.smoothness import NAME as SPARC
 from sagittal.core.parameters.trunk import NAMES as TRUNK_NAMES
 from sagittal.core.pipeline import TakeAnalysis, analyse
-from sagittal.core.recording import UniformRecording
 from sagittal.core.rotation import to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.simulate import simulate_scenario, simulate_tug
 from tests.helpers.walks import analysed
 

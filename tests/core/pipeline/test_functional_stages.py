@@ -12,14 +12,14 @@ from sagittal.core.frames import Protocol
 from sagittal.core.pipeline import PipelineConfig, TakeAnalysis, analyse, resume
 from sagittal.core.pipeline.functional_stages import measure_trunk_test, measure_walk_test
 from sagittal.core.pipeline.recipes import BY_TRUNK, choose_recipe
-from sagittal.core.recording import GivenLimits
+from sagittal.core.signals.recording import GivenLimits
 from sagittal.core.simulate.scripts import ON_SKIN
 from sagittal.core.simulate.standing import Sway, simulate_sway
 from sagittal.core.simulate.tug import simulate_tug
 from sagittal.core.timeline import synchronise
-from sagittal.server.report.bundle import load_bundle
-from sagittal.server.report.exports import analysis_files
-from sagittal.server.report.model import report_model
+from sagittal.server.report.files.bundle import load_bundle
+from sagittal.server.report.files.exports import analysis_files
+from sagittal.server.report.view.model import report_model
 from tests.helpers.kept import keep
 
 

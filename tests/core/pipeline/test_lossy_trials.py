@@ -13,8 +13,8 @@ from sagittal.core.angles.measure import measure_angles
 from sagittal.core.errors import SagittalError
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.pipeline import analyse
-from sagittal.core.recording import Subject
-from sagittal.server.report.exports import analysis_files
+from sagittal.core.signals.recording import Subject
+from sagittal.server.report.files.exports import analysis_files
 from tests.core.pipeline.lossy_trials import LossyTrial, draw_trial, keep_segments, lose_samples, walk
 
 EVERYDAY = range(24)

@@ -13,7 +13,7 @@ from sagittal.core.errors import ParameterError
 from sagittal.core.events.flags import StrideParams
 from sagittal.core.frames import Segment
 from sagittal.core.pipeline import TRUNK_ONLY, WALK, PipelineConfig, TakeAnalysis, analyse, resume
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 from sagittal.core.simulate import simulate_scenario
 
 OTHER = PipelineConfig(strides=StrideParams(edge_strides=2))

@@ -15,15 +15,15 @@ from sagittal.core.parameters.symmetry import compare_sides
 from sagittal.core.pipeline import SQUAT, PipelineConfig, TakeAnalysis, analyse, resume
 from sagittal.core.pipeline.recipes import choose_recipe
 from sagittal.core.pipeline.squat_stages import AGREED, NO_HEIGHT
-from sagittal.core.recording import Subject, UniformRecording
+from sagittal.core.signals.recording import Subject, UniformRecording
 from sagittal.core.simulate import SquatSimulation, simulate_movement
 from sagittal.core.squat.measures import MEASURES
 from sagittal.core.squat.params import SquatParams
 from sagittal.core.squat.side import find_squat_sides
 from sagittal.core.timeline import synchronise
-from sagittal.server.report.bundle import load_bundle
-from sagittal.server.report.exports import analysis_files
-from sagittal.server.report.model import report_model
+from sagittal.server.report.files.bundle import load_bundle
+from sagittal.server.report.files.exports import analysis_files
+from sagittal.server.report.view.model import report_model
 from tests.core.body.chain.squats import squat_on
 from tests.core.calibration.test_table_top import RATE
 from tests.helpers.table_top import from_table

@@ -10,14 +10,14 @@ import pytest
 from sagittal.core.calibration import CalibrationParams
 from sagittal.core.calibration.sensor_in_walk import WalkRungParams
 from sagittal.core.frames import Segment
-from sagittal.core.measure import measure_gait
+from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.pipeline import TakeAnalysis, analyse
 from sagittal.core.pipeline.config import PipelineConfig
 from sagittal.core.simulate import simulate_scenario
-from sagittal.server.report.bundle import load_bundle
-from sagittal.server.report.exports import analysis_files
-from sagittal.server.report.tracks import NAME, read_tracks
+from sagittal.server.report.files.bundle import load_bundle
+from sagittal.server.report.files.exports import analysis_files
+from sagittal.server.report.files.tracks import NAME, read_tracks
 from tests.helpers.mobgap import TRIALS, recording
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sagittal.core.formats import SourceFile, manifest_of, read_recording
-from sagittal.core.recording import Recording
+from sagittal.core.signals.recording import Recording
 from tests.core.quality.nine_sensors import NINE
 from tests.data import data_folder
 

@@ -11,8 +11,8 @@ import pytest
 from sagittal.core.formats import SourceFile, manifest_of, read_recording
 from sagittal.core.frames import GRAVITY, Floats
 from sagittal.core.quality.assessment import QualityReport, assess, concern_paths_alone
-from sagittal.core.recording import Recording
 from sagittal.core.rotation import about
+from sagittal.core.signals.recording import Recording
 from sagittal.core.timeline import synchronise
 from tests.core.formats.making import signals, stream, take
 from tests.core.formats.test_samples import gaitmap

@@ -11,8 +11,8 @@ import pytest
 
 from sagittal.core.quality.inspection import LOOKED_AT_S, describe, measure_losses
 from sagittal.core.quality.suggestion import Suggestion
-from sagittal.core.recording import Recording
-from sagittal.core.sample_blocks import LongStream, SampleBlock
+from sagittal.core.signals.recording import Recording
+from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 from sagittal.core.simulate import simulate_scenario
 from tests.core.formats.making import signals, stream
 

@@ -16,7 +16,7 @@ from sagittal.core.formats import SourceFile, read_recording
 from sagittal.core.frames import GRAVITY, Floats, Segment
 from sagittal.core.pipeline import TakeAnalysis, analyse
 from sagittal.core.quality.stuck import CODES, StuckWatch, drop_stuck_sensors, mark_stuck
-from sagittal.core.recording import ImuStream, Recording, SensorSignals, Subject, UniformRecording
+from sagittal.core.signals.recording import ImuStream, Recording, SensorSignals, Subject, UniformRecording
 from sagittal.core.simulate import SCRIPTS, simulate_scenario
 from sagittal.core.timeline import synchronise
 from tests.core.formats.making import stream, take

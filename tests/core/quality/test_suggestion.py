@@ -8,7 +8,7 @@ import pytest
 
 from sagittal.core.frames import Segment
 from sagittal.core.quality.suggestion import Suggestion, suggest, suggest_segments
-from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.signals.recording import ImuStream, Recording
 from sagittal.core.simulate import simulate_scenario
 from tests.core.formats.making import signals, stream
 from tests.core.quality.nine_sensors import NINE

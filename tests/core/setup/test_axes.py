@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from sagittal.core.frames import GRAVITY, Floats
-from sagittal.core.recording import SensorSignals
 from sagittal.core.rotation import about, conjugate, log, multiply, rotate
 from sagittal.core.setup.axes import CHOICES, REVERSED, fit_axes, refuses_choice
 from sagittal.core.setup.params import SetupParams
+from sagittal.core.signals.recording import SensorSignals
 
 RATE, PARAMS = 100.0, SetupParams()
 

@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sagittal.core.correction import SensorCorrection
 from sagittal.core.frames import GRAVITY, Segment
 from sagittal.core.pipeline import PipelineConfig, analyse
-from sagittal.core.recording import Recording
 from sagittal.core.setup import SetupParams, SetupRepair
+from sagittal.core.signals.correction import SensorCorrection
+from sagittal.core.signals.recording import Recording
 from sagittal.core.simulate import simulate_scenario
 from tests.helpers.setup_mistakes import TURNS, apply_repair, change_axes, exchange_labels, look_at
 

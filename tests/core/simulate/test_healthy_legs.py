@@ -18,11 +18,11 @@ import pytest
 from sagittal.core.angles import JointAngles
 from sagittal.core.events.result import GaitEvent, GaitEvents
 from sagittal.core.frames import SIDES, Side
-from sagittal.core.measure import measure_gait
 from sagittal.core.norms.at_speed import angle_values_at_speed, walkway_values_at_speed
 from sagittal.core.norms.speed import WalkingSpeed, walking_speed
 from sagittal.core.norms.values import list_norm_keys
 from sagittal.core.parameters.catalogue import LIMIT_FIGURES
+from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.simulate import SCRIPTS, STEADY
 from sagittal.core.simulate.human import move
 from sagittal.core.simulate.script import plan

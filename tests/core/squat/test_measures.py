@@ -14,10 +14,10 @@ from sagittal.core.angles.measure import measure_angles
 from sagittal.core.body.chain.leg import LegMotion, estimate_leg
 from sagittal.core.calibration.fixed_offset import make_fixed_mounts
 from sagittal.core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Floats, Side
 from sagittal.core.parameters.symmetry import compare_sides
+from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.simulate import SquatSimulation
 from sagittal.core.simulate.mems import MEMS
 from sagittal.core.simulate.squat_chain import measure_leg

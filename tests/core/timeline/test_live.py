@@ -16,7 +16,7 @@ from sagittal.core.errors import Notice, SignalError
 from sagittal.core.formats import SourceFile, read_recording
 from sagittal.core.formats.live_log import SampleBatch, SensorInfo, StreamInfo
 from sagittal.core.frames import Bools, Floats, Segment
-from sagittal.core.recording import UniformRecording
+from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.timeline import synchronise
 from sagittal.core.timeline.live import LiveAxis, UniformBlock, compile_axis_kernels
 from tests.helpers.live import Device, LiveTake, Samples, send, shared

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from sagittal.core.errors import Notice, SignalError
 from sagittal.core.formats import SourceFile, read_recording
 from sagittal.core.frames import Floats, Segment
-from sagittal.core.recording import ImuStream, SensorSignals
+from sagittal.core.signals.recording import ImuStream, SensorSignals
 from sagittal.core.timeline import TimelineParams, synchronise
 from tests.core.formats.making import signals, stream, take
 from tests.core.formats.test_samples import gaitmap

@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from tests.server.clinic import Clinic, open_clinic
+from tests.helpers.clinic import Clinic, open_clinic
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ import pytest
 
 from sagittal.core.simulate import Stand, Straight, mt_files, simulate
 from sagittal.server.processes.supervisor import Workers
-from sagittal.server.services import checks
-from tests.server.clinic import Clinic, open_clinic
+from sagittal.server.safekeeping import checks
+from tests.helpers.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sagittal.server import audit
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 API = "/api/v1/audit"

@@ -16,16 +16,19 @@ from sagittal.server import audit
 from sagittal.server.auth.roles import Action
 from sagittal.server.auth.routes import list_declared_actions
 from sagittal.server.auth.tokens import token_hash
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.jobs.queue import Claim
 from sagittal.server.pages.shell import FRAGMENT
-from sagittal.server.services import patients, reference_files, sessions, signed_reports, tunings, videos
-from sagittal.server.services.signed_reports import DOCUMENT, PSEUDONYMISED
+from sagittal.server.results import tunings
+from sagittal.server.sharing import signed_reports
+from sagittal.server.sharing.signed_reports import DOCUMENT, PSEUDONYMISED
 from sagittal.server.storage.field_cipher import make_keys
 from sagittal.server.storage.tables import job, new_id, tuning
 from sagittal.server.trail import MOST_REFUSED, QUIET_S, AuditTrail
+from sagittal.server.uploads import reference_files, videos
+from tests.helpers.clinic import PASSWORD, Clinic, open_clinic
 from tests.helpers.engines import on_both_engines
 from tests.server import analysed, walk
-from tests.server.clinic import PASSWORD, Clinic, open_clinic
 from tests.server.serving import serve
 
 pytestmark = pytest.mark.anyio

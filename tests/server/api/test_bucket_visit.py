@@ -13,11 +13,11 @@ import pytest
 
 from sagittal.core.simulate import Stand, Straight, mt_files, simulate
 from sagittal.server.processes.supervisor import Workers
-from sagittal.server.services import checks
-from sagittal.server.services.sweep import sweep
+from sagittal.server.safekeeping import checks
+from sagittal.server.safekeeping.sweep import sweep
 from sagittal.server.storage.readiness import Readiness
 from tests.helpers.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
-from tests.server.clinic import Clinic, open_clinic
+from tests.helpers.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -15,14 +15,14 @@ from sagittal.server import audit
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Role
 from sagittal.server.auth.throttle import MAX_PER_ADDRESS, MAX_PER_PAIR, Throttle
-from sagittal.server.services import report_links, signed_reports
-from sagittal.server.services.care_teams import EMERGENCY, end_all_emergencies
-from sagittal.server.services.signed_reports import DOCUMENT, PSEUDONYMISED
+from sagittal.server.sharing import report_links, signed_reports
+from sagittal.server.sharing.care_teams import EMERGENCY, end_all_emergencies
+from sagittal.server.sharing.signed_reports import DOCUMENT, PSEUDONYMISED
 from sagittal.server.storage.care_tables import emergency_access
 from sagittal.server.storage.migrate import configuration
 from sagittal.server.storage.tables import new_id, now, user
 from sagittal.server.storage.tables import patient as patient_table
-from tests.server.clinic import PASSWORD, Clinic, open_clinic
+from tests.helpers.clinic import PASSWORD, Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
 

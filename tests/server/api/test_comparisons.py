@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from sagittal.server.services import patients, programmes, sessions
+from sagittal.server.clinic import patients, programmes, sessions
 from sagittal.server.storage.tables import new_id
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -11,19 +11,13 @@ from typing import Any
 
 import pytest
 
-from sagittal.core.condition import USUAL
 from sagittal.core.feedback import Cue
-from sagittal.server.services import (
-    controls,
-    live,
-    live_training,
-    patients,
-    prescriptions,
-    programmes,
-    sessions,
-)
+from sagittal.core.subject.condition import USUAL
+from sagittal.server.clinic import patients, programmes, sessions
+from sagittal.server.live_takes import live, live_training
+from sagittal.server.results import controls, prescriptions
+from tests.helpers.clinic import Clinic
 from tests.server import analysed, feedback
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

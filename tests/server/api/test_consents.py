@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from sagittal.server.services import patients
+from sagittal.server.clinic import patients
 from sagittal.server.storage.tables import now
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 API = "/api/v1"

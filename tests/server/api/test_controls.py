@@ -10,7 +10,7 @@ import pytest
 
 from sagittal.core.simulate import Stand, Straight, mt_files, simulate
 from sagittal.server.processes.supervisor import Workers
-from tests.server.clinic import Clinic, open_clinic
+from tests.helpers.clinic import Clinic, open_clinic
 
 pytestmark = [pytest.mark.anyio, pytest.mark.slow]
 

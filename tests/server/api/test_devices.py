@@ -12,8 +12,9 @@ import pytest
 from sagittal.core.frames import GRAVITY
 from sagittal.core.quality.devices import DeviceCheck
 from sagittal.server.api.devices import COLUMNS
-from sagittal.server.services import devices, patients, recordings, sessions
-from tests.server.clinic import Clinic
+from sagittal.server.clinic import devices, patients, sessions
+from sagittal.server.uploads import recordings
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -15,7 +15,7 @@ import pytest
 from sagittal.core.simulate import Stand, Straight, mt_files, simulate
 from sagittal.server.processes.supervisor import Workers
 from tests.data import ROOT
-from tests.server.clinic import PASSWORD, open_clinic
+from tests.helpers.clinic import PASSWORD, open_clinic
 from tests.server.serving import serve
 
 pytestmark = pytest.mark.anyio

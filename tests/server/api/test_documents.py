@@ -7,7 +7,7 @@ import re
 import pytest
 
 from sagittal.server.api.documents import openapi
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

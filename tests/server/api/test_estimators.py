@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from sagittal.core.estimators import BY_NAME, ESTIMATORS
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

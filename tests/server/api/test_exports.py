@@ -12,12 +12,13 @@ import pytest
 
 from sagittal.core.formats.source import SourceFile
 from sagittal.server.commands.export import export
+from sagittal.server.downloads import exports
 from sagittal.server.jobs.queue import EXPORT
 from sagittal.server.main import main
-from sagittal.server.services import analyses, exports
+from sagittal.server.results import analyses
+from tests.helpers.clinic import Clinic
 from tests.helpers.engines import on_both_engines
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = [pytest.mark.anyio, on_both_engines]
 

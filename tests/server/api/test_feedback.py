@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from sagittal.core.feedback import Baseline, Cue, FeedbackEngine, Prescription
-from sagittal.server.services import analyses, edit_log, prescriptions
+from sagittal.server.results import analyses, edit_log, prescriptions
+from tests.helpers.clinic import Clinic
 from tests.helpers.feedback import Walked
 from tests.server import feedback
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

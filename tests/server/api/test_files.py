@@ -11,8 +11,8 @@ from urllib.parse import quote
 import httpx
 import pytest
 
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.helpers.engines import on_both_engines
-from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
 pytestmark = [pytest.mark.anyio, on_both_engines]

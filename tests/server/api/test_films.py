@@ -13,11 +13,12 @@ import httpx
 import pytest
 
 from sagittal.server.live.client import stream
-from sagittal.server.services import films, live, sweep
+from sagittal.server.live_takes import films, live
+from sagittal.server.safekeeping import sweep
 from sagittal.server.storage import segments
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.helpers.live_clinic import Visit, visit
 from tests.helpers.live_takes import HELLO, frame
-from tests.server.clinic import Clinic, open_clinic
 from tests.server.live.test_client import given
 from tests.server.serving import serve
 

@@ -6,11 +6,12 @@ from typing import Any
 
 import pytest
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.jobs.queue import COMPARE_FILTERS
-from sagittal.server.report.filter_list import FILTERS
-from sagittal.server.services import filter_runs, patients, sessions
+from sagittal.server.report.words.filter_list import FILTERS
+from sagittal.server.results import filter_runs
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 API = "/api/v1"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sagittal.server.storage.readiness import Readiness
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -13,12 +13,12 @@ import pytest
 
 from sagittal.server.auth import api_tokens
 from sagittal.server.auth.api_tokens import Scope
-from sagittal.server.services import signed_reports
-from sagittal.server.services.signed_reports import DOCUMENT, PSEUDONYMISED
+from sagittal.server.sharing import signed_reports
+from sagittal.server.sharing.signed_reports import DOCUMENT, PSEUDONYMISED
 from sagittal.server.storage.field_cipher import make_keys
 from sagittal.server.storage.tables import session
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed, crowd
-from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
 API = "/api/v1"

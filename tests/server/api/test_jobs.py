@@ -11,8 +11,8 @@ from sagittal.server.api.jobs import _events
 from sagittal.server.auth import access
 from sagittal.server.jobs.feed import JobFeed
 from sagittal.server.jobs.queue import Claim, JobView
+from tests.helpers.clinic import Clinic
 from tests.helpers.engines import on_both_engines
-from tests.server.clinic import Clinic
 from tests.server.serving import serve
 
 pytestmark = [pytest.mark.anyio, on_both_engines]

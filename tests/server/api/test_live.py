@@ -15,13 +15,13 @@ from sqlalchemy import select, update
 from sqlalchemy.exc import IntegrityError
 
 from sagittal.server.auth.throttle import MAX_PER_PAIR, Throttle
-from sagittal.server.services import patients, sessions
-from sagittal.server.services.live import ALPHABET
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.live_takes.live import ALPHABET
 from sagittal.server.storage.live_tables import live_event, live_take
 from sagittal.server.storage.tables import now, prescription, recording
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.helpers.live_clinic import closed, heard, new_session, open_code, visit
 from tests.helpers.live_takes import finish_text, frame
-from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
 pytestmark = pytest.mark.anyio

@@ -9,8 +9,8 @@ import pytest
 import websockets
 
 from sagittal.server.api.live_feed import GONE
+from tests.helpers.clinic import Clinic
 from tests.helpers.live_clinic import closed, heard, visit
-from tests.server.clinic import Clinic
 from tests.server.serving import serve
 from tests.server.sockets import ask_websocket
 

@@ -9,10 +9,10 @@ import re
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from sagittal.server.services import backup_schedule
-from sagittal.server.services.backup_schedule import BackupState, Outcome
+from sagittal.server.safekeeping import backup_schedule
+from sagittal.server.safekeeping.backup_schedule import BackupState, Outcome
 from tests.data import ROOT
-from tests.server.clinic import PASSWORD, Clinic
+from tests.helpers.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
 CANARY = "Kanari-Vogel"

@@ -9,9 +9,9 @@ import pytest
 from sagittal.server.auth import accounts
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Role
-from sagittal.server.services import notes, patients
+from sagittal.server.clinic import notes, patients
 from sagittal.server.storage.tables import now
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -11,12 +11,12 @@ from dataclasses import replace
 
 import pytest
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.pages.shell import FRAGMENT
-from sagittal.server.report.exports import angles_parquet
-from sagittal.server.services import patients, sessions
+from sagittal.server.report.files.exports import angles_parquet
 from sagittal.server.storage.tables import new_id
+from tests.helpers.clinic import Clinic
 from tests.server import analysed, walk
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -6,8 +6,8 @@ import pytest
 
 from sagittal.server import audit
 from sagittal.server.api.documents import openapi
+from tests.helpers.clinic import Clinic
 from tests.helpers.engines import on_both_engines
-from tests.server.clinic import Clinic
 
 pytestmark = [pytest.mark.anyio, on_both_engines]
 

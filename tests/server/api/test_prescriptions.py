@@ -8,14 +8,14 @@ import pytest
 
 from sagittal.core.feedback import Baseline, FeedbackEngine, Prescription
 from sagittal.core.parameters.result import Parameter
-from sagittal.server.services import prescriptions
-from sagittal.server.services.histories import list_analysed
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.results import prescriptions
+from sagittal.server.results.histories import list_analysed
+from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.tables import audit
+from tests.helpers.clinic import Clinic
 from tests.helpers.engines import on_both_engines
 from tests.helpers.feedback import prescription, train
 from tests.server import feedback
-from tests.server.clinic import Clinic
 
 pytestmark = [pytest.mark.anyio, on_both_engines]
 

@@ -12,11 +12,11 @@ from sqlalchemy import text
 from sagittal.core.errors import SagittalError, SignalError
 from sagittal.server.auth.access import require
 from sagittal.server.auth.roles import Action
+from sagittal.server.errors import NotFound
 from sagittal.server.http.problems import Problem, as_problem
-from sagittal.server.services.errors import NotFound
 from sagittal.server.storage import sqlite_file
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.helpers.marks import sqlite_only
-from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -6,9 +6,9 @@ import datetime as dt
 
 import pytest
 
-from sagittal.server.services import patients, sessions
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.storage.tables import now
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 API = "/api/v1"

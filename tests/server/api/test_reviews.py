@@ -10,13 +10,13 @@ from typing import Any
 import httpx
 import pytest
 
-from sagittal.server.report.exports import analysis_files
-from sagittal.server.report.tracks import NAME, tracks_parquet
-from sagittal.server.services import patients, sessions
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.report.files.exports import analysis_files
+from sagittal.server.report.files.tracks import NAME, tracks_parquet
 from sagittal.server.storage.tables import new_id
+from tests.helpers.clinic import Clinic
 from tests.helpers.engines import on_both_engines
 from tests.server import analysed, walk
-from tests.server.clinic import Clinic
 
 pytestmark = [pytest.mark.anyio, on_both_engines]
 

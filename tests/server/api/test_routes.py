@@ -9,7 +9,7 @@ from starlette.routing import Match
 from sagittal.server.api.routes import BESIDE, build_api
 from sagittal.server.auth.roles import Action
 from sagittal.server.auth.routes import list_declared_actions
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

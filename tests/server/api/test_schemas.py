@@ -9,7 +9,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from sagittal.server.api import schemas
-from sagittal.server.services.signed_reports import ASSESSMENT_CHARACTERS
+from sagittal.server.sharing.signed_reports import ASSESSMENT_CHARACTERS
 from sagittal.server.storage.tables import now
 
 LINE: TypeAdapter[str] = TypeAdapter(schemas.Line)

@@ -13,11 +13,12 @@ from schemathesis.python import asgi
 
 from sagittal.server.api.documents import openapi
 from sagittal.server.app import create_app
-from sagittal.server.services import patients, recordings, sessions
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.settings import Settings
+from sagittal.server.uploads import recordings
+from tests.helpers.clinic import Clinic
 from tests.helpers.databases import write_database
 from tests.helpers.marks import sweep_after
-from tests.server.clinic import Clinic
 
 EXAMPLES = 12
 # beyond a schema, so 422 for what it allows: rules between the parts of a manifest (two sensors on one

@@ -6,7 +6,7 @@ import pyotp
 import pytest
 
 from sagittal.server.auth.throttle import Throttle
-from tests.server.clinic import PASSWORD, Clinic
+from tests.helpers.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
 HERE = "/api/v1/account/second-factor"

@@ -8,8 +8,8 @@ import pytest
 
 from sagittal.server.auth import second_factor
 from sagittal.server.auth.throttle import Throttle
+from tests.helpers.clinic import PASSWORD, Clinic
 from tests.server.auth.soft_key import SoftKey
-from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
 ACCOUNT, HERE = "/api/v1/account", "http://localhost"

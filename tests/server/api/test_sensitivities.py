@@ -15,12 +15,13 @@ from sagittal.core.pipeline import analyse
 from sagittal.core.simulate import RecordingSetup, Squats, SquatSimulation, simulate_squats
 from sagittal.core.simulate.mems import MEMS
 from sagittal.core.simulate.squat_chain import place_as_agreed
+from sagittal.server.clinic import sessions
 from sagittal.server.jobs.queue import SENSITIVITY
-from sagittal.server.report.exports import analysis_files, angles_parquet
-from sagittal.server.services import sensitivities, sessions
+from sagittal.server.report.files.exports import analysis_files, angles_parquet
+from sagittal.server.results import sensitivities
 from tests.core.body.chain.squats import HEIGHT_M
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

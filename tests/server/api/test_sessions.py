@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from sagittal.server.services import patients, sessions
-from tests.server.clinic import Clinic
+from sagittal.server.clinic import patients, sessions
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 API = "/api/v1"

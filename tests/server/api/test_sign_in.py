@@ -11,8 +11,8 @@ from sagittal.server.auth import accounts, one_time
 from sagittal.server.auth.roles import POLICY, Role
 from sagittal.server.auth.throttle import MAX_PER_PAIR, Throttle
 from sagittal.server.storage.tables import one_time_token
+from tests.helpers.clinic import PASSWORD, Clinic, open_clinic
 from tests.helpers.engines import on_both_engines
-from tests.server.clinic import PASSWORD, Clinic, open_clinic
 
 pytestmark = [pytest.mark.anyio, on_both_engines]
 

@@ -6,11 +6,12 @@ import datetime as dt
 
 import pytest
 
-from sagittal.server.services import patients, sessions, signed_reports
-from sagittal.server.services.report_links import USUAL_DAYS
-from sagittal.server.services.signed_reports import ASSESSMENT_CHARACTERS, DOCUMENT, PSEUDONYMISED
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.sharing import signed_reports
+from sagittal.server.sharing.report_links import USUAL_DAYS
+from sagittal.server.sharing.signed_reports import ASSESSMENT_CHARACTERS, DOCUMENT, PSEUDONYMISED
 from sagittal.server.storage.tables import new_id
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 API = "/api/v1"

@@ -12,9 +12,9 @@ import httpx
 import pyarrow.parquet as pq
 import pytest
 
-from sagittal.server.services import study_maker
+from sagittal.server.downloads import study_maker
+from tests.helpers.clinic import PASSWORD, Clinic
 from tests.server.api.test_exports import API, visit
-from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
 

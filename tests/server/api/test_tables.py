@@ -10,8 +10,8 @@ import pytest
 from sagittal.core.formats import SourceFile, manifest_of, read_recording
 from sagittal.core.frames import GRAVITY
 from tests.core.formats.making import signals
+from tests.helpers.clinic import Clinic
 from tests.server.api.test_files import API, new_session
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

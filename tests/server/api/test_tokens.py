@@ -7,7 +7,7 @@ import datetime as dt
 import pytest
 
 from sagittal.server.auth.throttle import Throttle
-from tests.server.clinic import PASSWORD, Clinic
+from tests.helpers.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
 TOKENS = "/api/v1/account/tokens"

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from sagittal.core.change import Change
-from sagittal.core.condition import USUAL, WalkingCondition
+from sagittal.core.subject.condition import USUAL, WalkingCondition
 from sagittal.server.api import trend_schemas as schemas
 from sagittal.server.api.schemas import make_answer
-from sagittal.server.report.trends import TrendSeries, TrendValue
+from sagittal.server.report.history.trends import TrendSeries, TrendValue
 
 
 def names(kind: type[Any]) -> set[str]:

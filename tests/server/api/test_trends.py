@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from sagittal.core.frames import Protocol
-from sagittal.server.services import patients, sessions
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.storage.tables import new_id
+from tests.helpers.clinic import Clinic
 from tests.helpers.engines import on_both_engines
 from tests.server import analysed, walk
-from tests.server.clinic import Clinic
 
 pytestmark = [pytest.mark.anyio, on_both_engines]
 

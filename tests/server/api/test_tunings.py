@@ -9,10 +9,10 @@ import pytest
 from sagittal.core.formats.source import SourceFile
 from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import TUNE
-from sagittal.server.services import analyses, tunings
-from sagittal.server.services.recordings import ANALYSE
+from sagittal.server.results import analyses, tunings
+from sagittal.server.uploads.recordings import ANALYSE
 from tests.core.fusion.algorithms.motion import trial_bytes
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -12,10 +12,11 @@ import httpx
 import numpy as np
 import pytest
 
-from sagittal.server.services import erasure, sweep, uploads
+from sagittal.server.safekeeping import erasure, sweep
+from sagittal.server.uploads import uploads
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.helpers.engines import on_both_engines
 from tests.server.api.test_files import API, blobs, new_session, stored_names
-from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
 pytestmark = [pytest.mark.anyio, on_both_engines]

@@ -10,8 +10,8 @@ from sqlalchemy import func, select
 from sagittal.server.auth import accounts
 from sagittal.server.auth.roles import Role
 from sagittal.server.storage.tables import login_session
+from tests.helpers.clinic import PASSWORD, Clinic, open_clinic
 from tests.helpers.engines import on_both_engines
-from tests.server.clinic import PASSWORD, Clinic, open_clinic
 
 pytestmark = [pytest.mark.anyio, on_both_engines]
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

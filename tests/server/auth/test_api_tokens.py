@@ -14,8 +14,8 @@ from sagittal.server.auth.api_tokens import SCOPES, Scope
 from sagittal.server.auth.roles import POLICY, Action
 from sagittal.server.storage.person_tables import api_token
 from sagittal.server.storage.tables import audit, now
+from tests.helpers.clinic import PASSWORD, Clinic
 from tests.helpers.marks import sqlite_only
-from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
 API = "/api/v1"

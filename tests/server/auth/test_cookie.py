@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.clinic import PASSWORD, Clinic, open_clinic
 from tests.helpers.engines import on_both_engines
-from tests.server.clinic import PASSWORD, Clinic, open_clinic
 
 pytestmark = [pytest.mark.anyio, on_both_engines]
 

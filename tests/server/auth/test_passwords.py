@@ -23,8 +23,8 @@ from sagittal.server.auth.throttle import (
 )
 from sagittal.server.http.problems import Problem
 from sagittal.server.storage.db import Database
+from tests.helpers.clinic import PASSWORD
 from tests.helpers.databases import write_database
-from tests.server.clinic import PASSWORD
 
 
 @pytest.mark.slow

@@ -11,8 +11,8 @@ from starlette.routing import Mount
 from sagittal.server.auth.access import require
 from sagittal.server.auth.roles import POLICY, PUBLIC, Action, Role, is_permitted
 from sagittal.server.auth.routes import UndeclaredRouteError, list_declared_actions
+from tests.helpers.clinic import Clinic
 from tests.helpers.engines import on_both_engines
-from tests.server.clinic import Clinic
 from tests.server.sockets import ask_websocket
 
 pytestmark = pytest.mark.anyio

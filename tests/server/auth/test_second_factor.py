@@ -14,8 +14,8 @@ from sagittal.server.auth.throttle import Throttle
 from sagittal.server.commands import user as user_command
 from sagittal.server.storage.archive import make_key
 from sagittal.server.storage.person_tables import second_factor as table
+from tests.helpers.clinic import PASSWORD, Clinic
 from tests.helpers.engines import tell_commands
-from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
 API = "/api/v1"

@@ -15,8 +15,8 @@ from sqlalchemy import select, update
 from sagittal.server.auth import second_factor
 from sagittal.server.auth.throttle import Throttle
 from sagittal.server.storage.person_tables import security_key, security_key_challenge
+from tests.helpers.clinic import PASSWORD, Clinic
 from tests.server.auth.soft_key import SoftKey
-from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
 API, HERE = "/api/v1", "http://localhost"

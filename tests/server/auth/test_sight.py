@@ -10,11 +10,12 @@ from sqlalchemy import select, update
 from sagittal.server.auth import sight
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Role
-from sagittal.server.services import care_teams, patients, sessions
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.sharing import care_teams
 from sagittal.server.storage.care_tables import emergency_access
 from sagittal.server.storage.tables import now, patient
+from tests.helpers.clinic import Clinic
 from tests.helpers.engines import on_both_engines
-from tests.server.clinic import Clinic
 
 pytestmark = [pytest.mark.anyio, on_both_engines]
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 
 from sagittal.core.formats.live_log import FILE_MARK, hello_json, record
+from sagittal.server.clinic import jobs
 from sagittal.server.commands.adopt import adopt
-from sagittal.server.services import jobs, live_recordings, recordings
+from sagittal.server.live_takes import live_recordings
+from sagittal.server.uploads import recordings
 from tests.faults.clinic import Clinic
 from tests.helpers.live_takes import HELLO, frame
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from sagittal.server.clinic import identities
 from sagittal.server.commands.backup import backup
-from sagittal.server.services import identities
-from sagittal.server.services.backups import list_backups
+from sagittal.server.safekeeping.backups import list_backups
 from sagittal.server.storage.archive import make_key
 from sagittal.server.storage.high_water import read_newest
 from tests.faults.clinic import Clinic

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.commands.demo import _wait_for_live
-from sagittal.server.services import live, patients, sessions
-from tests.server.clinic import open_clinic
+from sagittal.server.live_takes import live
+from tests.helpers.clinic import open_clinic
 
 
 def helper(seconds: int) -> subprocess.Popen[bytes]:

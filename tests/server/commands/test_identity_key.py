@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from sagittal.server.clinic import identities
 from sagittal.server.commands.identity_key import identity_key
-from sagittal.server.services import identities
 from tests.faults.clinic import Clinic
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from sagittal.server.clinic import identities, patients
 from sagittal.server.commands.restore import _tell_names_key, restore
-from sagittal.server.services import identities, patients
-from sagittal.server.services.backups import IDENTITY_KEY, make_backup
+from sagittal.server.safekeeping.backups import IDENTITY_KEY, make_backup
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
 from tests.faults.clinic import Clinic

@@ -12,7 +12,7 @@ from sagittal.core.angles import JointAngles
 from sagittal.core.formats import write_recording
 from sagittal.core.simulate.mems import MEMS
 from sagittal.server.main import main
-from sagittal.server.report.exports import angles_parquet
+from sagittal.server.report.files.exports import angles_parquet
 from tests.core.body.chain.squats import squat_on
 
 

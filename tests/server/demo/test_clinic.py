@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from sagittal.core.condition import is_comparable
 from sagittal.core.pipeline import analyse
+from sagittal.core.subject.condition import is_comparable
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.demo.clinic import STROKE, VISITS, VOLUNTEER, fill, record
-from sagittal.server.services import patients, prescriptions, sessions
+from sagittal.server.results import prescriptions
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.migrate import upgrade

@@ -6,13 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from sagittal.core.condition import USUAL
 from sagittal.core.feedback import Cue
+from sagittal.core.subject.condition import USUAL
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.demo.clinic import PRESCRIBED
 from sagittal.server.demo.live import open_take, plan_training, stream_walk
-from sagittal.server.services import live, patients, prescriptions, sessions
+from sagittal.server.live_takes import live
+from sagittal.server.results import prescriptions
 from sagittal.server.storage.tables import session
-from tests.server.clinic import open_clinic
+from tests.helpers.clinic import open_clinic
 from tests.server.serving import serve
 
 

@@ -17,8 +17,8 @@ from sagittal.core.errors import FormatError
 from sagittal.core.events.edits import Edit
 from sagittal.server.export.bids import write_bids
 from sagittal.server.export.content import ExportContent, VisitFacts
-from sagittal.server.report import signals
-from sagittal.server.report.columns import floats_of
+from sagittal.server.report.files import signals
+from sagittal.server.report.files.columns import floats_of
 from tests.server import analysed
 from tests.server.export.opened import open_walk
 

@@ -14,7 +14,7 @@ from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.server.export.content import ExportContent
 from sagittal.server.export.kinds import write_export
 from sagittal.server.export.sheets import list_curves, list_cycles, list_events, list_notices
-from sagittal.server.report.numbers import numbers_of
+from sagittal.server.report.history.numbers import numbers_of
 from tests.server.export.opened import open_walk
 
 

@@ -13,10 +13,12 @@ import httpx
 import pytest
 from starlette.types import Receive, Scope, Send
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.http.compression import LONG_BYTES, Compression, accepts
-from sagittal.server.services import analyses, patients, recordings, sessions
+from sagittal.server.results import analyses
+from sagittal.server.uploads import recordings
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
 pytestmark = pytest.mark.anyio

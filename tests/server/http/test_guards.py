@@ -13,7 +13,7 @@ from sagittal.server.auth.routes import list_declared_actions
 from sagittal.server.http.cross_site import CrossSiteGuard
 from sagittal.server.http.headers import SecurityHeaders
 from sagittal.server.http.hosts import HostGuard
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 from tests.server.serving import serve
 
 pytestmark = pytest.mark.anyio

@@ -11,7 +11,7 @@ import pytest
 
 from sagittal.server.log import JsonLines, request_id, start_log
 from sagittal.server.settings import Settings, SettingsError
-from tests.server.clinic import open_clinic
+from tests.helpers.clinic import open_clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -11,10 +11,11 @@ import pytest
 from sagittal.core.formats.live_log import Hello
 from sagittal.server.live import client
 from sagittal.server.live.client import LiveError, StreamFaults, StreamReport, stream
-from sagittal.server.services import live, recordings
+from sagittal.server.live_takes import live
+from sagittal.server.uploads import recordings
+from tests.helpers.clinic import Clinic
 from tests.helpers.live_clinic import Visit, visit
 from tests.helpers.live_takes import HELLO, digest, frame, kept_in
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -13,10 +13,10 @@ import pytest
 
 from sagittal.core.formats.live_log import decode_batch, parse_hello, record
 from sagittal.server.live.protocol import FINAL, CloseCode
-from sagittal.server.services import live
+from sagittal.server.live_takes import live
 from tests.data import ROOT
+from tests.helpers.clinic import Clinic
 from tests.helpers.live_clinic import new_session
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -19,6 +19,7 @@ from websockets.asyncio.client import ClientConnection
 
 from sagittal.core.feedback import Cue
 from sagittal.core.formats.live_log import FILE_MARK, hello_json, record
+from sagittal.server.clinic import sessions
 from sagittal.server.live.client import StreamReport, stream
 from sagittal.server.live.estimator import EstimatorWorker
 from sagittal.server.live.hub import Hub
@@ -33,13 +34,15 @@ from sagittal.server.live.messages import (
 )
 from sagittal.server.live.messages import Report as Told
 from sagittal.server.live.take import STEERING
-from sagittal.server.services import live, prescriptions, recordings, sessions
-from sagittal.server.services.live_recordings import log_path
+from sagittal.server.live_takes import live
+from sagittal.server.live_takes.live_recordings import log_path
+from sagittal.server.results import prescriptions
 from sagittal.server.storage.live_tables import live_event
+from sagittal.server.uploads import recordings
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.helpers.live_clinic import Visit, heard, new_session, visit
 from tests.helpers.live_takes import finish_text
 from tests.helpers.live_walk import items, replayed, walk, walk_hello
-from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
 pytestmark = pytest.mark.anyio
@@ -355,7 +358,7 @@ async def test_a_crash_while_the_take_becomes_a_recording_is_repaired_at_the_nex
     monkeypatch.setattr("sagittal.server.live.hub.GRACE_S", 0.1)
     async with open_clinic(tmp_path, live_workers=0) as clinic, serve(clinic.app) as port:
         with monkeypatch.context() as patch:
-            patch.setattr(f"sagittal.server.services.live_recordings._{broken}", dies)
+            patch.setattr(f"sagittal.server.live_takes.live_recordings._{broken}", dies)
             async with visit(clinic, port) as v, v.tablet(v.hello(walk_hello(v.take))) as ws:
                 await heard(ws, "welcome")
                 for one in frames:

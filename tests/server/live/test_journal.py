@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 from sqlalchemy import delete, select
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.live.journal import Journal
-from sagittal.server.services import live, patients, sessions
+from sagittal.server.live_takes import live
 from sagittal.server.storage import sqlite_file
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.disk_log import DiskLog

@@ -12,9 +12,9 @@ from websockets.exceptions import ConnectionClosed
 
 from sagittal.server.live.client import stream
 from sagittal.server.live.protocol import ack
+from tests.helpers.clinic import Clinic
 from tests.helpers.live_clinic import Visit, heard, visit
 from tests.helpers.live_takes import finish_text, frame
-from tests.server.clinic import Clinic
 from tests.server.live.test_client import given, hello, recorded
 
 pytestmark = pytest.mark.anyio

@@ -13,7 +13,7 @@ from sagittal.core.errors import InputError
 from sagittal.core.formats.live_log import FILE_MARK, decode_batch, hello_json, parse_hello, record
 from sagittal.core.formats.live_reader import read_live_log
 from sagittal.core.frames import Floats
-from sagittal.core.recording import ImuStream, Recording
+from sagittal.core.signals.recording import ImuStream, Recording
 from sagittal.core.simulate import simulate_scenario
 from sagittal.core.timeline import synchronise
 from sagittal.server.live.playback import DueBatch, cut, hello_of, pace_batches

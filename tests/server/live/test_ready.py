@@ -24,13 +24,13 @@ from sagittal.server.live.messages import (
     encode,
 )
 from sagittal.server.live.pool import MODULE
+from sagittal.server.live_takes.live_recordings import log_path
 from sagittal.server.processes.channel import Channel
-from sagittal.server.services.live_recordings import log_path
 from tests.data import ROOT
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.helpers.live_clinic import heard, visit
 from tests.helpers.live_takes import finish_text
 from tests.helpers.live_walk import walk, walk_hello
-from tests.server.clinic import Clinic, open_clinic
 from tests.server.live.unready_estimator import UNTIL
 from tests.server.serving import serve
 

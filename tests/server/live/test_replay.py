@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from sagittal.core.simulate import mt_files, simulate_scenario
+from sagittal.server.live_takes import live
 from sagittal.server.main import main
-from sagittal.server.services import live
+from tests.helpers.clinic import Clinic
 from tests.helpers.live_clinic import new_session
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -14,9 +14,9 @@ from sagittal.server.live.client import StreamReport, stream
 from sagittal.server.live.playback import DueBatch, pace_batches
 from sagittal.server.live.pool import MODULE
 from tests.data import ROOT
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.helpers.live_clinic import heard, visit
 from tests.helpers.live_walk import walk, walk_hello
-from tests.server.clinic import Clinic, open_clinic
 from tests.server.live.sleepy_estimator import SLEEP_S
 from tests.server.serving import serve
 

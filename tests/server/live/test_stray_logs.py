@@ -9,19 +9,22 @@ from pathlib import Path
 import pytest
 
 from sagittal.core.formats.live_log import FILE_MARK, hello_json, record
+from sagittal.server.clinic import jobs, sessions
+from sagittal.server.errors import Conflict
 from sagittal.server.live.hub import Hub
 from sagittal.server.live.room import Room
 from sagittal.server.live.take import ActiveTake
+from sagittal.server.live_takes import live, live_logs, live_recordings
 from sagittal.server.main import main
-from sagittal.server.services import checks, jobs, live, live_logs, live_recordings, recordings, sessions
-from sagittal.server.services.errors import Conflict
+from sagittal.server.safekeeping import checks
 from sagittal.server.settings import Settings
 from sagittal.server.storage.blob_folder import FolderBlobs
 from sagittal.server.storage.db import Database
+from sagittal.server.uploads import recordings
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.helpers.engines import tell_commands
 from tests.helpers.live_clinic import PATIENCE_S, heard, new_session, visit
 from tests.helpers.live_takes import HELLO, frame, stored
-from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
 pytestmark = pytest.mark.anyio
@@ -152,7 +155,7 @@ async def test_an_adoption_that_dies_half_way_is_finished_by_the_next_start(
         path = put_stray(tmp_path)
         here = (clinic.db, clinic.app.state.blobs, clinic.settings, clinic.app.state.queue, None)
         with monkeypatch.context() as patch:
-            patch.setattr(f"sagittal.server.services.live_recordings._{broken}", dies)
+            patch.setattr(f"sagittal.server.live_takes.live_recordings._{broken}", dies)
             with pytest.raises(RuntimeError):
                 live_logs.adopt(*here, STRAY, session)
         assert path.read_bytes() == WHOLE

@@ -18,13 +18,13 @@ from sagittal.core.formats.live_log import StreamInfo
 from sagittal.server.live import hub
 from sagittal.server.live.protocol import CloseCode
 from sagittal.server.live.recorder import Recorder, open_recorder
-from sagittal.server.services import recordings
-from sagittal.server.services.live_recordings import log_path
+from sagittal.server.live_takes.live_recordings import log_path
 from sagittal.server.storage.live_tables import live_take
 from sagittal.server.storage.tables import audit, job, now
+from sagittal.server.uploads import recordings
+from tests.helpers.clinic import Clinic
 from tests.helpers.live_clinic import closed, heard, visit
 from tests.helpers.live_takes import HELLO, digest, finish_text, frame
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

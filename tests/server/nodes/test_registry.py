@@ -11,14 +11,15 @@ from pathlib import Path
 import pytest
 from sqlalchemy import update
 
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.errors import NodeAway
 from sagittal.server.live.rows import Rows
+from sagittal.server.live_takes import live, live_recordings
+from sagittal.server.live_takes.live_claims import claim_take
 from sagittal.server.nodes.pins import Owner, Pin, find_owner, find_pin
 from sagittal.server.nodes.registry import FORGOTTEN, Nodes
-from sagittal.server.services import live, live_recordings, patients, sessions
-from sagittal.server.services.custody import StrangersError
-from sagittal.server.services.errors import NodeAway
-from sagittal.server.services.live_claims import claim_take
-from sagittal.server.services.reviewed import ReviewedAnalyses
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.server.safekeeping.custody import StrangersError
 from sagittal.server.settings import Settings, SettingsError
 from sagittal.server.storage.blob_folder import FolderBlobs
 from sagittal.server.storage.db import Database

@@ -24,7 +24,7 @@ from websockets.asyncio.client import ClientConnection
 
 from sagittal.core.formats.live_log import PROTOCOL, Hello, hello_json
 from sagittal.server.live.pairing import pair as pair_tablet
-from sagittal.server.services import live
+from sagittal.server.live_takes import live
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.high_water import read_mark

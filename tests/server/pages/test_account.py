@@ -8,7 +8,7 @@ from sagittal.server.auth import api_tokens
 from sagittal.server.auth.api_tokens import MOST_DAYS, Scope
 from sagittal.server.auth.passwords import MIN_LENGTH
 from sagittal.server.pages.account import SCOPE_WORDS
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -6,13 +6,14 @@ import re
 
 import pytest
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.jobs.queue import COMPARE_FILTERS
 from sagittal.server.pages.algorithms import FILE_WORDS, list_choices
-from sagittal.server.report.filter_files import filter_run_files
-from sagittal.server.report.filter_list import PROPOSED
-from sagittal.server.services import filter_runs, patients, sessions
+from sagittal.server.report.files.filter_files import filter_run_files
+from sagittal.server.report.words.filter_list import PROPOSED
+from sagittal.server.results import filter_runs
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

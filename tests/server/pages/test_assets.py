@@ -6,7 +6,7 @@ import pytest
 
 from sagittal.server.auth.roles import PUBLIC
 from sagittal.server.pages.assets import STATIC, Assets
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

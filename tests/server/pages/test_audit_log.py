@@ -8,7 +8,7 @@ import pytest
 
 from sagittal.server import audit
 from sagittal.server.pages.audit_log import AUDIT_ROWS
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

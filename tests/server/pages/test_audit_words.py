@@ -8,9 +8,9 @@ import pytest
 
 from sagittal.server.auth.accounts import Factor
 from sagittal.server.pages.audit_words import DEEDS, SIGNED_IN_BY, describe_deed
-from sagittal.server.services.reviews import ACTIONS
+from sagittal.server.results.reviews import ACTIONS
 from tests.data import ROOT
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -10,10 +10,10 @@ import pytest
 from sagittal.core.calibration import calibrate
 from sagittal.core.calibration.score import score_calibration
 from sagittal.core.errors import Notice
-from sagittal.server.report.calibration_checks import view_calibration_checks
+from sagittal.server.report.view.calibration_checks import view_calibration_checks
+from tests.helpers.clinic import Clinic
 from tests.helpers.walks import simulated
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -7,9 +7,9 @@ import re
 import pytest
 
 from sagittal.core.frames import SEGMENTS
+from sagittal.server.live_takes.live import ALPHABET, CODE_LENGTH
 from sagittal.server.pages.capture import FILM_BITS_PER_S, PLACES
-from sagittal.server.services.live import ALPHABET, CODE_LENGTH
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from sagittal.server.pages.compare import _pairs, view_comparison
-from sagittal.server.services import comparisons
+from sagittal.server.results import comparisons
+from tests.helpers.clinic import Clinic
 from tests.server import analysed, crowd
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
+from tests.helpers.clinic import Clinic
 from tests.server import analysed, daily
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -12,9 +12,9 @@ import pytest
 from sagittal.core.frames import GRAVITY
 from sagittal.core.quality.device_course import SCALE_MOVED, SCALE_OFF, DeviceCourse, follow_device
 from sagittal.core.quality.devices import DeviceCheck
+from sagittal.server.clinic.devices import DatedCheck, KnownDevice
 from sagittal.server.pages.devices import _charts, _figures, _find_scale_band, _takes
-from sagittal.server.services.devices import DatedCheck, KnownDevice
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -7,15 +7,16 @@ from dataclasses import replace
 import pytest
 
 from sagittal.core.frames import Side
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.pages import figures
 from sagittal.server.pages.figures import draw_beginning, draw_contact
-from sagittal.server.report.bundle import read_poses
-from sagittal.server.services import analyses, histories, patients, reports, sessions
+from sagittal.server.report.files.bundle import read_poses
+from sagittal.server.results import analyses, histories, reports
 from sagittal.server.storage.blobs import Blob
 from sagittal.server.viewer.client import client_version
 from sagittal.server.viewer.still import draw_still
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

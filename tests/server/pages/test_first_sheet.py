@@ -15,11 +15,11 @@ import pytest
 
 from sagittal.server.pages import session as session_page
 from sagittal.server.pages.first_sheet import has_room_for_profile
-from sagittal.server.report.headline import Headline, HeadlineSentence
-from sagittal.server.services import comparisons
-from sagittal.server.services.signed_reports import ASSESSMENT_CHARACTERS
+from sagittal.server.report.view.headline import Headline, HeadlineSentence
+from sagittal.server.results import comparisons
+from sagittal.server.sharing.signed_reports import ASSESSMENT_CHARACTERS
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 DAY = dt.date(2026, 11, 18)

@@ -10,13 +10,13 @@ from dataclasses import replace
 import pytest
 
 from sagittal.core.pipeline import analyse
-from sagittal.core.recording import GivenLimits
+from sagittal.core.signals.recording import GivenLimits
 from sagittal.core.simulate.scripts import ON_SKIN
 from sagittal.core.simulate.tug import simulate_tug
-from sagittal.server.report.exports import analysis_files
+from sagittal.server.report.files.exports import analysis_files
+from tests.helpers.clinic import Clinic
 from tests.helpers.kept import keep
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -10,11 +10,11 @@ import pytest
 
 from sagittal.core.frames import PROTOCOLS
 from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.clinic.sessions import Session
 from sagittal.server.pages.guided_test import view_guided_test
-from sagittal.server.report.functional import norm_words
-from sagittal.server.report.guided_words import HINTS, TOTAL
-from sagittal.server.services.patients import Patient
-from sagittal.server.services.sessions import Session
+from sagittal.server.report.view.functional import norm_words
+from sagittal.server.report.words.guided_words import HINTS, TOTAL
 from sagittal.server.storage.tables import now
 
 PATIENT = Patient("1", "P-1", "female", 1950, 1.7, None, False, "", now(), 1, None, False)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.errors import Conflict
 from sagittal.server.pages.handouts import gather_course, gather_leaflet
-from sagittal.server.services import patients, sessions
-from sagittal.server.services.errors import Conflict
+from tests.helpers.clinic import Clinic
 from tests.server import analysed, crowd
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

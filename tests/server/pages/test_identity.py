@@ -10,10 +10,10 @@ import pytest
 
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Role
+from sagittal.server.clinic import identities, patients
 from sagittal.server.pages.identity import name_on_paper, offers_identity
-from sagittal.server.services import identities, patients
 from sagittal.server.storage.field_cipher import make_keys
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -6,12 +6,14 @@ from typing import Any
 
 import pytest
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.jobs.queue import JobView
 from sagittal.server.pages.job_views import FOLLOWED, find_active_jobs, find_newest_job, follow_few, view_job
-from sagittal.server.services import filter_runs, patients, recordings, sessions
+from sagittal.server.results import filter_runs
 from sagittal.server.storage.tables import now
+from sagittal.server.uploads import recordings
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

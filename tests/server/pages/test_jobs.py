@@ -8,11 +8,12 @@ import pytest
 
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Role
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.jobs.queue import BESIDE, JobState
 from sagittal.server.pages.jobs import JOB_WORDS, KIND_WORDS, list_jobs
-from sagittal.server.services import patients, recordings, sessions
+from sagittal.server.uploads import recordings
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -6,11 +6,11 @@ import re
 
 import pytest
 
-from sagittal.core.condition import USUAL
 from sagittal.core.frames import PROTOCOLS
-from sagittal.server.services import patients, programmes
+from sagittal.core.subject.condition import USUAL
+from sagittal.server.clinic import patients, programmes
 from sagittal.server.storage.tables import now
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

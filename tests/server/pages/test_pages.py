@@ -11,11 +11,12 @@ import pytest
 from sagittal.core.body.model import NOMINAL_HEIGHT_M
 from sagittal.core.online.calibrating import CalibratingParams
 from sagittal.server.pages.charts import draw_chart
-from sagittal.server.report.panels import CurvePanel
-from sagittal.server.services import analyses, recordings
+from sagittal.server.report.charts.panels import CurvePanel
+from sagittal.server.results import analyses
+from sagittal.server.uploads import recordings
 from tests.data import ROOT
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -7,9 +7,9 @@ import re
 import pytest
 
 from sagittal.core.parameters.catalogue import CATALOGUE
-from sagittal.server.services import patients, sessions
+from sagittal.server.clinic import patients, sessions
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

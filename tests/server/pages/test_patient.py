@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -11,12 +11,14 @@ from sqlalchemy import update
 
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Role
+from sagittal.server.clinic import patients, programmes, sessions
+from sagittal.server.live_takes import live
 from sagittal.server.pages.patients import FILTERS, list_patients
-from sagittal.server.services import live, patients, programmes, recordings, sessions
 from sagittal.server.storage.live_tables import live_take
 from sagittal.server.storage.tables import now
+from sagittal.server.uploads import recordings
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 from tests.server.pages.test_patient import API, rows_of, text_of, walked
 
 pytestmark = pytest.mark.anyio

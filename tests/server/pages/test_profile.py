@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from sagittal.server.pages.profile import view_profile
-from sagittal.server.report.profile import ProfileBar, ProfileView
+from sagittal.server.report.view.profile import ProfileBar, ProfileView
 
 KNEE = ProfileBar("Knee flexion", {"left": 7.25, "right": 4.0}, 4.0, 7.0)
 SCORE = ProfileBar("Score", {"left": 9.0}, 5.0, 8.25)

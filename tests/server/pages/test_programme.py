@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
+from sagittal.server.clinic import patients, programmes, sessions
+from sagittal.server.clinic.programmes import PlannedVisit, Programme
 from sagittal.server.pages.programme import STATE_WORDS, view_programme
-from sagittal.server.services import patients, programmes, sessions
-from sagittal.server.services.programmes import PlannedVisit, Programme
 from sagittal.server.storage.tables import now
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 MONDAY = dt.date(2026, 3, 2)

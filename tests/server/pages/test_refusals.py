@@ -9,11 +9,12 @@ import pytest
 from sqlalchemy import Connection
 
 from sagittal.server.auth.roles import Role
-from sagittal.server.services import consents, notes, patients, report_links, sessions
-from sagittal.server.services.errors import NotFound, ServiceError
+from sagittal.server.clinic import consents, notes, patients, sessions
+from sagittal.server.errors import NotFound, ServiceError
+from sagittal.server.sharing import report_links
 from sagittal.server.storage.db import Database
 from sagittal.web.language import LANGUAGES, SOURCE, load_catalogue, script_texts
-from tests.server.clinic import open_clinic
+from tests.helpers.clinic import open_clinic
 
 pytestmark = pytest.mark.anyio
 

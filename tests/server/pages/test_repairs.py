@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from sagittal.server.services.analysing import REPAIRED
+from sagittal.server.results.analysing import REPAIRED
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -20,12 +20,12 @@ import sqlalchemy as sa
 
 from sagittal.server.http.templates import TEMPLATES
 from sagittal.server.report.pdf import PdfMissing, render_pdf
-from sagittal.server.services import report_links
-from sagittal.server.services.signed_reports import ASSESSMENT_CHARACTERS
+from sagittal.server.sharing import report_links
+from sagittal.server.sharing.signed_reports import ASSESSMENT_CHARACTERS
 from sagittal.server.storage.report_tables import report_link
 from sagittal.server.storage.tables import audit, now
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic, open_clinic
 from tests.server.pages.test_pages import page, visit
 
 pytestmark = pytest.mark.anyio

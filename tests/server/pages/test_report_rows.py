@@ -16,7 +16,7 @@ from sagittal.server.pages.report_rows import (
     select_groups,
     select_others,
 )
-from sagittal.server.report.table import ParameterRow, TableCell
+from sagittal.server.report.view.table import ParameterRow, TableCell
 
 
 @dataclass

@@ -20,24 +20,24 @@ from starlette.responses import Response
 from sagittal.core.flags import RULES, Flag, Rule
 from sagittal.core.flags.rules import CURVES
 from sagittal.core.frames import SIDES, Side
-from sagittal.core.measure import measure_gait
 from sagittal.core.norms import Norms
 from sagittal.core.parameters.catalogue import find_entry
+from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.simulate import PATIENTS
 from sagittal.server.export.fhir import write_fhir
 from sagittal.server.http.templates import TEMPLATES, render
 from sagittal.server.pages import paper, shell
-from sagittal.server.report.exports import analysis_files
-from sagittal.server.report.headline import MOST, Headline, HeadlineSentence, find_standouts
-from sagittal.server.report.limits import limits_view
+from sagittal.server.report.files.exports import analysis_files
 from sagittal.server.report.pdf import render_pdf
+from sagittal.server.report.view.headline import MOST, Headline, HeadlineSentence, find_standouts
+from sagittal.server.report.words.limits import limits_view
 from sagittal.server.storage.tables import new_id
 from sagittal.web.language import LANGUAGES
+from tests.helpers.clinic import Clinic
 from tests.helpers.marks import sweep_after
 from tests.helpers.true_walks import true_tracks
 from tests.helpers.walks import simulated
 from tests.server import analysed
-from tests.server.clinic import Clinic
 from tests.server.export.opened import open_walk
 
 pytestmark = pytest.mark.anyio

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.pages.sensitivity import list_choices
-from sagittal.server.services import patients, reference_files, sessions
+from sagittal.server.uploads import reference_files
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -8,7 +8,7 @@ import pytest
 
 from sagittal.server.auth import one_time
 from sagittal.server.auth.passwords import MIN_LENGTH
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -11,10 +11,10 @@ from sagittal.core.pipeline import analyse
 from sagittal.core.simulate import RecordingSetup, Squats, simulate_squats
 from sagittal.core.simulate.mems import MEMS
 from sagittal.core.simulate.squat_chain import place_as_agreed
-from sagittal.server.report.exports import analysis_files
+from sagittal.server.report.files.exports import analysis_files
 from tests.core.body.chain.squats import HEIGHT_M, squat_on
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -11,14 +11,16 @@ from fastapi.routing import APIRoute
 from sqlalchemy import insert, select
 
 from sagittal.core.feedback import Baseline, Cue
+from sagittal.server.clinic import identities, patients, programmes, sessions
+from sagittal.server.live_takes import live
 from sagittal.server.pages.routes import ROUTERS
 from sagittal.server.pages.shell import FRAGMENT
-from sagittal.server.services import identities, live, patients, prescriptions, programmes, sessions
+from sagittal.server.results import prescriptions
 from sagittal.server.storage.care_tables import care_team_member
 from sagittal.server.storage.live_tables import live_take
 from sagittal.server.storage.tables import analysis, new_id, recording
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed, crowd
-from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
 

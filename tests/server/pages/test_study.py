@@ -6,10 +6,10 @@ import datetime as dt
 
 import pytest
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.pages import study
-from sagittal.server.services import patients, sessions
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

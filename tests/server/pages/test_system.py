@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from sagittal.server.clinic.calendar_days import move_years
 from sagittal.server.pages.system import describe_backups
-from sagittal.server.services import backup_schedule
-from sagittal.server.services.backup_schedule import BackupState, Outcome
-from sagittal.server.services.calendar_days import move_years
+from sagittal.server.safekeeping import backup_schedule
+from sagittal.server.safekeeping.backup_schedule import BackupState, Outcome
 from sagittal.server.settings import Settings, SettingsError
 from sagittal.server.storage.readiness import Readiness
 from sagittal.server.storage.tables import now
-from tests.server.clinic import open_clinic
+from tests.helpers.clinic import open_clinic
 
 pytestmark = pytest.mark.anyio
 NOW = dt.datetime(2026, 3, 14, 8, tzinfo=dt.UTC)

@@ -6,12 +6,13 @@ import datetime as dt
 
 import pytest
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.pages.report_rows import select_first
 from sagittal.server.pages.takes import view_takes
-from sagittal.server.report.change_words import find_term
-from sagittal.server.services import histories, patients, reports, sessions
+from sagittal.server.report.words.change_words import find_term
+from sagittal.server.results import histories, reports
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -6,7 +6,7 @@ import pytest
 
 from sagittal.server.http.headers import KEPT
 from sagittal.web.language import LANGUAGES, SOURCE, script_texts
-from tests.server.clinic import Clinic
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.pages.shell import FRAGMENT
-from sagittal.server.services import patients, sessions
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.clinic.programmes import PlannedVisit
 from sagittal.server.pages.trends import _column, _pick_side, _waiting, list_ahead, view_daily_trend
-from sagittal.server.report.daily_trend import PerformanceDay
-from sagittal.server.report.trends import Trend, TrendSeries, TrendValue
-from sagittal.server.services import patients, sessions
-from sagittal.server.services.programmes import PlannedVisit
+from sagittal.server.report.history.daily_trend import PerformanceDay
+from sagittal.server.report.history.trends import Trend, TrendSeries, TrendValue
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 DAY = dt.date(2026, 3, 1)

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
+from sagittal.server.clinic.devices import LastPlaces
 from sagittal.server.pages.upload import fits_movement, view_inspection
-from sagittal.server.services.devices import LastPlaces
-from sagittal.server.services.recordings import StoredRecording
+from sagittal.server.uploads.recordings import StoredRecording
 from sagittal.web.language import load_catalogue
 
 

@@ -11,15 +11,15 @@ from typing import Any, Final
 import pytest
 from sqlalchemy import JSON, Column, Connection, String, Table, insert, select, update
 
+from sagittal.server.clinic import identities, sessions
 from sagittal.server.pages.shell import FRAGMENT
-from sagittal.server.services import identities, sessions
 from sagittal.server.storage.care_tables import clinic_option
 from sagittal.server.storage.columns import UserJson, UserString
 from sagittal.server.storage.report_tables import signed_report
 from sagittal.server.storage.tables import analysis, device_check, job, metadata, new_id, recording
 from sagittal.web.language import catalogue_path, load_catalogue, read_messages
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed, crowd
-from tests.server.clinic import Clinic, open_clinic
 from tests.server.pages.test_statements import ANSWERS, PAGES, QUERIES, TRAINED
 from tests.server.pages.test_upload import device
 

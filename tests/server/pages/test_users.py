@@ -10,8 +10,8 @@ from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.passwords import MIN_LENGTH
 from sagittal.server.auth.roles import Role
 from sagittal.server.pages.words import ROLE_WORDS
-from sagittal.server.services import care_teams
-from tests.server.clinic import Clinic
+from sagittal.server.sharing import care_teams
+from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

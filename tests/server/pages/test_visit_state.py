@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import pytest
 
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.live_takes import live
 from sagittal.server.pages.visit_state import LIVE_STATES, STATES, describe_live, describe_state, judge_visit
-from sagittal.server.services import analyses, edit_log, live, patients, sessions
+from sagittal.server.results import analyses, edit_log
 from sagittal.server.storage.blobs import Blob
+from tests.helpers.clinic import Clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 

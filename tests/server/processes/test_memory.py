@@ -13,7 +13,7 @@ from tests.data import ROOT
 HOLES = """
 from pathlib import Path
 import numpy as np
-from sagittal.core.memory import give_memory_back
+from sagittal.core.signals.memory import give_memory_back
 from sagittal.server.processes.memory import share_allocator
 share_allocator()
 import pyarrow as pa

@@ -7,7 +7,7 @@ import pytest
 
 from sagittal.core.errors import Notice
 from sagittal.core.parameters import gait_parameters
-from sagittal.server.report.bundle import Bundle
+from sagittal.server.report.files.bundle import Bundle
 from tests.server import walk
 
 MakeBundle = Callable[..., Bundle]

@@ -16,13 +16,13 @@ from sagittal.core.norms.controls import ControlSession, control_group, mean_cur
 from sagittal.core.norms.kinematics import adult_kinematics
 from sagittal.core.parameters import cycle_curves
 from sagittal.core.parameters.kinematic import MEAN_ZERO
-from sagittal.core.standing_angles import NAMES, PELVIS
-from sagittal.server.report.bundle import Bundle
-from sagittal.server.report.model import ReportModel, report_model
-from sagittal.server.report.panels import CurvePanel, same_zero
+from sagittal.core.subject.standing_angles import NAMES, PELVIS
+from sagittal.server.report.charts.panels import CurvePanel, same_zero
+from sagittal.server.report.files.bundle import Bundle
 from sagittal.server.report.tables import curves_csv, parameters_csv
+from sagittal.server.report.view.model import ReportModel, report_model
 from tests.server.report.conftest import MakeBundle
-from tests.server.report.test_estimator import section
+from tests.server.report.words.test_estimator import section
 
 STANDING = {
     f"{joint}_{s}": angle for joint, angle in (("hip_flexion", 12.0), ("knee_flexion", 6.0)) for s in "lr"

@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy import insert, select
 
 from sagittal.server import audit
-from sagittal.server.services import patients, sessions
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.storage.copying import copy_rows
 from sagittal.server.storage.db import Database, highest_number, raise_number
 from sagittal.server.storage.tables import audit as audit_table

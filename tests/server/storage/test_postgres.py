@@ -17,10 +17,10 @@ from sqlalchemy import insert, make_url, select
 from sqlalchemy.exc import IntegrityError, OperationalError
 
 from sagittal.server import audit
+from sagittal.server.clinic import patients
 from sagittal.server.jobs.opening import open_queue
 from sagittal.server.main import main
-from sagittal.server.services import patients
-from sagittal.server.services.custody import StrangersError, refuse_foreign_folder
+from sagittal.server.safekeeping.custody import StrangersError, refuse_foreign_folder
 from sagittal.server.settings import Settings, SettingsError
 from sagittal.server.storage import migrate
 from sagittal.server.storage.db import Database, highest_number
@@ -29,10 +29,10 @@ from sagittal.server.storage.person_tables import api_token
 from sagittal.server.storage.postgres import PostgresServer
 from sagittal.server.storage.refusal import is_busy
 from sagittal.server.storage.tables import metadata, new_id, now, patient, user
+from tests.helpers.clinic import ORIGIN, open_clinic
 from tests.helpers.databases import write_database
 from tests.helpers.engines import require_postgres
 from tests.helpers.postgres import PASSWORD, run_sql
-from tests.server.clinic import ORIGIN, open_clinic
 from tests.server.nodes.pair import describe, find_ports, start_process
 
 pytestmark = [pytest.mark.postgres, pytest.mark.anyio]

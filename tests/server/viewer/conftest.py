@@ -9,11 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from sagittal.server.report.exports import poses_parquet
-from sagittal.server.services import analyses, patients, recordings, sessions
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.report.files.exports import poses_parquet
+from sagittal.server.results import analyses
+from sagittal.server.uploads import recordings
 from sagittal.server.viewer.motion import ReplayMotion, prepare_motion
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed, walk
-from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
 

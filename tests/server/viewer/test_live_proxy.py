@@ -15,8 +15,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.typing import Subprotocol
 
+from sagittal.server.clinic import patients, sessions
 from sagittal.server.live.hub import Hub
-from sagittal.server.services import patients, sessions
 from sagittal.server.viewer.views import FigureView, FigureViews
 from tests.server.viewer.conftest import Ward
 from tests.server.viewer.pictures import picture

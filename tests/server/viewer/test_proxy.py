@@ -16,7 +16,7 @@ from websockets.typing import Subprotocol
 
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Role
-from sagittal.server.report.no_figure import FEW_SENSORS
+from sagittal.server.report.view.no_figure import FEW_SENSORS
 from sagittal.server.viewer import pipe
 from sagittal.server.viewer.room import VIEWS
 from sagittal.server.viewer.views import FigureView, FigureViews

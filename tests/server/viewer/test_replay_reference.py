@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sagittal.server.report.bundle import read_poses
-from sagittal.server.services import analyses, histories, patients, sessions
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.report.files.bundle import read_poses
+from sagittal.server.results import analyses, histories
 from sagittal.server.viewer.motion import prepare_motion
 from sagittal.server.viewer.reference import SAGITTAL
 from sagittal.server.viewer.replay_reference import _average_side, find_references
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed
-from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
 

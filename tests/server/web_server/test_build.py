@@ -7,7 +7,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from tests.server.clinic import open_clinic
+from tests.helpers.clinic import open_clinic
 from tests.server.serving import serve
 
 pytestmark = pytest.mark.anyio

@@ -12,7 +12,7 @@ import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from sagittal.server.live.protocol import MOST_MESSAGE_BYTES
-from tests.server.clinic import Clinic, open_clinic
+from tests.helpers.clinic import Clinic, open_clinic
 from tests.server.serving import serve, serving
 
 pytestmark = pytest.mark.anyio

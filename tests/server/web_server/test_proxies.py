@@ -11,7 +11,7 @@ import pytest
 from starlette.types import Receive, Scope, Send
 
 from sagittal.server.settings import Settings
-from tests.server.clinic import open_clinic
+from tests.helpers.clinic import open_clinic
 from tests.server.serving import serve
 
 pytestmark = pytest.mark.anyio

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from sagittal.core.errors import FormatError
+from sagittal.server.errors import Conflict
 from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import BESIDE, COMPARE_FILTERS, EXPORT, SENSITIVITY, TUNE
-from sagittal.server.services import recordings
-from sagittal.server.services.errors import Conflict
 from sagittal.server.settings import Settings
 from sagittal.server.storage.blob_source import open_source
+from sagittal.server.uploads import recordings
 from sagittal.server.worker import tasks
 from sagittal.server.worker.task import TASKS, load
 from tests.faults.clinic import Clinic

@@ -15,8 +15,8 @@ import pytest
 
 from sagittal.server.jobs.queue import Claim, JobQueue, LeaseState
 from sagittal.server.processes.channel import Channel
-from sagittal.server.services import erasure
 from sagittal.server.settings import Settings
+from sagittal.server.storage import references
 from sagittal.server.storage.blobs import Blob, BlobStore, StoreAway
 from sagittal.server.storage.db import Database
 from sagittal.server.worker import worker as at
@@ -110,7 +110,7 @@ def test_a_job_that_was_left_in_its_midst_is_not_answered_for_the_next(
     def leave() -> None:
         raise StoreAway("away", refuses=False)
 
-    monkeypatch.setattr(erasure, "discard", lambda *_: None)
+    monkeypatch.setattr(references, "discard", lambda *_: None)
     assert work(monkeypatch, leave).published == []
 
 
@@ -126,7 +126,7 @@ def test_a_former_checkpoint_that_cannot_be_removed_stops_no_job(monkeypatch: py
             tried.append("looked again")
             raise StoreAway("away", refuses=False)
 
-    monkeypatch.setattr(erasure, "discard", discard)
+    monkeypatch.setattr(references, "discard", discard)
     work(monkeypatch, leave)
     assert tried[:2] == ["discard", "looked again"]
 

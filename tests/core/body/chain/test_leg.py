@@ -13,10 +13,10 @@ from sagittal.core.angles.measure import measure_angles
 from sagittal.core.body.chain.leg import estimate_leg
 from sagittal.core.calibration.fixed_offset import make_fixed_mounts
 from sagittal.core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import CalibrationError, EstimationError
 from sagittal.core.frames import Segment, Side
 from sagittal.core.rotation import about, to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.simulate import SquatSimulation
 from sagittal.core.simulate.mems import MEMS
 from sagittal.core.simulate.squat_chain import measure_leg

@@ -18,12 +18,12 @@ from sagittal.core.body.erkf.headings import (
 )
 from sagittal.core.body.erkf.params import ErkfParams
 from sagittal.core.body.tree import PRESETS
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.frames import R_NEUTRAL, Segment
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.rest import index_window
 from sagittal.core.rotation import about, angle_between, from_matrix, to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
+from sagittal.core.signals.rest import index_window
 from tests.helpers.walks import simulated
 
 WHOLE = PRESETS["lower_body7"]

@@ -14,8 +14,8 @@ from sagittal.core.body.live_still import ROLLING_MPS
 from sagittal.core.body.tree import person_tree
 from sagittal.core.frames import GRAVITY, Floats, Segment
 from sagittal.core.online import LiveStride
-from sagittal.core.recording import UniformRecording
 from sagittal.core.rotation import about, multiply
+from sagittal.core.signals.recording import UniformRecording
 from tests.core.body.live_standing import BODY, NEUTRAL, RATE
 from tests.helpers.live_walks import live as stream
 from tests.helpers.walks import cut, only, simulated

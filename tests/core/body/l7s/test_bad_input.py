@@ -23,10 +23,10 @@ from sagittal.core.errors import EstimationError, SagittalError
 from sagittal.core.estimators import Estimator
 from sagittal.core.frames import FOOT, SIDES, Floats, Segment
 from sagittal.core.fusion.mahony import estimate_orientations
-from sagittal.core.held_samples import SampleSeries
 from sagittal.core.pipeline import PipelineConfig, analyse
-from sagittal.core.recording import Recording, SensorSignals, UniformRecording
 from sagittal.core.rotation import about, multiply, rotate
+from sagittal.core.signals.held_samples import SampleSeries
+from sagittal.core.signals.recording import Recording, SensorSignals, UniformRecording
 from sagittal.core.simulate import simulate_scenario
 from tests.core.body.l7s.test_poses import still_feet
 from tests.core.body.test_estimate import FEET, PELVIS_FEET, estimated

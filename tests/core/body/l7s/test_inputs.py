@@ -10,9 +10,9 @@ import pytest
 from sagittal.core.body import BodyModel
 from sagittal.core.body.l7s.inputs import KnownSamples, arrange_inputs, remove_gravity
 from sagittal.core.body.l7s.legs import BODIES, LegModel
-from sagittal.core.calibration.result import SegmentCalibration
 from sagittal.core.frames import GRAVITY, Bools, Floats
 from sagittal.core.rotation import exp, from_matrix, rotate, to_matrix
+from sagittal.core.signals.calibrated import SegmentCalibration
 
 MODEL = LegModel.of(BodyModel.from_height(1.7))
 N = 300

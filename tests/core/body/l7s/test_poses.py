@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sagittal.core.angles.measure import measure_angles
+from sagittal.core.angles.withheld import withhold
 from sagittal.core.body.l7s import smoother
 from sagittal.core.body.l7s.constraints import constraint_rows
 from sagittal.core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
@@ -22,14 +23,13 @@ from sagittal.core.body.poses import Poses
 from sagittal.core.body.se3 import right_jacobian
 from sagittal.core.body.still import FOOT_STILL, still_samples
 from sagittal.core.calibration import calibrate
-from sagittal.core.calibration.result import CalibratedRecording
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Side
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.rotation import about, exp, multiply, to_matrix
+from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.simulate import WalkTruth
-from sagittal.core.withheld import withhold
 from tests.helpers.walks import simulated
 
 BODY = BodyModel.from_height(1.75)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sagittal.core import held_samples
 from sagittal.core.body import poses
 from sagittal.core.body.l7s import windows
 from sagittal.core.body.l7s.windows import cut_windows
 from sagittal.core.body.poses import Poses
 from sagittal.core.frames import FOOT, SHANK, SIDES
+from sagittal.core.signals import held_samples
 from tests.core.body.l7s.test_poses import poses_of
 
 

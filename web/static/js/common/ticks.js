@@ -1,4 +1,4 @@
-// Round ticks of a value axis: multiples of 1, 2 or 5 times a power of ten, as server/report/svg.py has them.
+// Round ticks of a value axis: multiples of 1, 2 or 5 times a power of ten, as server/report/charts/svg.py has them.
 const MOST = 5;
 const ROUNDING = 1e-9; // of a step: an end of the axis that is a multiple gets its tick
 

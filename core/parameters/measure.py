@@ -1,0 +1,158 @@
+"""Events, a person's edits → strides → parameters: everything that follows the stride list, in one function.
+
+The pipeline calls it at its end and the server after every edit, so that both give the same numbers. `Tracks`
+is what it needs of a finished analysis; nothing here filters a signal, and nothing imports numba.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.feet import FootTracks
+from sagittal.core.errors import Notice
+from sagittal.core.events.alternation import AlternationParams, measure_foot_lag
+from sagittal.core.events.bouts import Bout, BoutParams, find_bouts
+from sagittal.core.events.edits import Edit, apply_event_edits, apply_stride_edits
+from sagittal.core.events.flags import StrideParams, add_flag
+from sagittal.core.events.result import GaitEvents, Strides
+from sagittal.core.events.steps import Steps
+from sagittal.core.events.strides import count_strides, stride_list
+from sagittal.core.events.turns import Turn
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.parameters import Surface, take_figures
+from sagittal.core.parameters.flats import Flats, find_flats
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.rows import Column
+from sagittal.core.parameters.smoothness import stride_smoothness
+from sagittal.core.parameters.spatial import in_place
+from sagittal.core.parameters.trunk import trunk_regularity
+from sagittal.core.parameters.uncertainty import state_uncertainty
+from sagittal.core.parameters.walking import bout_parameters, step_parameters, step_strides, turn_parameters
+from sagittal.core.signals.rest import Window
+
+
+@dataclass(frozen=True, eq=False)
+class Tracks:
+    """What strides and parameters are measured on, all on one uniform axis.
+
+    Parameters
+    ----------
+    t_s : (n,) s from recording start.
+    events : as detected, before any edit.
+    q, valid : foot → (n, 4) foot to world, scalar first, and (n,) the sensor was there: heading and pitch.
+    turning : (n,) mask of the calibration, None if not known.
+    feet : paths of the feet, None where no distance can be measured. angles : None when not reached.
+    trunk : pelvis, chest → (n, 3) acceleration free of gravity, forward, left, up (m/s²): core/walking_frame.
+    params : of the stride list. bout_params : of the walking bouts of the feet's contacts.
+    rests : windows of standing still, None if not known. standing : those of the feet alone, short ones too
+        (core/signals/rest.py, STANDING). turns : of the body. steps : of a trunk sensor,
+        where no foot carries one; they are not edited.
+    """
+
+    t_s: Floats
+    rate_hz: float
+    events: GaitEvents
+    q: Mapping[Segment, Floats]
+    valid: Mapping[Segment, Bools]
+    turning: Bools | None = None
+    feet: FootTracks | None = None
+    angles: JointAngles | None = None
+    trunk: Mapping[Segment, Floats] = field(default_factory=dict)
+    surface: Surface = field(default_factory=Surface)
+    params: StrideParams = field(default_factory=StrideParams)
+    bout_params: BoutParams = field(default_factory=BoutParams)
+    rests: tuple[Window, ...] | None = None
+    standing: tuple[Window, ...] = ()
+    turns: tuple[Turn, ...] = ()
+    steps: Steps | None = None
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last sample."""
+        return float(self.t_s[-1]) if len(self.t_s) else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredGait:
+    """What the events and edits give.
+
+    Parameters
+    ----------
+    columns : parameters of every stride of the list, counted or not, in its order.
+    bouts : walking without a long break. turns : of the body. steps : of a trunk sensor without foot sensors.
+    """
+
+    events: GaitEvents
+    strides: Strides
+    parameters: tuple[Parameter, ...]
+    columns: Mapping[str, Column]
+    bouts: tuple[Bout, ...] = ()
+    turns: tuple[Turn, ...] = ()
+    steps: Steps | None = None
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """Of the stride list and the steps."""
+        return self.strides.notices + (() if self.steps is None else self.steps.notices)
+
+
+def _regular(tracks: Tracks, steps: Steps) -> tuple[Parameter, ...]:
+    strides = step_strides(steps)
+    return (
+        *trunk_regularity(strides, tracks.t_s, tracks.trunk),
+        stride_smoothness(strides, tracks.t_s, tracks.trunk),
+    )
+
+
+def measure_gait(tracks: Tracks, edits: Sequence[Edit] = ()) -> MeasuredGait:
+    """Apply the edits and measure again.
+
+    Raises
+    ------
+    ParameterError
+        An edit does not fit the events: `no_such_event`, `event_outside`, `event_order` of
+        core/events/edits.py.
+    """
+    events = apply_event_edits(tracks.events, edits, tracks.duration_s)
+    found = stride_list(events, tracks, tracks.turning, tracks.params)
+    flats = None if tracks.feet is None else find_flats(found, tracks.feet)
+    strides = apply_stride_edits(_walked(tracks, found, flats), edits)
+    figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk, flats)
+    # contacts, found or set by a person, say more than the trunk
+    steps = None if events.events else tracks.steps
+    if steps is None:
+        bouts = find_bouts(events, tracks.rests, tracks.bout_params, tracks.standing)
+    else:
+        bouts = steps.bouts
+    first = figures.parameters if steps is None else _of_steps(tracks, steps, figures.parameters)
+    estimated = () if tracks.angles is None else tracks.angles.estimated
+    first = state_uncertainty(first, events, estimated, feet_lag_s=_find_feet_lag(tracks, events))
+    parameters = first + bout_parameters(bouts) + turn_parameters(tracks.turns)
+    return MeasuredGait(events, strides, parameters, figures.columns, bouts, tracks.turns, steps)
+
+
+def _find_feet_lag(tracks: Tracks, events: GaitEvents) -> float:
+    """What one foot's clock may be late by, s; 0 where a chain of sensors links the feet, or none tells."""
+    if tracks.feet is not None and tracks.feet.linked:
+        return 0.0
+    return abs(measure_foot_lag(events, AlternationParams()) or 0.0)
+
+
+def _walked(tracks: Tracks, found: Strides, flats: Flats | None) -> Strides:
+    """The stride list, without strides that lead nowhere where the feet's paths are known."""
+    marching = in_place(found, tracks.feet, tracks.surface, flats).tolist()
+    if not marching:
+        return found
+    listed = list(found.strides)
+    for i in marching:
+        listed[i] = add_flag(listed[i], "in_place")
+    return count_strides(listed, tracks.params)
+
+
+def _of_steps(tracks: Tracks, steps: Steps, figures: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
+    """What the trunk tells; beside it, where feet were worn and not understood, what they do not tell."""
+    told = (*step_parameters(steps), *_regular(tracks, steps))
+    known = {(p.name, p.side) for p in told}
+    return told + tuple(p for p in figures if tracks.q and (p.name, p.side) not in known)

@@ -1,0 +1,1 @@
+"""What was recorded, and how signals are filtered, searched and kept in memory."""

@@ -1,0 +1,336 @@
+"""What was recorded: frozen objects, checked once at construction, SI units.
+
+`Recording` is what the files say (each sensor on its own clock); `UniformRecording` is the same take on
+one time axis with a validity mask per sensor (made by core/timeline). All later stages work on the latter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from sagittal.core.errors import Notice, ParameterError, SignalError
+from sagittal.core.frames import PROTOCOLS, SEGMENTS, Bools, Floats, Protocol, Segment
+from sagittal.core.signals.held_samples import HoldsSamples, hold_samples
+from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
+from sagittal.core.subject.anthropometry import BodyMeasures
+from sagittal.core.subject.shoe import Shoe
+from sagittal.core.subject.standing_angles import check_standing
+
+
+def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], where: str) -> None:
+    """Check shape and type of an array once and lock it against writing."""
+    if a is None:
+        return
+    if a.ndim != len(shape) or any(
+        want is not None and got != want for got, want in zip(a.shape, shape, strict=True)
+    ):
+        raise ParameterError("bad_shape", f"{where}: {name} has shape {a.shape}, expected {shape}.")
+    a.setflags(write=False)
+
+
+BELT_MPS: Final = (0.05, 5.0)
+"""Speeds a treadmill can have."""
+
+
+def check_belt(belt_speed_mps: float | None, protocol: Protocol) -> None:
+    """Refuse a belt speed that no treadmill has, or one without a treadmill.
+
+    Raises
+    ------
+    ParameterError `belt_speed_implausible`, `belt_speed_without_treadmill`.
+    """
+    if belt_speed_mps is None:
+        return
+    if not BELT_MPS[0] <= belt_speed_mps <= BELT_MPS[1]:
+        raise ParameterError(
+            "belt_speed_implausible",
+            f"Belt speed {belt_speed_mps:g} m/s is outside {BELT_MPS[0]:g} to {BELT_MPS[1]:g} m/s; give it "
+            "in metres per second (3.6 km/h is 1 m/s).",
+        )
+    if protocol != "treadmill":
+        raise ParameterError(
+            "belt_speed_without_treadmill",
+            f"A belt speed is given, but the protocol is '{protocol}'; set it to treadmill or leave the "
+            "speed out.",
+        )
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Who was measured; None where nobody said.
+
+    Parameters
+    ----------
+    height_m : body height, 0.5 to 2.5 m.
+    standing_width_m : between the middles of the ankles while standing at the beginning, 0 to 0.8 m.
+    standing_angles_deg : joint angles in that standing by goniometer, names as
+        `sagittal.core.subject.standing_angles.NAMES`.
+    shoe : the shape of its sole. measures : lengths of the body by tape.
+    """
+
+    height_m: float | None = None
+    standing_width_m: float | None = None
+    standing_angles_deg: Mapping[str, float] = field(default_factory=dict, hash=False)
+    shoe: Shoe | None = None
+    measures: BodyMeasures = field(default_factory=BodyMeasures)
+
+    def __post_init__(self) -> None:
+        if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:
+            raise ParameterError(
+                "height_implausible",
+                f"Body height {self.height_m:g} m is outside 0.5 to 2.5 m; give it in metres.",
+            )
+        if self.standing_width_m is not None and not 0.0 <= self.standing_width_m <= 0.8:
+            raise ParameterError(
+                "standing_width_implausible",
+                f"Ankles {self.standing_width_m:g} m apart while standing is outside 0 to 0.8 m; give the "
+                "distance of their middles in metres.",
+            )
+        check_standing(self.standing_angles_deg)
+        object.__setattr__(self, "standing_angles_deg", MappingProxyType(dict(self.standing_angles_deg)))
+
+    def complete_from(self, other: Subject) -> Subject:
+        """What is known here, and from `other` what is not."""
+        height, width = self.height_m, self.standing_width_m
+        return Subject(
+            other.height_m if height is None else height,
+            other.standing_width_m if width is None else width,
+            {**other.standing_angles_deg, **self.standing_angles_deg},
+            self.shoe or other.shoe,
+            self.measures.complete_from(other.measures),
+        )
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values, keys as in a manifest's `subject`."""
+        return {
+            "height_m": self.height_m,
+            "standing_width_m": self.standing_width_m,
+            "standing_angles_deg": dict(self.standing_angles_deg),
+            "shoe": None if self.shoe is None else asdict(self.shoe),
+            "measures": self.measures.to_json(),
+        }
+
+
+@hold_samples("acc", "gyr", "mag", "quat")
+@dataclass(frozen=True, eq=False)
+class ImuStream(HoldsSamples):
+    """One sensor as its file gives it, in SI units, on its own clock; missing samples are NaN rows.
+
+    Parameters
+    ----------
+    device_id : serial number or column label, unique in a recording.
+    source : name of the file it came from.
+    t_s : (n,) seconds, strictly increasing. From a packet counter (unwrapped) or the device clock.
+        Streams of one recording that share `clock` share the origin of `t_s`.
+    acc : (n, 3) specific force, m/s². gyr : (n, 3) rad/s or None. mag : (n, 3) any unit or None.
+    quat : (n, 4) vendor orientation, scalar first, kept for comparison only, or None.
+    rate_hz : nominal sampling rate.
+    clock : what `t_s` was made from: "counter" (shared packet counter), "device" (own clock), "index".
+    digest : made of the signal values, to find the same stream under two ids.
+    notices : what the reader had to decide or could not read.
+    """
+
+    device_id: str
+    source: str
+    t_s: Floats
+    acc: Floats
+    gyr: Floats | None
+    mag: Floats | None
+    quat: Floats | None
+    rate_hz: float
+    clock: str
+    digest: str
+    notices: tuple[Notice, ...] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.t_s)
+        if n == 0:
+            raise SignalError("empty", f"“{self.source}”: no samples.", sensor=self.device_id)
+        for name, a, shape in (
+            ("t_s", self.t_s, (n,)),
+            ("acc", self.held("acc"), (n, 3)),
+            ("gyr", self.held("gyr"), (n, 3)),
+            ("mag", self.held("mag"), (n, 3)),
+            ("quat", self.held("quat"), (n, 4)),
+        ):
+            _frozen(a, name, shape, self.source)
+        if np.any(self.t_s[1:] <= self.t_s[:-1]):
+            raise SignalError(
+                "time_not_increasing", f"“{self.source}”: time does not increase.", sensor=self.device_id
+            )
+
+
+@dataclass(frozen=True)
+class GivenLimits:
+    """When a person says that a functional test began and ended, s; None = as it is found.
+
+    Raises
+    ------
+    ParameterError `test_limits` where a time is below 0 or the end is not after the start.
+    """
+
+    start_s: float | None = None
+    end_s: float | None = None
+
+    def __post_init__(self) -> None:
+        times = [t for t in (self.start_s, self.end_s) if t is not None]
+        if any(not 0.0 <= t < float("inf") for t in times) or times != sorted(set(times)):
+            raise ParameterError(
+                "test_limits",
+                f"A test from {self.start_s} s to {self.end_s} s; expected times of 0 or more, the end after "
+                "the start.",
+            )
+
+
+BLOCK_ROWS: Final = 1 << 16
+"""Rows of a block where nothing else says how long it is."""
+
+
+def as_long_stream(stream: ImuStream, rows: int = BLOCK_ROWS) -> LongStream:
+    """A stream that is in memory, read in blocks of so many rows."""
+
+    def open_blocks() -> Iterator[SampleBlock]:
+        for i in range(0, len(stream.t_s), rows):
+            part = slice(i, i + rows)
+            gyr = None if stream.held("gyr") is None else stream.cut("gyr", part)
+            yield SampleBlock(stream.t_s[part] - stream.t_s[0], stream.cut("acc", part), gyr)
+
+    return LongStream(
+        device_id=stream.device_id,
+        source=stream.source,
+        rate_hz=stream.rate_hz,
+        has_gyro=stream.held("gyr") is not None,
+        duration_s=float(stream.t_s[-1] - stream.t_s[0]),
+        open_blocks=open_blocks,
+        notices=stream.notices,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One take: streams by device id and which segment each is worn on.
+
+    Parameters
+    ----------
+    streams : device id → stream.
+    segments : device id → segment, None = not used. Ids without an entry are unassigned (see `unassigned`).
+    mounting : segment → declared mounting, free text ("sacrum, face backwards").
+    sha256 : file name → sha256 of the source bytes.
+    belt_speed_mps : of a treadmill, None = not entered.
+    test_limits : of a functional test, as a person corrected them.
+    long : device id → sensor that is read block by block; such a sensor need not be among the streams.
+    """
+
+    streams: Mapping[str, ImuStream]
+    segments: Mapping[str, Segment | None]
+    subject: Subject = field(default_factory=Subject)
+    protocol: Protocol = "walk"
+    mounting: Mapping[str, str] = field(default_factory=dict)
+    sha256: Mapping[str, str] = field(default_factory=dict)
+    notices: tuple[Notice, ...] = ()
+    belt_speed_mps: float | None = None
+    test_limits: GivenLimits = field(default_factory=GivenLimits)
+    long: Mapping[str, LongStream] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_belt(self.belt_speed_mps, self.protocol)
+        if self.protocol not in PROTOCOLS:
+            raise ParameterError(
+                "unknown_protocol", f"Protocol '{self.protocol}' is not one of {', '.join(PROTOCOLS)}."
+            )
+        worn: dict[str, str] = {}
+        for device, segment in self.segments.items():
+            if segment is None:
+                continue
+            if segment not in SEGMENTS:
+                raise ParameterError(
+                    "unknown_segment",
+                    f"Sensor {device} is mapped to '{segment}'; expected {', '.join(SEGMENTS)} or null.",
+                    sensor=device,
+                )
+            if segment in worn:
+                raise ParameterError(
+                    "duplicate_segment",
+                    f"Sensors {worn[segment]} and {device} are both mapped to {segment}; choose one.",
+                    sensor=device,
+                )
+            worn[segment] = device
+        for name in ("streams", "segments", "mounting", "sha256", "long"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    @property
+    def unassigned(self) -> tuple[str, ...]:
+        """Device ids that nobody has mapped or set aside."""
+        return tuple(d for d in dict.fromkeys((*self.streams, *self.long)) if d not in self.segments)
+
+
+@hold_samples("acc", "gyr", "mag")
+@dataclass(frozen=True, eq=False)
+class SensorSignals(HoldsSamples):
+    """One sensor on the uniform axis.
+
+    Parameters
+    ----------
+    acc, gyr : (n, 3) m/s², rad/s; finite everywhere (invalid samples hold the last value).
+    mag : (n, 3) or None.
+    valid : (n,) measured or interpolated over ≤ 0.1 s. interpolated : (n,) filled, flagged.
+    """
+
+    device_id: str
+    acc: Floats
+    gyr: Floats
+    mag: Floats | None
+    valid: Bools
+    interpolated: Bools
+
+    def __post_init__(self) -> None:
+        acc, gyr = self.held("acc"), self.held("gyr")
+        n = len(acc)
+        for name, a, shape in (
+            ("acc", acc, (n, 3)),
+            ("gyr", gyr, (n, 3)),
+            ("mag", self.held("mag"), (n, 3)),
+            ("valid", self.valid, (n,)),
+            ("interpolated", self.interpolated, (n,)),
+        ):
+            _frozen(a, name, shape, self.device_id)
+        if not (np.isfinite(acc).all() and np.isfinite(gyr).all()):
+            raise SignalError(
+                "bad_signal", f"{self.device_id}: non-finite samples left.", sensor=self.device_id
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class UniformRecording:
+    """A take on one uniform time axis, by segment.
+
+    Parameters
+    ----------
+    t_s : (n,) seconds from recording start, step 1 / rate_hz.
+    sensors : segment → signals, all of length n. belt_speed_mps : of a treadmill, None = not entered.
+    """
+
+    t_s: Floats
+    rate_hz: float
+    sensors: Mapping[Segment, SensorSignals]
+    subject: Subject
+    protocol: Protocol
+    mounting: Mapping[str, str]
+    notices: tuple[Notice, ...] = ()
+    belt_speed_mps: float | None = None
+
+    def __post_init__(self) -> None:
+        _frozen(self.t_s, "t_s", (None,), "UniformRecording")
+        for segment, s in self.sensors.items():
+            if len(s.valid) != len(self.t_s):
+                raise ParameterError(
+                    "bad_shape",
+                    f"{segment} has {len(s.valid)} samples, the axis {len(self.t_s)}.",
+                    sensor=segment,
+                )
+        object.__setattr__(self, "sensors", MappingProxyType(dict(self.sensors)))

@@ -1,0 +1,201 @@
+"""Where the sensors are at rest: quiet windows anywhere in a take, for all sensors together or for one.
+
+A sample is quiet when the 1-s window around it has mean |ω − b| below 6 °/s and std |f| below 0.25 m/s²
+(docs/science/calibration.md, "Rest"). b is the sensor's own offset, taken from its quietest window instead of
+the median of the take: in a take that is mostly walking the median is a property of the gait, not of the
+gyroscope.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import radians
+from typing import Final, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.signals.recording import SensorSignals, UniformRecording
+
+A = TypeVar("A", Floats, Bools)
+
+Window = tuple[float, float]
+"""Half-open time range [start, end) in seconds from recording start."""
+
+
+@dataclass(frozen=True)
+class QuietParams:
+    """What counts as quiet (docs/science/calibration.md, "Rest")."""
+
+    window_s: float = 1.0
+    gyro_limit: float = radians(6.0)
+    acc_std_limit: float = 0.25
+    shortest_s: float = 1.0
+
+
+@dataclass(frozen=True)
+class RestParams(QuietParams):
+    """What counts as rest of a person (docs/science/calibration.md, "Rest", "False rests").
+
+    Parameters
+    ----------
+    drift, drift_rate : a rest over which the vertical turns further in a sensor, and faster, rad and rad/s,
+        is a slow movement. bias : a mean rate further from that of a longer rest, rad/s, is no bias of the
+        gyroscope, and that of the longer rest is taken. 6 °/s of mean rate let both pass: a lower back that
+        swayed for 2 s at the start of a real take had 2.9 °/s, and its heading was lost.
+    """
+
+    drift: float = radians(1.0)
+    drift_rate: float = radians(1.0)
+    bias: float = radians(1.0)
+
+
+STANDING: Final = QuietParams(window_s=0.5, shortest_s=0.5)
+"""A short standing within a walk, which says nothing of the gyroscope (our choice: the shortest stop,
+core/events/bouts.py)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quietness:
+    """How quiet one sensor is around each sample.
+
+    Parameters
+    ----------
+    gyro : (n,) mean |ω − b| over the window in rad/s. acc : (n,) std |f| over the window in m/s².
+    quiet : (n,) both below their limits and every sample of the window valid.
+    """
+
+    gyro: Floats
+    acc: Floats
+    quiet: Bools
+
+
+def measure_quietness(signals: SensorSignals, rate_hz: float, params: QuietParams | None = None) -> Quietness:
+    """Measure how quiet a sensor is in the window around every sample; borders hold the nearest window."""
+    params = params or QuietParams()
+    width = max(2, round(params.window_s * rate_hz))
+    if len(signals.valid) < width:
+        never = np.full(len(signals.valid), np.inf)
+        return Quietness(never, never, np.zeros(len(signals.valid), bool))
+    # readers of results do without numba
+    from sagittal.core.signals.kernel import find_steadiest_rate, measure_norms, measure_windows
+
+    n, zero = len(signals.valid), np.zeros(3)
+    whole, offset, norm = np.empty(n - width + 1, np.bool_), np.empty(3), np.empty(n)
+    rate = _lock(signals.gyr)
+    find_steadiest_rate(rate, _lock(signals.valid), width, whole, offset)
+    measure_norms(rate, zero if np.linalg.norm(offset) > params.gyro_limit else offset, norm)
+    del rate
+    gyro, acc, unused = np.empty(n), np.empty(n), np.empty(n)
+    measure_windows(norm, width, gyro, unused)
+    measure_norms(_lock(signals.acc), zero, norm)
+    norm -= norm.mean()
+    measure_windows(norm, width, unused, acc)
+    quiet = (gyro < params.gyro_limit) & (acc < params.acc_std_limit) & _centred(whole, n, width)
+    return Quietness(gyro, acc, quiet)
+
+
+def find_rest_windows(
+    recording: UniformRecording,
+    params: QuietParams | None = None,
+    segments: Iterable[Segment] | None = None,
+) -> tuple[Window, ...]:
+    """Windows in which all sensors (or those of `segments`) are at rest together, in order of time.
+
+    The quarter window at each end of a run that may already hold the onset of movement is left out.
+    """
+    params = params or QuietParams()
+    chosen = tuple(recording.sensors if segments is None else segments)
+    if not chosen:
+        return ()
+    quiet = np.ones(len(recording.t_s), bool)
+    for segment in chosen:
+        quiet &= measure_quietness(recording.sensors[segment], recording.rate_hz, params).quiet
+    return find_windows(quiet, recording.rate_hz, params)
+
+
+def drop_false_rests(
+    recording: UniformRecording, rests: tuple[Window, ...], params: RestParams | None = None
+) -> tuple[Window, ...]:
+    """The rests in which no sensor's vertical turns: the others are slow movements."""
+    params, rate = params or RestParams(), recording.rate_hz
+    sensors = recording.sensors.values()
+    return tuple(r for r in rests if not any(is_drifting(x, r, rate, params) for x in sensors))
+
+
+def is_drifting(signals: SensorSignals, window: Window, rate_hz: float, params: RestParams) -> bool:
+    """Does the vertical turn in a sensor between the ends of a window, a quarter of a second to one each?"""
+    turned = measure_turn(signals.cut("acc", index_window(window, rate_hz)), rate_hz)
+    return turned[0] > params.drift and turned[0] > params.drift_rate * turned[1]
+
+
+def measure_turn(acc: Floats, rate_hz: float) -> tuple[float, float]:
+    """Angle in rad by which the mean force (n, 3) differs at the ends of a rest, and the seconds between."""
+    edge = max(1, min(len(acc) // 4, round(rate_hz)))
+    a, b = acc[:edge].mean(axis=0), acc[-edge:].mean(axis=0)
+    turned = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+    return turned, (len(acc) - edge) / rate_hz
+
+
+def find_windows(quiet: Bools, rate_hz: float, params: QuietParams | None = None) -> tuple[Window, ...]:
+    """Turn a mask (n,) of quiet window centres into rest windows of at least `shortest_s`."""
+    params = params or QuietParams()
+    n = len(quiet)
+    reach = round(0.25 * params.window_s * rate_hz)
+    found = []
+    for start, end in find_runs(quiet):
+        first, last = max(0, start - reach), min(n, end + reach)
+        if last - first >= params.shortest_s * rate_hz - 1:
+            found.append((first / rate_hz, last / rate_hz))
+    return tuple(found)
+
+
+def count_runs(mask: Bools, before: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Samples in a row (T, n), this one included, up to each of a block of a mask (T, n).
+
+    Parameters
+    ----------
+    before : (n,) of those so far, advanced in place.
+    """
+    if not len(mask):
+        return np.zeros(mask.shape, np.int64)
+    count = np.arange(1, len(mask) + 1)[:, None]
+    since = np.maximum.accumulate(np.where(mask, 0, count), axis=0)
+    found = count - since + np.where(since == 0, before, 0)
+    before[:] = found[-1]
+    return np.asarray(found, np.int64)
+
+
+def find_runs(mask: Bools) -> list[tuple[int, int]]:
+    """Half-open index ranges of the True runs of a mask (n,)."""
+    if not len(mask):
+        return []
+    edges = (np.flatnonzero(mask[1:] != mask[:-1]) + 1).tolist()
+    edges = [*([0] if mask[0] else []), *edges, *([len(mask)] if mask[-1] else [])]
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def index_window(window: Window, rate_hz: float) -> slice:
+    """Index range of a time window on the uniform axis."""
+    return slice(max(0, round(window[0] * rate_hz)), max(0, round(window[1] * rate_hz)))
+
+
+def _lock(x: A) -> A:
+    """The same array as a kernel takes it, which is compiled once: contiguous, not to be written."""
+    locked = np.ascontiguousarray(x).view()
+    locked.setflags(write=False)
+    return locked
+
+
+def _centred(x: Bools, n: int, width: int) -> Bools:
+    """Place full-window values at the window centres of an axis of n samples, borders held."""
+    index = np.clip(np.arange(n) - width // 2, 0, len(x) - 1)
+    return x[index]
+
+
+def compile_rest_kernels() -> None:
+    """Compile what `measure_quietness` calls or load it, so that the first take does not wait for it."""
+    valid = np.ones(2, np.bool_)
+    measure_quietness(SensorSignals("", np.zeros((2, 3)), np.zeros((2, 3)), None, valid, ~valid), 1.0)

@@ -1,0 +1,1 @@
+"""Patients and their visits: identity, consent, notes, programme, sessions, sensors."""

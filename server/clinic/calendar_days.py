@@ -1,0 +1,31 @@
+"""Which days a programme, a planned visit or a note may have: a mistyped year is refused."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Final
+
+from sagittal.server.errors import ServiceError
+from sagittal.server.storage.tables import now
+
+FIRST: Final = dt.date(1900, 1, 1)
+AHEAD: Final = dt.timedelta(days=3653)
+"""Nobody plans further ahead than ten years (our choice)."""
+
+
+def require_day(day: dt.date) -> dt.date:
+    """Return the day; raises ServiceError bad_value for one before 1900 or more than ten years ahead."""
+    last = now().date() + AHEAD
+    if FIRST <= day <= last:
+        return day
+    raise ServiceError(
+        "bad_value", f"The day is {day.isoformat()}. Expected one from {FIRST} to {last}; check the year."
+    )
+
+
+def move_years(day: dt.date, years: int) -> dt.date:
+    """The same day some years later or, below 0, earlier; 28 for 29 February where there is none."""
+    try:
+        return day.replace(year=day.year + years)
+    except ValueError:
+        return day.replace(year=day.year + years, day=28)

@@ -1,0 +1,119 @@
+"""What a patient has agreed to: for what, since when, where it is written, and until when.
+
+Nothing is overwritten: whoever no longer agrees gets a day of withdrawal, and may agree anew later. It leaves
+with the patient only.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+
+from sqlalchemy import Connection, insert, select, update
+
+from sagittal.server import audit
+from sagittal.server.clinic import patients
+from sagittal.server.errors import Conflict, NotFound, ServiceError
+from sagittal.server.storage.person_tables import CONSENT_PURPOSES, consent
+from sagittal.server.storage.tables import new_id, now, user
+
+
+@dataclass(frozen=True)
+class Consent:
+    """One thing that a patient agreed to.
+
+    Parameters
+    ----------
+    purpose : one of CONSENT_PURPOSES. evidence : where it is written, "signed form, file 12".
+    withdrawn_on : None = it holds. by : name of who wrote it down, None = the program.
+    """
+
+    id: str
+    patient_id: str
+    purpose: str
+    given_on: dt.date
+    evidence: str
+    withdrawn_on: dt.date | None
+    created_at: dt.datetime
+    by: str | None
+
+
+def give(
+    c: Connection,
+    actor: audit.Actor | None,
+    patient_id: str,
+    *,
+    purpose: str,
+    evidence: str,
+    given_on: dt.date | None = None,
+) -> Consent:
+    """Write down that a patient agreed, today unless said otherwise.
+
+    Raises
+    ------
+    NotFound; Conflict `agreed_already`; ServiceError `bad_value`.
+    """
+    patients.get(c, patient_id)
+    today = now().date()
+    day = given_on or today
+    if purpose not in CONSENT_PURPOSES:
+        raise ServiceError("bad_value", f"'{purpose}' is no purpose; expected {', '.join(CONSENT_PURPOSES)}.")
+    if not 1 <= len(evidence.strip()) <= 200:
+        raise ServiceError("bad_value", "Say in 1 to 200 characters where the consent is written.")
+    if not dt.date(1900, 1, 1) <= day <= today:
+        raise ServiceError("bad_value", f"The day is {day.isoformat()}. Expected today or an earlier day.")
+    if any(one.purpose == purpose and one.withdrawn_on is None for one in of_patient(c, patient_id)):
+        raise Conflict("agreed_already", "This is written down already and holds.")
+    consent_id = new_id()
+    c.execute(
+        insert(consent).values(
+            id=consent_id,
+            patient_id=patient_id,
+            purpose=purpose,
+            given_on=day,
+            evidence=evidence.strip(),
+            created_at=now(),
+            created_by=None if actor is None else actor.user_id,
+        )
+    )
+    detail = {"consent_id": consent_id, "purpose": purpose}
+    audit.record(c, actor, "consent.given", "patient", patient_id, detail)
+    return get(c, consent_id)
+
+
+def withdraw(c: Connection, actor: audit.Actor | None, consent_id: str) -> Consent:
+    """Write down that a patient no longer agrees, from today; raises NotFound, Conflict withdrawn_already."""
+    found = get(c, consent_id)
+    if found.withdrawn_on is not None:
+        raise Conflict("withdrawn_already", "That it was withdrawn is written down already.")
+    c.execute(update(consent).where(consent.c.id == consent_id).values(withdrawn_on=now().date()))
+    detail = {"consent_id": consent_id, "purpose": found.purpose}
+    audit.record(c, actor, "consent.withdrawn", "patient", found.patient_id, detail)
+    return get(c, consent_id)
+
+
+def get(c: Connection, consent_id: str) -> Consent:
+    """One consent; raises NotFound."""
+    row = c.execute(_QUERY.where(consent.c.id == consent_id)).first()
+    if row is None:
+        raise NotFound("consent", consent_id)
+    return Consent(**row._asdict())
+
+
+def of_patient(c: Connection, patient_id: str) -> list[Consent]:
+    """What a patient agreed to, what holds first, then the latest."""
+    query = _QUERY.where(consent.c.patient_id == patient_id)
+    ordered = query.order_by(consent.c.withdrawn_on.is_not(None), consent.c.given_on.desc(), consent.c.id)
+    return [Consent(**row._asdict()) for row in c.execute(ordered)]
+
+
+_QUERY = select(
+    consent.c.id,
+    consent.c.patient_id,
+    consent.c.purpose,
+    consent.c.given_on,
+    consent.c.evidence,
+    consent.c.withdrawn_on,
+    consent.c.created_at,
+    user.c.name.label("by"),
+).outerjoin(user, user.c.id == consent.c.created_by)

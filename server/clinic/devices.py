@@ -1,0 +1,165 @@
+"""The clinic's sensors by serial number: what their takes showed of them, and where each was worn last.
+
+A row is written with the analysis it comes from and leaves with its recording (services/erasure.py). What is
+given here names no patient and no visit, days only, so no row of the audit says that it was looked at.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from sqlalchemy import Connection, Select, delete, func, insert, select
+
+from sagittal.core.quality.device_course import DeviceCourse, follow_device
+from sagittal.core.quality.devices import DeviceCheck
+from sagittal.server.errors import NotFound
+from sagittal.server.storage.tables import device_check, now, recording, session
+
+LISTED: Final = 200
+"""Devices of a list, and of what a tablet is told."""
+
+FOLLOWED: Final = 50
+"""Newest checks of a device that are shown and compared."""
+
+REMEMBERED_DAYS: Final = 365
+"""How long a place is offered again (our choice)."""
+
+
+@dataclass(frozen=True, eq=False)
+class DatedCheck:
+    """What one take showed of a device, and where it was worn."""
+
+    day: dt.date
+    segment: str
+    check: DeviceCheck
+
+
+@dataclass(frozen=True, eq=False)
+class KnownDevice:
+    """A device with its newest checks, oldest first, and what can be said of them; `takes` counts all."""
+
+    device_id: str
+    takes: int
+    checks: tuple[DatedCheck, ...]
+    course: DeviceCourse
+
+    @property
+    def last(self) -> DatedCheck:
+        """The newest take in which it was worn."""
+        return self.checks[-1]
+
+
+@dataclass(frozen=True)
+class LastPlaces:
+    """Where devices were worn in the clinic's last takes with them: serial → segment, each segment once."""
+
+    segments: Mapping[str, str]
+    day: dt.date | None
+    """Of the newest of these takes; None = nothing is known."""
+
+
+NO_PLACES: Final = LastPlaces({}, None)
+
+
+def keep_checks(c: Connection, recording_id: str, found: Sequence[Mapping[str, Any]]) -> None:
+    """Write what an analysis found of its devices, in the transaction that publishes it.
+
+    Takes the place of what earlier analyses of the session said: they are of the same samples, or were
+    superseded.
+
+    Parameters
+    ----------
+    found : `devices` of analysis.json.
+    """
+    own = select(recording.c.session_id).where(recording.c.id == recording_id).scalar_subquery()
+    siblings = select(recording.c.id).where(recording.c.session_id == own).scalar_subquery()
+    c.execute(delete(device_check).where(device_check.c.recording_id.in_(siblings)))
+    for one in found:
+        content = {name: one[name] for name in DeviceCheck.__dataclass_fields__}
+        row = {name: one[name] for name in ("device_id", "segment", "exchanged")}
+        c.execute(insert(device_check).values(**row, recording_id=recording_id, content=content, at=now()))
+
+
+def list_devices(c: Connection) -> list[KnownDevice]:
+    """Every device of the clinic, the one that was worn last first."""
+    rows = c.execute(_newest_of_each(FOLLOWED)).all()
+    grouped: dict[str, list[Any]] = {}
+    for row in rows:
+        grouped.setdefault(row.device_id, []).append(row)
+    known = [_known(found) for found in grouped.values()]
+    known.sort(key=lambda d: d.device_id)
+    known.sort(key=lambda d: d.last.day, reverse=True)
+    return known[:LISTED]
+
+
+def get(c: Connection, device_id: str) -> KnownDevice:
+    """One device; raises NotFound."""
+    rows = c.execute(_newest_of_each(FOLLOWED, [device_id])).all()
+    if not rows:
+        raise NotFound("sensor", device_id)
+    return _known(rows)
+
+
+def recall_places(
+    c: Connection, device_ids: Collection[str] | None = None, *, but: str | None = None
+) -> LastPlaces:
+    """Where devices sat in the last take of the clinic in which each was worn.
+
+    Of two that claim one segment the one that was worn later has it. A take in which sensors were found
+    exchanged is passed over, as is what is older than `REMEMBERED_DAYS`.
+
+    Parameters
+    ----------
+    device_ids : None = all of the clinic, at most `LISTED`. but : a session that does not count.
+    """
+    since = now().date() - dt.timedelta(days=REMEMBERED_DAYS)
+    wanted = _placed(device_ids).where(~device_check.c.exchanged, session.c.performed_on >= since)
+    if but is not None:
+        wanted = wanted.where(session.c.id != but)
+    last = wanted.subquery()
+    newest = (
+        select(last)
+        .where(last.c.place == 1)
+        .order_by(last.c.day.desc(), last.c.began.desc(), last.c.device_id)
+    )
+    segments: dict[str, str] = {}
+    days = []
+    for row in c.execute(newest.limit(LISTED)):
+        if row.segment not in segments.values() or device_ids is None:
+            segments[row.device_id] = row.segment
+            days.append(row.day)
+    return LastPlaces(segments, max(days, default=None))
+
+
+def _placed(device_ids: Collection[str] | None) -> Select[Any]:
+    """Checks with the day of their take, each device's newest with place 1."""
+    newest_first = (session.c.performed_on.desc(), recording.c.created_at.desc())
+    query = (
+        select(
+            device_check.c.device_id,
+            device_check.c.segment,
+            device_check.c.content,
+            session.c.performed_on.label("day"),
+            recording.c.created_at.label("began"),
+            func.row_number()
+            .over(partition_by=device_check.c.device_id, order_by=newest_first)
+            .label("place"),
+            func.count().over(partition_by=device_check.c.device_id).label("takes"),
+        )
+        .join(recording, recording.c.id == device_check.c.recording_id)
+        .join(session, session.c.id == recording.c.session_id)
+    )
+    return query if device_ids is None else query.where(device_check.c.device_id.in_(device_ids))
+
+
+def _newest_of_each(most: int, device_ids: Collection[str] | None = None) -> Select[Any]:
+    ranked = _placed(device_ids).subquery()
+    return select(ranked).where(ranked.c.place <= most).order_by(ranked.c.device_id, ranked.c.place.desc())
+
+
+def _known(rows: Sequence[Any]) -> KnownDevice:
+    checks = tuple(DatedCheck(row.day, row.segment, DeviceCheck.from_json(row.content)) for row in rows)
+    return KnownDevice(rows[0].device_id, rows[0].takes, checks, follow_device([x.check for x in checks]))

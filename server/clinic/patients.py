@@ -1,0 +1,281 @@
+"""Patients by pseudonym: made, changed, found; erasing one is server/safekeeping/erasure.py."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any, Literal
+from unicodedata import normalize
+
+from sqlalchemy import Connection, Select, bindparam, func, insert, select, update
+from sqlalchemy.exc import IntegrityError
+
+from sagittal.core.frames import Side
+from sagittal.server import audit
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.sight import TEAMS_ARE_ON, only_seen
+from sagittal.server.clinic import jobs
+from sagittal.server.errors import Conflict, NotFound, ServiceError
+from sagittal.server.jobs.queue import BESIDE
+from sagittal.server.storage.columns import make_all
+from sagittal.server.storage.tables import ACTIVE_STATES, job, new_id, now, patient, recording, session
+
+if TYPE_CHECKING:
+    from sagittal.server.clinic.sessions import Session
+
+CHANGEABLE = frozenset({"code", "sex", "birth_year", "height_m", "affected_side", "is_control", "note"})
+
+
+@dataclass(frozen=True)
+class Patient:
+    """A patient with what a list shows of the visits.
+
+    Parameters
+    ----------
+    code : the clinic's pseudonym, unique. sex : female, male or None. height_m : metres or None.
+    affected_side : left, right, or None for none or both. is_control : healthy, and agreed that these visits
+    serve as reference in this clinic.
+    sessions : number of visits. last_visit : day of the newest, None without one.
+    running : a job of one of the visits is queued or running.
+    """
+
+    id: str
+    code: str
+    sex: Literal["female", "male"] | None
+    birth_year: int | None
+    height_m: float | None
+    affected_side: Side | None
+    is_control: bool
+    note: str
+    created_at: dt.datetime
+    sessions: int
+    last_visit: dt.date | None
+    running: bool
+
+    def find_age(self, day: dt.date) -> int | None:
+        """Age in years as far as the year of birth tells it, None where that is not known."""
+        return day.year - self.birth_year if self.birth_year else None
+
+    def find_height(self, session: Session) -> float | None:
+        """Height at a visit in metres: as measured then, else the usual one."""
+        return session.height_m if session.height_m is not None else self.height_m
+
+
+@dataclass(frozen=True)
+class PatientList:
+    """Patients that a list shows, and what its page says beside them.
+
+    Parameters
+    ----------
+    total : patients that the person may open. active_jobs : jobs of theirs that wait or run.
+    teams_on : the clinic has care teams.
+    """
+
+    patients: list[Patient]
+    total: int
+    active_jobs: int
+    teams_on: bool
+
+
+class CodeTaken(Conflict):
+    """Another patient has the code, or one that looks alike; None = which is not known.
+
+    The message names it as it was typed: its exact spelling opens that patient in an emergency.
+    """
+
+    def __init__(self, code: str, patient_id: str | None) -> None:
+        super().__init__("code_taken", f"The code '{code}' belongs to another patient; choose a new one.")
+        self.patient_id = patient_id
+
+
+def create(
+    c: Connection,
+    actor: audit.Actor | None,
+    *,
+    code: str,
+    sex: str | None = None,
+    birth_year: int | None = None,
+    height_m: float | None = None,
+    affected_side: Side | None = None,
+    is_control: bool = False,
+    note: str = "",
+) -> Patient:
+    """Add a patient; raises CodeTaken, ServiceError bad_value."""
+    patient_id = new_id()
+    values = {
+        "code": code,
+        "sex": sex,
+        "birth_year": birth_year,
+        "height_m": height_m,
+        "affected_side": affected_side,
+        "is_control": is_control,
+        "note": note,
+    }
+    checked = _checked(values)
+    _refuse_alike(c, str(checked["code"]))
+    with _explained(code):
+        c.execute(insert(patient).values(id=patient_id, created_at=now(), **checked))
+    audit.record(c, actor, "patient.created", "patient", patient_id)
+    return get(c, patient_id)
+
+
+def change(
+    c: Connection, actor: audit.Actor | None, patient_id: str, values: Mapping[str, object]
+) -> Patient:
+    """Change some of CHANGEABLE; raises NotFound, CodeTaken, ServiceError bad_value."""
+    before = get(c, patient_id)
+    checked = _checked(values)
+    changed = {name: value for name, value in checked.items() if getattr(before, name) != value}
+    if "code" in changed:
+        _refuse_alike(c, str(changed["code"]), patient_id)
+    if changed:
+        with _explained(str(changed.get("code"))):
+            c.execute(update(patient).where(patient.c.id == patient_id).values(**changed))
+        audit.record(c, actor, "patient.changed", "patient", patient_id, {"fields": sorted(changed)})
+    return get(c, patient_id)
+
+
+def get(c: Connection, patient_id: str) -> Patient:
+    """One patient; raises NotFound."""
+    row = c.execute(_one(), {"one_id": patient_id}).first()
+    if row is None:
+        raise NotFound("patient", patient_id)
+    return Patient(**row._asdict())
+
+
+def count(c: Connection, who: Identity | None) -> int:
+    """How many patients there are that a person may open; None = the system, in all."""
+    return int(c.execute(_count(who)).scalar_one())
+
+
+def _count(who: Identity | None) -> Select[Any]:
+    return only_seen(select(func.count()).select_from(patient), who)
+
+
+def list_patients(
+    c: Connection, who: Identity | None, *, search: str = "", limit: int = 200, offset: int = 0
+) -> list[Patient]:
+    """Patients whose code or note contains `search` (any case), the latest visit first.
+
+    Parameters
+    ----------
+    who : only those this person may open; None = the system, which sees everybody.
+    """
+    return make_all(Patient, c.execute(_search(who, search).limit(limit).offset(offset)))
+
+
+def list_counted(c: Connection, who: Identity, *, search: str = "", limit: int = 200) -> PatientList:
+    """The same with what its page says beside it, in one statement; in a second one where nobody is found."""
+    counts = [
+        _count(who).correlate(None).scalar_subquery(),
+        jobs.select_active_count(who).correlate(None).scalar_subquery(),
+        TEAMS_ARE_ON,
+    ]
+    named = [x.label(f"count_{i}") for i, x in enumerate(counts)]
+    result = c.execute(_search(who, search).add_columns(*named).limit(limit))
+    names = tuple(result.keys())[: -len(named)]
+    rows = result.all()
+    total, active, teams_on = rows[0][-len(named) :] if rows else c.execute(select(*named)).one()
+    found = [Patient(**dict(zip(names, row, strict=False))) for row in rows]
+    return PatientList(found, total, active, bool(teams_on))
+
+
+def _search(who: Identity | None, search: str) -> Select[Any]:
+    query = only_seen(_listing(), who).order_by(
+        _LAST_VISIT.desc().nulls_last(), patient.c.created_at.desc(), patient.c.id
+    )
+    if search.strip():
+        text = search.strip()
+        query = query.where(
+            patient.c.code.icontains(text, autoescape=True) | patient.c.note.icontains(text, autoescape=True)
+        )
+    return query
+
+
+def list_older(c: Connection, day: dt.date) -> list[Patient]:
+    """Patients whose newest visit, or who themselves without one, are older than a day; the oldest first."""
+    added = dt.datetime.combine(day, dt.time(), dt.UTC)
+    is_older = (day > _LAST_VISIT) | (_LAST_VISIT.is_(None) & (patient.c.created_at < added))
+    query = _listing().where(is_older).order_by(_LAST_VISIT.nulls_first(), patient.c.created_at, patient.c.id)
+    return make_all(Patient, c.execute(query))
+
+
+_LAST_VISIT = (
+    select(func.max(session.c.performed_on))
+    .where(session.c.patient_id == patient.c.id)
+    .correlate(patient)
+    .scalar_subquery()
+)
+
+
+@cache
+def _listing() -> Select[Any]:
+    visits = (
+        select(func.count())
+        .select_from(session)
+        .where(session.c.patient_id == patient.c.id)
+        .correlate(patient)
+        .scalar_subquery()
+    )
+    # read once for all patients: asked for each, it would look through every job that waits each time
+    running = patient.c.id.in_(
+        select(session.c.patient_id)
+        .join(recording, recording.c.session_id == session.c.id)
+        .join(job, job.c.recording_id == recording.c.id)
+        .where(job.c.state.in_(ACTIVE_STATES), job.c.kind.not_in(BESIDE))
+        .correlate(None)
+    )
+    return select(
+        patient, visits.label("sessions"), _LAST_VISIT.label("last_visit"), running.label("running")
+    )
+
+
+@cache
+def _one() -> Select[Any]:
+    return _listing().where(patient.c.id == bindparam("one_id"))
+
+
+def _checked(values: Mapping[str, object]) -> dict[str, Any]:
+    unknown = values.keys() - CHANGEABLE
+    if unknown:
+        raise ServiceError("bad_value", f"A patient has no {', '.join(sorted(unknown))}.")
+    checked = dict(values)
+    if "code" in checked:
+        code = normalize("NFKC", str(checked["code"])).strip()
+        if not 1 <= len(code) <= 64:
+            raise ServiceError("bad_value", "A patient's code has 1 to 64 characters.")
+        checked["code"] = code
+    born, year = checked.get("birth_year"), now().year
+    if isinstance(born, int) and born > year:
+        raise ServiceError("bad_value", f"The year of birth is {born}. Expected {year} or earlier.")
+    return checked
+
+
+def _refuse_alike(c: Connection, code: str, own: str | None = None) -> None:
+    """Raise CodeTaken where another's code differs in case or in the form of letters only."""
+    for other_id, other in c.execute(select(patient.c.id, patient.c.code)):
+        if other_id != own and normalize("NFKC", other).casefold() == code.casefold():
+            raise CodeTaken(code, other_id)
+
+
+class _explained:  # noqa: N801 - reads as a word: with _explained(code)
+    """Turn the database's refusal into a sentence."""
+
+    def __init__(self, code: str) -> None:
+        self._code = code
+
+    def __enter__(self) -> None:
+        """Nothing to prepare."""
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if not isinstance(error, IntegrityError):
+            return
+        if "code" in str(error.orig) and "UNIQUE" in str(error.orig).upper():
+            raise CodeTaken(self._code, None) from error
+        raise ServiceError(
+            "bad_value",
+            "Expected sex female, male or none, a year of birth from 1850, a height of 0.5 to 2.5 m. "
+            "Expected an affected side left, right or none.",
+        ) from error

@@ -1,0 +1,202 @@
+"""Exports of an analysis for other programs: offered, asked for, written in the child, published.
+
+The file of an export is a file of its analysis, named by the job; so it lives and goes with it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+from sqlalchemy import Connection, insert, select
+
+from sagittal.core.events.edits import read_edit
+from sagittal.server import audit
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.clinic.sessions import Session
+from sagittal.server.errors import Conflict
+from sagittal.server.export import kinds
+from sagittal.server.export.content import SignedForm, VisitFacts, open_content
+from sagittal.server.export.kinds import EXPORTED, ExportKind, name_file
+from sagittal.server.jobs.queue import EXPORT, VIEW_COLUMNS, Claim, JobQueue, JobView, job_view
+from sagittal.server.provenance import CODE_VERSION
+from sagittal.server.results import analyses, edit_log
+from sagittal.server.results.histories import AnalysedSession
+from sagittal.server.results.shown_take import make_key, submit_for
+from sagittal.server.sharing import signed_reports
+from sagittal.server.storage.blobs import Blob
+from sagittal.server.storage.tables import analysis_file, job
+
+if TYPE_CHECKING:
+    from sagittal.core.formats.source import SourceFile
+
+SIGNED: Final = "signed-"
+"""Begin of the names of the signed report's documents among the files of a job."""
+
+MEDIA_TYPES: Final = {signed_reports.PDF: "application/pdf", signed_reports.DOCUMENT: "text/html"}
+"""Of the documents of a signed report, the printable one first."""
+
+
+@dataclass(frozen=True)
+class ExportOffer:
+    """A format that the shown analysis can be written in, as it counts now.
+
+    Parameters
+    ----------
+    kind : its name. label, what : in words. job : that writes it, None = not asked for since the last change.
+    analysis_id, file : where it can be downloaded, file None until it is written.
+    """
+
+    kind: str
+    label: str
+    what: str
+    job: JobView | None
+    analysis_id: str
+    file: str | None
+
+
+def list_offers(
+    c: Connection, patient: Patient, session: Session, found: analyses.AnalysisRecord
+) -> list[ExportOffer]:
+    """Every format that an analysis of a session can be written in, and how far it is.
+
+    What was written before the last edit, or before person or visit were corrected, is offered anew; what
+    hands on the signed report also after it was signed, reopened or printed.
+    """
+    possible = kinds.list_possible(found.files)
+    params = _collect_params(c, patient, session, found, possible)
+    keys = {name: make_key(found, EXPORT, own) for name, own in params.items()}
+    query = select(*VIEW_COLUMNS, job.c.key).where(job.c.key.in_(keys.values())).order_by(job.c.seq)
+    rows: list[Any] = list(c.execute(query))
+    newest = {row.key: job_view(row) for row in rows}
+    return [_offer(found, kind, newest.get(keys[kind.name])) for kind in possible]
+
+
+def _offer(found: analyses.AnalysisRecord, kind: ExportKind, made: JobView | None) -> ExportOffer:
+    name = None if made is None else name_file(kind, made.id)
+    return ExportOffer(
+        kind.name, kind.label, kind.what, made, found.id, name if name in found.files else None
+    )
+
+
+def submit(
+    c: Connection, queue: JobQueue, actor: audit.Actor | None, session_id: str, *, kind: str
+) -> JobView:
+    """Ask for an export of the analysis that the session shows, with the edits that count; done once.
+
+    Raises
+    ------
+    NotFound
+        the session, its analysis. InputError unknown_export. Conflict export_not_possible.
+    """
+    chosen = kinds.find_kind(kind)
+    found = analyses.get_shown(c, session_id)
+    if chosen not in kinds.list_possible(found.files):
+        lacking = ", ".join(name for name in chosen.needs if name not in found.files)
+        raise Conflict(
+            "export_not_possible", f"This analysis has no {lacking}, which “{chosen.label}” is made from."
+        )
+    session, patient = sessions.get(c, session_id), patients.get(c, found.patient_id)
+    params = _collect_params(c, patient, session, found, [chosen])
+    return submit_for(c, queue, actor, found, EXPORT, "export.requested", params[kind])
+
+
+def run(files: Sequence[SourceFile], params: Mapping[str, Any]) -> dict[str, bytes]:
+    """Write an export; pure.
+
+    Parameters
+    ----------
+    files : result files of the analysis, and documents of the signed report where the format hands it on.
+
+    Raises
+    ------
+    SagittalError
+        it cannot be written; the code and the sentence say why.
+    """
+    readers = {file.name: file.read for file in files if not file.name.startswith(SIGNED)}
+    edits = [read_edit(e) for e in params["edits"]]
+    content = open_content(readers, VisitFacts.of_json(params["visit"]), edits)
+    if params.get("signed") is not None:
+        content = replace(content, signed=_read_signed(files, params["signed"]))
+    return {params["kind"]: kinds.write_export(params["kind"], content)}
+
+
+def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob]) -> None:
+    """Write the file of a result, in the transaction that marks its job done."""
+    for kind, blob in stored.items():
+        name = name_file(kinds.find_kind(kind), claim.job_id)
+        row = {"name": name, "size": blob.size, "sha256": blob.sha256}
+        c.execute(insert(analysis_file).values(analysis_id=claim.params["analysis_id"], **row))
+
+
+def _read_signed(files: Sequence[SourceFile], told: Mapping[str, Any]) -> SignedForm:
+    """The signed report of a job, as `_collect_params` has given it."""
+    readers = {file.name: file.read for file in files}
+    documents = tuple(
+        (media_type, readers[SIGNED + name]())
+        for name, media_type in MEDIA_TYPES.items()
+        if SIGNED + name in readers
+    )
+    known = ("version", "language", "signed_by", "signed_at", "of_these_numbers")
+    return SignedForm(**{name: told[name] for name in known}, documents=documents)
+
+
+def _collect_params(
+    c: Connection,
+    patient: Patient,
+    session: Session,
+    found: analyses.AnalysisRecord,
+    wanted: Sequence[ExportKind],
+) -> dict[str, dict[str, Any]]:
+    """What each format is written from, fixed at submission, by its name."""
+    edits = edit_log.edits_of(c, found.id)
+    shared: dict[str, Any] = {
+        "space": found.patient_id,
+        "files": [
+            {"name": name, "size": blob.size, "sha256": blob.sha256}
+            for name, blob in found.files.items()
+            if not name.startswith(EXPORTED)
+        ],
+        "analysis_id": found.id,
+        "edits": [e.to_json() for e in edits.edits],
+        "visit": _describe_visit(patient, AnalysedSession(session, found, edits)).to_json(),
+    }
+    params: dict[str, dict[str, Any]] = {kind.name: {**shared, "kind": kind.name} for kind in wanted}
+    handed_on = [kind.name for kind in wanted if kind.hands_on_signed]
+    signed = signed_reports.find_documents(c, session.id) if handed_on else None
+    if signed is not None:
+        documents = [
+            {"name": SIGNED + name, "size": blob.size, "sha256": blob.sha256}
+            for name, blob in signed.files.items()
+        ]
+        for name in handed_on:
+            params[name] |= {
+                "files": shared["files"] + documents,
+                "signed": signed.describe(found, edits),
+            }
+    return params
+
+
+def _describe_visit(patient: Patient, analysed: AnalysedSession) -> VisitFacts:
+    session = analysed.session
+    return VisitFacts(
+        subject=make_pseudonym(patient.id),
+        code=patient.code,
+        visit=make_pseudonym(session.id),
+        day=session.performed_on.isoformat(),
+        protocol=session.protocol,
+        sex=patient.sex,
+        age_years=patient.find_age(session.performed_on),
+        height_m=patient.find_height(session),
+        affected_side=patient.affected_side,
+        condition=analysed.condition.words,
+        version=CODE_VERSION,
+    )
+
+
+def make_pseudonym(identity: str) -> str:
+    """A stable name that leads back to nobody without the database: 12 hex digits."""
+    return hashlib.sha256(identity.encode()).hexdigest()[:12]

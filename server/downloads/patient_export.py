@@ -1,0 +1,162 @@
+"""Everything that is stored of one patient as one zip, for the person or for another clinic.
+
+    for piece in export_patient(db, blobs, patient_id, key_file): ...        # in pieces, whatever the size
+
+`patient.json` has every row that belongs to the patient, by table, with the names of who wrote it; who the
+patient is stands there in clear for who may read that, else not at all.
+`audit.json` who opened or changed what of it, `files/<table>/<id>/<name>` the files, recordings as uploaded.
+What belongs to a patient is found by the references of the tables, so a new table is in it by itself.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from sqlalchemy import Connection, Table, or_, select
+
+from sagittal.server.clinic import identities, patients
+from sagittal.server.export.zipping import ZipSink
+from sagittal.server.provenance import CODE_VERSION
+from sagittal.server.storage.archive import PIECE
+from sagittal.server.storage.blobs import BlobStore, IntegrityError
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.field_cipher import KeyUnusable, ValueUnreadable
+from sagittal.server.storage.person_tables import patient_identity
+from sagittal.server.storage.tables import audit, metadata, now, patient, user
+
+_INTO: Final = "w"
+"""How a zip's own file is opened; on the disk nothing is."""
+SECRET: Final = frozenset({"code_sha256", "token_sha256"})
+"""Columns that open something; they are nobody's data."""
+_ENCRYPTED: Final = patient_identity.name
+
+
+@dataclass(frozen=True)
+class ExportedFile:
+    """A stored file and its name in the zip."""
+
+    name: str
+    sha256: str
+
+
+def list_rows(c: Connection, patient_id: str) -> dict[str, list[dict[str, Any]]]:
+    """Every row that belongs to a patient, by table; raises NotFound."""
+    patients.get(c, patient_id)
+    found: dict[str, dict[tuple[object, ...], dict[str, Any]]] = {}
+    ids: dict[str, set[str]] = {patient.name: {patient_id}}
+    _keep(c, patient, patient.c.id == patient_id, found, ids)
+    grows = True
+    while grows:
+        grows = False
+        for table in metadata.sorted_tables:
+            # whoever wrote a row is not whom it is about
+            keys = [key for key in table.foreign_keys if key.column.table.name in ids.keys() - {user.name}]
+            if keys and table.name != _ENCRYPTED:
+                mine = or_(*(key.parent.in_(ids[key.column.table.name]) for key in keys))
+                grows = _keep(c, table, mine, found, ids) or grows
+    return {name: list(rows.values()) for name, rows in sorted(found.items())}
+
+
+def list_files(rows: dict[str, list[dict[str, Any]]]) -> list[ExportedFile]:
+    """The files that rows refer to; their names were checked when they came (recordings.check_name)."""
+    found = {}
+    for table, its_rows in rows.items():
+        for row in its_rows:
+            for name, sha256 in (("name", "sha256"), ("reference_name", "reference_sha256")):
+                if row.get(name) and row.get(sha256):
+                    owner = next(str(value) for key, value in row.items() if key.endswith("id"))
+                    path = f"files/{table}/{owner}/{row[name]}"
+                    found[path] = ExportedFile(path, row[sha256])
+    return list(found.values())
+
+
+def export_patient(
+    db: Database, blobs: BlobStore, patient_id: str, identity_key: Path | None = None
+) -> Iterator[bytes]:
+    """The zip in pieces; what is gone or damaged is named in `missing.json` instead.
+
+    Parameters
+    ----------
+    identity_key : file with the key of patients' names; None = who asks may not read them.
+    """
+    missing = []
+    with db.read() as c:
+        rows = list_rows(c, patient_id)
+        if identity_key is not None and identities.are_kept(c, identity_key):
+            try:
+                who = identities.get(c, identity_key, patient_id)
+            except (KeyUnusable, ValueUnreadable) as error:
+                missing.append({"name": _ENCRYPTED, "why": error.message})
+            else:
+                if who.changed_at is not None:
+                    rows[_ENCRYPTED] = [{k: _plain(v) for k, v in vars(who).items()}]
+        ids = [row["id"] for its_rows in rows.values() for row in its_rows if "id" in row]
+        trail = c.execute(select(audit).where(audit.c.resource_id.in_(ids)).order_by(audit.c.seq)).all()
+        people = c.execute(select(user.c.id, user.c.name)).all()
+    return _zip(blobs, patient_id, rows, [row._asdict() for row in trail], dict(map(tuple, people)), missing)
+
+
+def _zip(
+    blobs: BlobStore,
+    patient_id: str,
+    rows: dict[str, list[dict[str, Any]]],
+    trail: list[dict[str, Any]],
+    people: dict[str, str],
+    missing: list[dict[str, str]],
+) -> Iterator[bytes]:
+    sink = ZipSink()
+    # stored as it is: recordings hardly shrink, and the server has others to serve
+    with zipfile.ZipFile(sink, "w", zipfile.ZIP_STORED) as archive:
+        text = json.dumps(rows, ensure_ascii=False)
+        named = {one: name for one, name in people.items() if one in text}
+        about = {"exported_at": now(), "code_version": CODE_VERSION, "users": named, "rows": rows}
+        archive.writestr("patient.json", _dump(about))
+        archive.writestr("audit.json", _dump(trail))
+        yield sink.take()
+        for file in list_files(rows):
+            try:
+                source = blobs.open(patient_id, file.sha256)
+            except IntegrityError as error:
+                missing.append({"name": file.name, "why": error.message})
+                continue
+            with source, archive.open(file.name, _INTO, force_zip64=True) as target:
+                while piece := source.read(PIECE):
+                    target.write(piece)
+                    yield sink.take()
+        if missing:
+            archive.writestr("missing.json", _dump(missing))
+    yield sink.take()
+
+
+def _keep(
+    c: Connection,
+    table: Table,
+    mine: Any,
+    found: dict[str, dict[tuple[object, ...], dict[str, Any]]],
+    ids: dict[str, set[str]],
+) -> bool:
+    """Add the rows of a table to those found; whether there are new ones."""
+    known = found.setdefault(table.name, {})
+    before = len(known)
+    for row in c.execute(select(table).where(mine)):
+        values = {name: _plain(value) for name, value in row._asdict().items() if name not in SECRET}
+        known[tuple(getattr(row, column.name) for column in table.primary_key)] = values
+        if "id" in values:
+            ids.setdefault(table.name, set()).add(str(values["id"]))
+    if not known:
+        del found[table.name]
+    return len(known) > before
+
+
+def _plain(value: object) -> object:
+    return value.isoformat() if isinstance(value, dt.date) else value
+
+
+def _dump(tree: object) -> str:
+    return json.dumps(tree, ensure_ascii=False, indent=1, default=_plain)

@@ -1,0 +1,178 @@
+"""The visits of a study as two tables: which ones are chosen, and their analyses as they count.
+
+Nothing is analysed anew and nothing is kept: the tables are made of the stored analyses with the persons'
+edits, in a process of their own (study_child.py). Persons and visits stand in them by pseudonyms, those of
+the other exports; no date, no note.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from sqlalchemy import Connection
+
+from sagittal.core.errors import SagittalError
+from sagittal.core.frames import Protocol
+from sagittal.server.auth.identity import Identity
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.clinic.sessions import Session
+from sagittal.server.downloads.exports import make_pseudonym
+from sagittal.server.errors import Conflict
+from sagittal.server.export.ages import coarsen_age
+from sagittal.server.provenance import CODE_VERSION
+from sagittal.server.report.files.analysis_json import parameter_row
+from sagittal.server.report.files.exports import strides_csv
+from sagittal.server.report.study_tables import StudyTables, StudyTake, write_study
+from sagittal.server.results import analyses, edit_log
+from sagittal.server.results.histories import AnalysedSession
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.server.storage.blobs import StoreAway
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import now
+from sagittal.server.uploads import recordings
+
+MOST_VISITS: Final = 300
+"""Of one study; more are asked for in parts."""
+
+
+@dataclass(frozen=True)
+class StudyChoice:
+    """Which visits are wanted.
+
+    Parameters
+    ----------
+    search : part of a patient's code or note. protocol : None = any. since, until : days, both included.
+    visits : only these of them; None = all.
+    """
+
+    search: str = ""
+    protocol: Protocol | None = None
+    since: dt.date | None = None
+    until: dt.date | None = None
+    visits: frozenset[str] | None = None
+
+
+def list_visits(c: Connection, who: Identity, choice: StudyChoice) -> list[Session]:
+    """The visits of a choice that a person may open, by patient and day."""
+    if choice.visits is not None and not choice.visits:
+        return []
+    return sessions.search(
+        c,
+        who,
+        search=choice.search,
+        protocol=choice.protocol,
+        since=choice.since,
+        until=choice.until,
+        ids=choice.visits or (),
+    )
+
+
+def check_size(chosen: Sequence[Session]) -> None:
+    """Refuse a study of no visit or of too many; raises Conflict no_visits, too_many_visits."""
+    if not chosen:
+        raise Conflict("no_visits", "No visit fits this choice. Choose another period or protocol.")
+    if len(chosen) > MOST_VISITS:
+        raise Conflict(
+            "too_many_visits",
+            f"{len(chosen)} visits fit this choice, at most {MOST_VISITS} go into one study. "
+            "Choose a shorter period and put the tables together.",
+        )
+
+
+def make_study(
+    db: Database, reviewed: ReviewedAnalyses, who: Identity, choice: StudyChoice
+) -> tuple[StudyTables, list[str]]:
+    """Write the tables of a choice, and say which visits are in them.
+
+    Raises
+    ------
+    Conflict
+        no_visits, too_many_visits.
+    """
+    with db.read() as c:
+        chosen = list_visits(c, who, choice)
+        check_size(chosen)
+        people = {p: patients.get(c, p) for p in dict.fromkeys(s.patient_id for s in chosen)}
+        shown = analyses.latest_of(c, [s.id for s in chosen])
+        edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
+        recorded = {s: recordings.get(c, found.recording_id) for s, found in shown.items()}
+    first: dict[str, dt.date] = {}
+    for s in chosen:
+        first[s.patient_id] = min(s.performed_on, first.get(s.patient_id, s.performed_on))
+    takes = []
+    for s in chosen:
+        person, name = people[s.patient_id], _name(s)
+        found = shown.get(s.id)
+        labels = _label(person, s, first[s.patient_id])
+        if found is None:
+            lacking = SagittalError("no_analysis", "This visit has no analysis. Analyse it, or leave it out.")
+            takes.append(StudyTake(name, labels, 0, {}, lacking, dict, lambda: None))
+        else:
+            done = AnalysedSession(s, found, edits[found.id])
+            labels |= {"condition": done.condition.words, "edits": len(done.edits.made)}
+            files = {f.name: f.sha256 for f in recorded[s.id].files}
+            takes.append(_open_take(reviewed, name, labels, files, done))
+    about = {
+        "written_by": CODE_VERSION,
+        "written_at": now().isoformat(timespec="seconds"),
+        "analyses": {
+            _name(s): {"analysed_by": found.code_version, "config": dict(found.config)}
+            for s in chosen
+            if (found := shown.get(s.id)) is not None
+        },
+    }
+    return write_study(takes, about), [s.id for s in chosen]
+
+
+def _open_take(
+    reviewed: ReviewedAnalyses,
+    name: str,
+    labels: Mapping[str, object],
+    files: Mapping[str, str],
+    done: AnalysedSession,
+) -> StudyTake:
+    """The result of a visit as it counts; what cannot be read is told, and the others go on."""
+    found, edits = done.found, done.edits
+    error, strides, analysis = None, None, {}
+    try:
+        analysis = json.loads(analyses.file_bytes(reviewed.blobs, found, "analysis.json"))
+        result = reviewed.measure(found, edits)
+        if result is not None:
+            strides = strides_csv(result.strides, result.columns)
+            bundle = reviewed.read_bundle(found, edits)
+            analysis["parameters"] = [parameter_row(p) for p in bundle.parameters]
+        elif "strides.csv" in found.files:
+            strides = analyses.file_bytes(reviewed.blobs, found, "strides.csv")
+    except StoreAway:
+        raise  # it is not this visit that cannot be read
+    except SagittalError as refused:
+        error = refused
+    return StudyTake(name, labels, len(files), _hide_names(files), error, lambda: analysis, lambda: strides)
+
+
+def _hide_names(files: Mapping[str, str]) -> dict[str, str]:
+    """Hashes by number: a file may be called after a person."""
+    return {f"file-{number}": sha256 for number, sha256 in enumerate(files.values(), 1)}
+
+
+def _name(session: Session) -> str:
+    return f"sub-{make_pseudonym(session.patient_id)}/ses-{make_pseudonym(session.id)}"
+
+
+def _label(person: Patient, session: Session, first: dt.date) -> dict[str, Any]:
+    return {
+        "sub": make_pseudonym(person.id),
+        "ses": make_pseudonym(session.id),
+        "days_since_first": (session.performed_on - first).days,
+        "protocol": session.protocol,
+        "sex": person.sex,
+        "age_years": coarsen_age(person.find_age(session.performed_on)),
+        "height_m": person.find_height(session),
+        "affected_side": person.affected_side,
+        "is_control": person.is_control,
+    }

@@ -1,0 +1,63 @@
+"""Studies as a download: each made by a process of its own, one at a time."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import msgspec
+
+from sagittal.server.auth.identity import Identity
+from sagittal.server.downloads.studies import StudyChoice, check_size, list_visits
+from sagittal.server.downloads.study_child import StudyReply
+from sagittal.server.errors import Conflict, ServiceError
+from sagittal.server.processes.child import FAR_BEHIND
+from sagittal.server.processes.errand import ErrandTurn, TooManyErrands, run_errand
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database
+from sagittal.web.user_text import encode_user_text
+
+CHILD: Final = "sagittal.server.downloads.study_child"
+LONGEST_S: Final = 300.0
+"""Longest one may take; the most visits that are allowed take some ten seconds of computing."""
+
+_turn = ErrandTurn()
+
+
+class StudyFailed(ServiceError):  # noqa: N818 - says what failed
+    """No tables could be made."""
+
+    status = 503
+
+
+def fetch_study(
+    db: Database, settings: Settings, who: Identity, choice: StudyChoice
+) -> tuple[bytes, tuple[str, ...]]:
+    """The tables of a choice as a zip, and which visits are in them.
+
+    Raises
+    ------
+    Conflict
+        no_visits, too_many_visits. StudyFailed: others wait, it took too long, or ended without a word.
+    """
+    with db.read() as c:
+        check_size(list_visits(c, who, choice))
+    order = msgspec.msgpack.encode((who, choice), enc_hook=encode_user_text)
+    try:
+        with _turn.take():
+            answer = run_errand(CHILD, settings, order, LONGEST_S, FAR_BEHIND)
+    except TooManyErrands as error:
+        raise StudyFailed("busy", "Other studies are being made. Try again in a minute.") from error
+    except TimeoutError as error:
+        raise StudyFailed(
+            "study_failed", f"The tables were not made within {LONGEST_S:.0f} s. Choose fewer visits."
+        ) from error
+    except (EOFError, OSError) as error:
+        raise StudyFailed(
+            "study_failed", "The process that makes the tables has ended. Choose fewer visits."
+        ) from error
+    reply = msgspec.msgpack.decode(answer, type=StudyReply)
+    if reply.code in {"no_visits", "too_many_visits"}:  # changed since it was looked at
+        raise Conflict(reply.code, reply.message)
+    if reply.code:
+        raise StudyFailed(reply.code, reply.message)
+    return reply.content, reply.visits

@@ -1,0 +1,1 @@
+"""Live takes: opened, logged, coached, filmed, and stored as recordings when they end."""

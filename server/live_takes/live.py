@@ -1,0 +1,411 @@
+"""Live takes: opened for a session, joined to a tablet by a code, ended; the log then becomes a recording.
+
+    pairing ──code──> open ──first batch──> streaming ──finish──> finished
+       └───────────────┴───────── close ────────┴────────────────> closed
+
+The order at the end is what survives a crash: first the take is over (row), then the log is a stored file,
+then one transaction makes it a recording with its inspection and analysis, then the log goes. `repair` takes
+the steps that a crash left out. Of code and token only hashes are kept.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import hmac
+import secrets
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from sqlalchemy import Connection, bindparam, insert, select, update
+
+from sagittal.core.errors import ParameterError
+from sagittal.core.signals.recording import GivenLimits
+from sagittal.server import audit
+from sagittal.server.auth.tokens import new_token, token_hash
+from sagittal.server.clinic import devices, sessions
+from sagittal.server.errors import Conflict, NodeAway, NotFound, ServiceError
+from sagittal.server.storage.live_tables import OPEN_TAKE_STATES, live_event, live_take
+from sagittal.server.storage.tables import new_id, now, patient, session, user
+
+ALPHABET = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
+"""Characters of a code: none that looks or sounds on a tablet like another (0 O, 1 I L)."""
+CODE_LENGTH = 6
+"""31⁶ = 9 · 10⁸ codes, ten failures per address in a quarter of an hour (server/auth/throttle.py)."""
+CODE_LIFE = dt.timedelta(minutes=10)
+TOKEN_LIFE = dt.timedelta(hours=12)
+
+DAMAGED = "live_log_damaged"
+"""Code of the notice that a part of a take's log could not be read back."""
+
+COMMANDS = (
+    "start", "stop", "mark", "undo_mark", "feedback", "level", "pause", "redo_calibration", "ghost", "test",
+)  # fmt: skip
+"""What a therapist may do in a running take; each is kept as an event."""
+
+
+@dataclass(frozen=True)
+class LiveTakeRecord:
+    """A live take of a session.
+
+    Parameters
+    ----------
+    state : pairing (waits for a tablet), open (paired), streaming (samples are coming or came), finished (the
+        tablet ended it), closed (ended here). source : what the tablet streams, None before its first.
+    count, sha256 : batches and the tablet's digest of their payloads, at the end.
+    recording_id : what the take became; None while it runs and when nothing came.
+    problem : code of what was wrong at the end, finish_mismatch or node_away.
+    node, node_run : the web server that has its log and which start of it; None = one without a name.
+    """
+
+    id: str
+    session_id: str
+    patient_id: str
+    state: str
+    source: str | None
+    count: int | None
+    sha256: str | None
+    recording_id: str | None
+    prescription_id: str | None
+    problem: str | None
+    opened_by: str | None
+    code_expires_at: dt.datetime | None
+    created_at: dt.datetime
+    finished_at: dt.datetime | None
+    node: str | None
+    node_run: int | None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether samples may still come."""
+        return self.state in OPEN_TAKE_STATES
+
+
+@dataclass(frozen=True)
+class TakeOwner:
+    """A web server as the owner of live takes; without a name it serves alone and every take is its own."""
+
+    node: str | None = None
+    run: int | None = None
+
+    def has(self, take: LiveTakeRecord) -> bool:
+        """Whether a take is this one's, or nobody's."""
+        return self.node is None or take.node in (None, self.node)
+
+    def require(self, take: LiveTakeRecord) -> None:
+        """Raise NodeAway of a take that another one has."""
+        if not self.has(take):
+            raise NodeAway(take.node)
+
+
+ALONE = TakeOwner()
+
+
+@dataclass(frozen=True)
+class TabletAccess:
+    """What a tablet gets for a code; the token opens this take only."""
+
+    token: str
+    take: str
+    session_id: str
+    session_title: str
+    patient_code: str
+    remembered: Mapping[str, str]
+    """Serial number → segment it was worn on last."""
+
+
+@dataclass(frozen=True)
+class LiveEvent:
+    """Something that happened in a take: a command, a cue, a calibration, a notice, a change of state."""
+
+    seq: int
+    take_id: str
+    kind: str
+    t_s: float | None
+    content: Mapping[str, Any]
+    by: str | None
+    at: dt.datetime
+
+
+def open_take(
+    c: Connection, actor: audit.Actor | None, session_id: str, owner: TakeOwner = ALONE
+) -> tuple[LiveTakeRecord, str]:
+    """Open a take of this web server and return it with its code; raises NotFound, Conflict take_open."""
+    sessions.get(c, session_id)
+    earlier = current(c, session_id)
+    if earlier is not None and earlier.is_open:
+        raise Conflict(
+            "take_open", "This session has an open live take; ask for a new code or close it first."
+        )
+    code, take_id = _new_code(), new_id()
+    c.execute(
+        insert(live_take).values(
+            id=take_id,
+            session_id=session_id,
+            state="pairing",
+            opened_by=actor.user_id if actor else None,
+            created_at=now(),
+            node=owner.node,
+            node_run=owner.run,
+            **_code_columns(code),
+        )
+    )
+    audit.record(c, actor, "live.opened", "session", session_id, {"take_id": take_id})
+    return get(c, take_id), code
+
+
+def new_code(c: Connection, actor: audit.Actor | None, session_id: str) -> tuple[LiveTakeRecord, str]:
+    """Give another code; a tablet that is already joined stays so until this code is used."""
+    this = require_open(c, session_id)
+    code = _new_code()
+    c.execute(update(live_take).where(live_take.c.id == this.id).values(**_code_columns(code)))
+    audit.record(c, actor, "live.code_given", "session", session_id, {"take_id": this.id})
+    return get(c, this.id), code
+
+
+class CodeNotValid(ServiceError):  # noqa: N818 - what the person reads
+    """A pairing code is unknown, used or expired: one answer, nothing to learn by guessing."""
+
+    status = 404
+
+    def __init__(self) -> None:
+        super().__init__(
+            "code_not_valid",
+            "This code has been used, has expired, or was mistyped. Ask for a new one on the live page.",
+        )
+
+
+def pair(c: Connection, code: str) -> TabletAccess:
+    """Use a code up; raises CodeNotValid. The caller counts the failures (server/auth/throttle.py)."""
+    plain = "".join(code.split()).replace("-", "").upper()
+    token, at = new_token(), now()
+    row = c.execute(
+        select(live_take.c.id, live_take.c.session_id, live_take.c.state, session.c.title, patient.c.code)
+        .join(session, session.c.id == live_take.c.session_id)
+        .join(patient, patient.c.id == session.c.patient_id)
+        .where(
+            live_take.c.code_sha256 == token_hash(plain),
+            live_take.c.code_expires_at > at,
+            live_take.c.state.in_(OPEN_TAKE_STATES),
+        )
+    ).first()
+    if row is None:
+        raise CodeNotValid
+    values = {
+        "state": "open" if row.state == "pairing" else row.state,
+        "code_sha256": None,
+        "code_expires_at": None,
+        "token_sha256": token_hash(token),
+        "token_expires_at": at + TOKEN_LIFE,
+    }
+    c.execute(update(live_take).where(live_take.c.id == row.id).values(values))
+    audit.record(c, None, "live.paired", "session", row.session_id, {"take_id": row.id})
+    places = devices.recall_places(c).segments
+    return TabletAccess(token, row.id, row.session_id, row.title, row.code, places)
+
+
+def by_token(c: Connection, take_id: str, token: str) -> LiveTakeRecord | None:
+    """The take that this token opens, over or not; None when the token is unknown, expired or another's."""
+    row = c.execute(
+        select(live_take.c.token_sha256, live_take.c.token_expires_at).where(live_take.c.id == take_id)
+    ).first()
+    if row is None or row.token_sha256 is None or row.token_expires_at <= now():
+        return None
+    return get(c, take_id) if hmac.compare_digest(row.token_sha256, token_hash(token)) else None
+
+
+def check_value(name: str, value: object) -> None:
+    """Refuse a command's value that cannot be obeyed; raises ServiceError bad_value."""
+    if name in ("feedback", "pause"):
+        ok, expected = isinstance(value, bool), "true or false"
+    elif name == "level":
+        ok = isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 100
+        expected = "a whole number of steps, + easier, − harder"
+    elif name in ("mark", "ghost"):
+        ok = value is None or (isinstance(value, str) and len(value) <= 200)
+        expected = "a short text or nothing"
+    elif name == "test":
+        ok, expected = value in ("go", "repeat") or _are_limits(value), "go, repeat, or start_s and end_s"
+    else:
+        ok, expected = value is None, "nothing"
+    if not ok:
+        raise ServiceError("bad_value", f"The value of the command {name} is not {expected}.")
+
+
+def _are_limits(value: object) -> bool:
+    """Whether these are a start and an end of a functional test."""
+    if not isinstance(value, Mapping) or set(value) != {"start_s", "end_s"}:
+        return False
+    try:
+        limits = GivenLimits(value["start_s"], value["end_s"])
+    except (ParameterError, TypeError):
+        return False
+    return limits.start_s is not None and limits.end_s is not None
+
+
+def read_test_limits(c: Connection, take_id: str) -> dict[str, float] | None:
+    """What was said last of when the functional test of a take began and ended; a repetition drops it."""
+    said = [e.content["value"] for e in events(c, take_id) if e.kind == "test"]
+    last = said[-1] if said else None
+    return dict(last) if isinstance(last, Mapping) else None
+
+
+def note_start(c: Connection, take_id: str, source: str) -> LiveTakeRecord:
+    """Note the first samples."""
+    c.execute(
+        update(live_take)
+        .where(live_take.c.id == take_id, live_take.c.state.in_(("pairing", "open")))
+        .values(state="streaming", source=source)
+    )
+    return get(c, take_id)
+
+
+def end(
+    c: Connection,
+    actor: audit.Actor | None,
+    take_id: str,
+    state: str,
+    *,
+    count: int,
+    sha256: str | None = None,
+    problem: str | None = None,
+) -> LiveTakeRecord:
+    """End a take as finished or closed; one that is over stays as it is."""
+    changed = c.execute(
+        update(live_take)
+        .where(live_take.c.id == take_id, live_take.c.state.in_(OPEN_TAKE_STATES))
+        .values(
+            state=state,
+            finished_at=now(),
+            count=count,
+            sha256=sha256,
+            problem=problem,
+            code_sha256=None,
+            code_expires_at=None,
+        )
+    ).rowcount
+    this = get(c, take_id)
+    if changed:
+        detail = {"take_id": take_id, "count": count, "problem": problem}
+        audit.record(c, actor, f"live.{state}", "session", this.session_id, detail)
+    return this
+
+
+def get(c: Connection, take_id: str) -> LiveTakeRecord:
+    """One take; raises NotFound."""
+    row = c.execute(_QUERY.where(live_take.c.id == take_id)).first()
+    if row is None:
+        raise NotFound("live take", take_id)
+    return LiveTakeRecord(**row._asdict())
+
+
+def find_many(c: Connection, take_ids: Collection[str]) -> dict[str, LiveTakeRecord]:
+    """Those of these takes that are there, by id."""
+    rows = c.execute(_QUERY.where(live_take.c.id.in_(take_ids)))
+    return {row.id: LiveTakeRecord(**row._asdict()) for row in rows}
+
+
+def current(c: Connection, session_id: str) -> LiveTakeRecord | None:
+    """The session's newest take, None before the first."""
+    row = c.execute(_NEWEST, {"of_session": session_id}).first()
+    return None if row is None else LiveTakeRecord(**row._asdict())
+
+
+def require_open(c: Connection, session_id: str) -> LiveTakeRecord:
+    """The session's open take; raises NotFound, Conflict no_open_take."""
+    sessions.get(c, session_id)
+    this = current(c, session_id)
+    if this is None or not this.is_open:
+        raise Conflict("no_open_take", "This session has no open live take; start one first.")
+    return this
+
+
+def list_running(c: Connection) -> list[LiveTakeRecord]:
+    """All takes that receive samples or may at any moment, those that receive them last.
+
+    One whose code expired before a tablet paired is not among them.
+    """
+    waiting = (live_take.c.state == "pairing") & (live_take.c.code_expires_at > now())
+    query = _QUERY.where(live_take.c.state.in_(("open", "streaming")) | waiting)
+    rows = c.execute(query.order_by(live_take.c.state == "streaming", live_take.c.created_at))
+    return [LiveTakeRecord(**row._asdict()) for row in rows]
+
+
+def add_event(
+    c: Connection, actor: audit.Actor | None, take_id: str, kind: str, t_s: float | None, content: object
+) -> int:
+    """Append what happened and return its number."""
+    row = {
+        "take_id": take_id,
+        "kind": kind,
+        "t_s": t_s,
+        "content": content,
+        "user_id": actor.user_id if actor else None,
+        "at": now(),
+    }
+    key = c.execute(insert(live_event).values(row)).inserted_primary_key
+    if key is None:
+        raise RuntimeError("the database gave no number to an event")
+    return int(key[0])
+
+
+def events(c: Connection, take_id: str) -> list[LiveEvent]:
+    """Everything that happened in a take, in order."""
+    query = (
+        select(*_EVENT_COLUMNS, user.c.display_name.label("by"))
+        .join(user, user.c.id == live_event.c.user_id, isouter=True)
+        .where(live_event.c.take_id == take_id)
+        .order_by(live_event.c.seq)
+    )
+    return [LiveEvent(**row._asdict()) for row in c.execute(query)]
+
+
+def own_notice(code: str, text: str) -> dict[str, str]:
+    """Content of a notice that the server itself has to give, not the estimator."""
+    return {"code": code, "text": text, "severity": "bad", "from": "server"}
+
+
+def is_own_notice(content: Mapping[str, Any]) -> bool:
+    """Whether an event's content is one of `own_notice`."""
+    return content.get("from") == "server"
+
+
+def list_damages(c: Connection, session_id: str) -> list[str]:
+    """What was lost of a session's live takes because the disk damaged their logs, as sentences."""
+    return list(c.execute(_DAMAGES, {"of_session": session_id}).scalars())
+
+
+_DAMAGES: Final = (
+    select(live_event.c.content["text"].as_string())
+    .join(live_take, live_take.c.id == live_event.c.take_id)
+    .where(
+        live_take.c.session_id == bindparam("of_session"),
+        live_event.c.kind == "notice",
+        live_event.c.content["code"].as_string() == DAMAGED,
+    )
+    .order_by(live_event.c.seq)
+)
+
+
+def takes_of(c: Connection, session_id: str) -> list[LiveTakeRecord]:
+    """All takes of a session, the oldest first."""
+    query = _QUERY.where(live_take.c.session_id == session_id)
+    return [LiveTakeRecord(**row._asdict()) for row in c.execute(query.order_by(live_take.c.created_at))]
+
+
+_EVENT_COLUMNS = tuple(live_event.c[name] for name in LiveEvent.__dataclass_fields__ if name in live_event.c)
+_COLUMNS = tuple(live_take.c[name] for name in LiveTakeRecord.__dataclass_fields__ if name in live_take.c)
+_QUERY = select(*_COLUMNS, session.c.patient_id).join(session, session.c.id == live_take.c.session_id)
+_NEWEST = (
+    _QUERY.where(live_take.c.session_id == bindparam("of_session"))
+    .order_by(live_take.c.created_at.desc(), live_take.c.id)
+    .limit(1)
+)
+
+
+def _new_code() -> str:
+    return "".join(secrets.choice(ALPHABET) for _ in range(CODE_LENGTH))
+
+
+def _code_columns(code: str) -> dict[str, Any]:
+    return {"code_sha256": token_hash(code), "code_expires_at": now() + CODE_LIFE}

@@ -1,0 +1,154 @@
+"""The logs of all web servers: what they hold, which the database knows, and adopting a stranger.
+
+A log may outlive its row: the database was put back from a backup. It is kept until somebody adopts it or
+removes it by hand.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from sqlalchemy import Connection, insert, select
+
+from sagittal.core.errors import InputError
+from sagittal.core.formats.live_log import parse_hello, read_batch_header
+from sagittal.server import audit
+from sagittal.server.clinic import sessions
+from sagittal.server.errors import Conflict, NotFound
+from sagittal.server.jobs.queue import JobQueue
+from sagittal.server.live_takes import live_recordings
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs, segments
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.live_tables import live_take
+
+_ID = re.compile(r"[0-9a-f]{32}")
+
+
+@dataclass(frozen=True)
+class LiveLog:
+    """One log in `live/`.
+
+    Parameters
+    ----------
+    known : whether the database has its take. written_at : when the last batch came. batches : whole ones.
+    span_s : time between the first and the last of them, None with fewer than two. sensors : how many.
+    damage : what cannot be read behind them, None = nothing.
+    """
+
+    take_id: str
+    path: Path
+    known: bool
+    written_at: dt.datetime
+    size: int
+    source: str | None
+    sensors: int
+    batches: int
+    span_s: float | None
+    damage: segments.Damage | None
+
+    @property
+    def words(self) -> str:
+        """What it holds, for people."""
+        long = "" if self.span_s is None else f", {self.span_s:.0f} s"
+        return f"{self.written_at:%Y-%m-%d %H:%M}Z, {self.sensors} sensors, {self.batches} batches{long}"
+
+
+def list_logs(c: Connection, settings: Settings) -> Iterator[LiveLog]:
+    """Every log in `live/`, by name; one that vanishes meanwhile (its take has ended) is passed over."""
+    for path in _list_files(settings, "*.log"):
+        found = c.execute(select(live_take.c.id).where(live_take.c.id == path.stem)).first()
+        try:
+            yield read_log(path, known=found is not None)
+        except FileNotFoundError:
+            continue
+
+
+def list_originals(settings: Settings) -> list[Path]:
+    """The copies kept of damaged logs."""
+    return _list_files(settings, "*.damaged")
+
+
+def _list_files(settings: Settings, pattern: str) -> list[Path]:
+    return sorted(path for folder in settings.live_folders for path in folder.glob(pattern))
+
+
+def read_log(path: Path, *, known: bool) -> LiveLog:
+    """Look through one log; raises OSError."""
+    found = path.stat()
+    source, sensors, batches, size, sent = None, 0, 0, 0, []
+    for size, one in segments.read_records(path):  # noqa: B007 - the last one is used
+        try:
+            if one.kind == "H":
+                hello = parse_hello(one.body)
+                source, sensors = hello.source, sum(len(s.sensors) for s in hello.streams)
+            elif one.kind == "B":
+                batches += 1
+                sent.append(read_batch_header(one.body).sent_us)
+        except InputError:
+            break
+    return LiveLog(
+        path.stem,
+        path,
+        known,
+        dt.datetime.fromtimestamp(found.st_mtime, dt.UTC),
+        found.st_size,
+        source,
+        sensors,
+        batches,
+        (max(sent) - min(sent)) / 1e6 if len(sent) > 1 else None,
+        segments.find_damage(path, size),
+    )
+
+
+def adopt(
+    db: Database,
+    blobs: BlobStore,
+    settings: Settings,
+    queue: JobQueue,
+    actor: audit.Actor | None,
+    take_id: str,
+    session_id: str,
+) -> str:
+    """Make a log that the database does not know a recording of a session, analysed; returns its id.
+
+    Raises
+    ------
+    NotFound no such log or session; Conflict `take_known`, `take_empty`.
+    """
+    if not _ID.fullmatch(take_id):
+        raise NotFound("live log", take_id)
+    path = next(iter(_list_files(settings, f"{take_id}.log")), None)
+    if path is None:
+        raise NotFound("live log", take_id)
+    log = read_log(path, known=False)
+    if not log.batches:
+        raise Conflict("take_empty", f"{path.name} holds no sample that can be read; it was left as it is.")
+    with db.write() as c:
+        sessions.get(c, session_id)
+        if c.execute(select(live_take.c.id).where(live_take.c.id == take_id)).first():
+            raise Conflict("take_known", f"The take {take_id} belongs to a session already.")
+        c.execute(
+            insert(live_take).values(
+                id=take_id,
+                session_id=session_id,
+                state="closed",
+                source=log.source,
+                count=log.batches,
+                opened_by=actor.user_id if actor else None,
+                created_at=log.written_at,
+                finished_at=log.written_at,
+            )
+        )
+        detail = {"take_id": take_id, "count": log.batches}
+        audit.record(c, actor, "live.adopted", "session", session_id, detail)
+    made = live_recordings.keep(db, blobs, queue, path)
+    if made is None:
+        raise NotFound("session", session_id)
+    fs.remove_file(path)
+    return made

@@ -1,0 +1,243 @@
+"""The log of a take that is over becomes a recording of its session, byte for byte, and is analysed.
+
+Every step may be the last before a crash; `repair` takes them again at the start of the server.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, insert, select, update
+
+from sagittal.server import audit
+from sagittal.server.errors import NotFound
+from sagittal.server.jobs.queue import JobQueue
+from sagittal.server.live_takes import live, live_training
+from sagittal.server.results import analyses
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs, references, segments
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.live_tables import OPEN_TAKE_STATES, live_take
+from sagittal.server.storage.tables import new_id, now, recording, recording_file, user
+from sagittal.server.uploads import recordings
+
+log = logging.getLogger(__name__)
+
+CHUNK_BYTES = 1_000_000
+
+
+@dataclass(frozen=True)
+class TakeOpener:
+    """The person who opened the take, on whose behalf it is stored and analysed."""
+
+    user_id: str
+    name: str
+
+
+def log_path(folder: Path, take_id: str) -> Path:
+    """Where the log of a take is while it has not become a recording."""
+    return folder / f"{take_id}.log"
+
+
+def file_name(take: live.LiveTakeRecord) -> str:
+    """Name of the recording's only file."""
+    return f"live-{take.created_at:%Y%m%dT%H%M%SZ}.sagittal-live"
+
+
+def keep(db: Database, blobs: BlobStore, queue: JobQueue, path: Path) -> str | None:
+    """Make the log of a take that is over its session's newest recording; done already is fine.
+
+    Parameters
+    ----------
+    path : of the log, named by the take.
+
+    Returns
+    -------
+    The recording's id; None when no sample ever came or the session has been erased. The log may go.
+    """
+    take_id = path.stem
+    try:
+        with db.read() as c:
+            take = live.get(c, take_id)
+        if take.is_open:
+            raise RuntimeError(f"live take {take_id} is still {take.state}")
+        if take.recording_id is None and path.is_file():
+            hello = _hello_of_data(path)
+            if hello is not None:
+                take = _store(db, blobs, queue, take, path, hello)
+            else:
+                _set_aside(db, take_id, path)
+    except NotFound:
+        return None
+    return take.recording_id
+
+
+def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) -> list[str]:
+    """Finish what a crash left: store the logs of takes that are over.
+
+    A log of a take that the database does not know stays: it may be the right database that is missing.
+
+    Returns
+    -------
+    Ids of the takes that are still open and have a log.
+    """
+    fs.make_folder(settings.live)
+    _take_in(db, settings)
+    waiting = []
+    for path in sorted(settings.live.glob("*.log")):
+        with db.read() as c:
+            state = c.execute(select(live_take.c.state).where(live_take.c.id == path.stem)).scalar()
+        if state is None:
+            log.warning("the database knows nothing of %s; it is kept (see `sagittal adopt`)", path)
+            continue
+        if state in OPEN_TAKE_STATES:
+            waiting.append(path.stem)
+            continue
+        try:
+            keep(db, blobs, queue, path)
+            fs.remove_file(path)
+        except Exception:
+            # one take that cannot be stored must not keep the clinic closed; its log stays for the next start
+            log.exception("live take %s could not be stored", path.stem)
+    return waiting
+
+
+def _take_in(db: Database, settings: Settings) -> None:
+    """Move here the logs and films of web servers that cannot run beside this one, whose takes are ours then.
+
+    That is the one without a name, or, where this one has none, all others.
+    """
+    left = [one for one in settings.live_folders if one != settings.live and one.is_dir()]
+    if settings.node_name:
+        left = [one for one in left if one.parent == settings.data_dir]
+    if any(any(folder.iterdir()) for folder in left):
+        # two servers that start at once: the second finds nothing
+        with db.write():
+            for folder in left:
+                for path in sorted(folder.iterdir()):
+                    fs.move_file(path, settings.live / path.name)
+                fs.sync_folder(folder)
+            fs.sync_folder(settings.live)
+    _note_owner(db, settings)
+
+
+def _note_owner(db: Database, settings: Settings) -> None:
+    """Let the takes whose files are here belong to this server, also where a crash came after the move."""
+    here = {path.name.partition(".")[0] for path in settings.live.iterdir()}
+    node = settings.node_name or None
+    strange = live_take.c.id.in_(here) & live_take.c.node.is_distinct_from(node)
+    with db.read() as c:
+        if c.execute(select(live_take.c.id).where(strange).limit(1)).first() is None:
+            return
+    with db.write() as c:
+        c.execute(update(live_take).where(strange).values(node=node, node_run=None))
+
+
+def _store(
+    db: Database, blobs: BlobStore, queue: JobQueue, take: live.LiveTakeRecord, path: Path, hello: bytes
+) -> live.LiveTakeRecord:
+    blob = _copy(blobs, take.patient_id, path)
+    try:
+        with db.write() as c:
+            return _publish(c, blobs, queue, take.id, blob, hello)
+    except NotFound:
+        # erased meanwhile: nothing of it may wait in the trash
+        references.discard(db, blobs, take.patient_id, [blob.sha256])
+        raise
+
+
+def _set_aside(db: Database, take_id: str, path: Path) -> None:
+    """Keep the log of a take without a readable sample when there is more in it than a crash leaves."""
+    damage = segments.find_damage(path, segments.count_readable_bytes(path))
+    if damage is None:
+        return
+    original = segments.keep_original(path)
+    log.warning("%s: %s Kept as %s.", path.name, damage.sentence, original)
+    notice = live.own_notice(live.DAMAGED, damage.sentence)
+    try:
+        with db.write() as c:
+            live.get(c, take_id)
+            live.add_event(c, None, take_id, "notice", None, notice)
+    except NotFound:
+        fs.remove_file(original)  # erased meanwhile
+        raise
+
+
+def _copy(blobs: BlobStore, space: str, path: Path) -> Blob:
+    # no limit: these bytes were acknowledged
+    with blobs.receive(space) as receiver:
+        for chunk in _chunks(path):
+            receiver.write(chunk)
+        return receiver.keep()
+
+
+def _chunks(path: Path) -> Iterator[bytes]:
+    with path.open("rb") as file:
+        while chunk := file.read(CHUNK_BYTES):
+            yield chunk
+
+
+def _hello_of_data(path: Path) -> bytes | None:
+    """The hello of a log with at least one batch, else None."""
+    hello = None
+    for _, found in segments.read_records(path):
+        if found.kind == "H":
+            hello = found.body
+        elif found.kind == "B":
+            return hello
+    return None
+
+
+def _publish(
+    c: Connection, blobs: BlobStore, queue: JobQueue, take_id: str, blob: Blob, hello: bytes
+) -> live.LiveTakeRecord:
+    take = live.get(c, take_id)
+    if take.recording_id is not None:
+        return take
+    blobs.require(take.patient_id, blob.sha256)
+    recording_id, at = new_id(), now()
+    said: dict[str, Any] = {"sensors": _sensors(hello)}
+    if (limits := live.read_test_limits(c, take_id)) is not None:
+        said["test_limits"] = limits
+    manifest = analyses.complete_manifest(c, take.session_id, said)
+    # alone in its set: files that were uploaded to this session before are another take
+    c.execute(
+        insert(recording).values(
+            id=recording_id, session_id=take.session_id, manifest=manifest, created_at=at
+        )
+    )
+    c.execute(
+        insert(recording_file).values(
+            recording_id=recording_id,
+            name=file_name(take),
+            size=blob.size,
+            sha256=blob.sha256,
+            added_at=at,
+        )
+    )
+    c.execute(update(live_take).where(live_take.c.id == take_id).values(recording_id=recording_id))
+    actor = find_opener(c, take)
+    live_training.settle_feedback(c, actor, take)
+    detail = {"session_id": take.session_id, "take_id": take_id, "sha256": blob.sha256, "size": blob.size}
+    audit.record(c, actor, "recording.file_added", "recording", recording_id, detail)
+    recordings.inspect(c, queue, actor, take.session_id)
+    analyses.submit(c, queue, actor, take.session_id)
+    return live.get(c, take_id)
+
+
+def _sensors(hello: bytes) -> dict[str, Any]:
+    """Device → segment, as the tablet declared them."""
+    from sagittal.core.formats.live_log import parse_hello
+
+    return {sensor.id: sensor.segment for stream in parse_hello(hello).streams for sensor in stream.sensors}
+
+
+def find_opener(c: Connection, take: live.LiveTakeRecord) -> TakeOpener | None:
+    """Who opened a take, None when nobody is known who did."""
+    row = c.execute(select(user.c.id, user.c.name).where(user.c.id == take.opened_by)).first()
+    return None if row is None else TakeOpener(row.id, row.name)

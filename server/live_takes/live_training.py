@@ -1,0 +1,98 @@
+"""What a live take is estimated and coached with: fixed at its first sample and kept as an event.
+
+A replay after a crash needs the same target and the same baseline, whatever is prescribed meanwhile.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, select, update
+
+from sagittal.core.errors import SagittalError
+from sagittal.server import audit
+from sagittal.server.clinic import sessions
+from sagittal.server.live_takes import live
+from sagittal.server.results import analyses, prescriptions
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.live_tables import live_event, live_take
+from sagittal.server.storage.tables import session
+
+log = logging.getLogger(__name__)
+
+KIND = "prescription"
+
+
+@dataclass(frozen=True)
+class LiveTraining:
+    """What the estimator needs to know beside the samples.
+
+    Parameters
+    ----------
+    height_m, protocol : of the session or the patient.
+    prescription_id, prescription, baseline : JSON of sagittal.core.feedback, None = no feedback.
+    """
+
+    height_m: float | None
+    protocol: str
+    prescription_id: str | None = None
+    prescription: Mapping[str, Any] | None = None
+    baseline: Mapping[str, Any] | None = None
+
+
+def training_of(db: Database, reviewed: ReviewedAnalyses, take: live.LiveTakeRecord) -> LiveTraining:
+    """What this take began with, or begins with now."""
+    query = select(live_event.c.content).where(live_event.c.take_id == take.id, live_event.c.kind == KIND)
+    with db.read() as c:
+        said = analyses.complete_manifest(c, take.session_id, None)
+        content = c.execute(query.order_by(live_event.c.seq).limit(1)).scalar()
+        begins = content is None
+        if content is None:
+            content = _prescribed(c, reviewed, take)
+    if begins:
+        with db.write() as c:
+            live.add_event(c, None, take.id, KIND, None, content)
+            row = update(live_take).where(live_take.c.id == take.id)
+            c.execute(row.values(prescription_id=content["id"]))
+    height, protocol = said.get("subject", {}).get("height_m"), said["protocol"]
+    return LiveTraining(height, protocol, content["id"], content["prescription"], content["baseline"])
+
+
+def note_feedback(c: Connection, take_ids: Collection[str]) -> None:
+    """Note on the sessions of these takes that somebody walked with feedback."""
+    query = (
+        select(session.c.id)
+        .join(live_take, live_take.c.session_id == session.c.id)
+        .where(live_take.c.id.in_(take_ids), ~session.c.feedback)
+    )
+    for session_id in c.execute(query.distinct()).scalars().all():
+        sessions.change(c, None, session_id, {"feedback": True})
+
+
+def settle_feedback(c: Connection, actor: audit.Actor | None, take: live.LiveTakeRecord) -> None:
+    """Where an earlier take of the session gave feedback, note whether this one did, which now counts.
+
+    Without such a take what a person said stays; cues that come later are noted by themselves.
+    """
+    given = prescriptions.cues(c, [t.id for t in live.takes_of(c, take.session_id)])
+    told = {of: any(cue.with_feedback for cue in cues) for of, cues in given.items()}
+    if any(told.values()):
+        sessions.change(c, actor, take.session_id, {"feedback": told[take.id]})
+
+
+def _prescribed(c: Connection, reviewed: ReviewedAnalyses, take: live.LiveTakeRecord) -> dict[str, Any]:
+    nothing = {"id": None, "prescription": None, "baseline": None}
+    try:
+        written = prescriptions.in_force(c, take.patient_id)
+        found = prescriptions.for_take(c, reviewed, take.session_id)
+    except SagittalError:
+        # an earlier visit that cannot be read must not keep this one from being recorded
+        log.exception("live take %s begins without feedback", take.id)
+        return nothing
+    if written is None or found is None or not found[0].target.resolved:
+        return nothing
+    return {"id": written.id, "prescription": found[0].to_json(), "baseline": found[1].to_json()}

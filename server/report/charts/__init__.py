@@ -1,0 +1,1 @@
+"""Charts as SVG: curves, bars, dots, for page and paper."""

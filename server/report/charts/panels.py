@@ -1,0 +1,220 @@
+"""Cycle curves as they are drawn and tabled: degrees, left and right, the norm where comparable."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from sagittal.core.events.result import COMPARED
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.norms import NormBand
+from sagittal.core.norms.kinematics import Zero
+from sagittal.core.norms.lookup import Norms
+from sagittal.core.parameters import mean_curve
+from sagittal.core.parameters.anatomical_zero import anatomical_variables, standing_offset_deg
+from sagittal.core.parameters.kinematic import MEAN_ZERO, rest_at_bound
+from sagittal.core.parameters.result import CycleCurves
+from sagittal.core.parameters.variability import mean_and_sd
+from sagittal.server.report.files.bundle import Bundle
+from sagittal.server.report.words.estimator import list_estimated_variables
+from sagittal.server.report.words.wording import VARIABLES, ZERO_WORDS, Variable, reason_words
+
+NO_BAND: Final[Mapping[Zero, str]] = {
+    "standing": "No norm band: these curves start from this person's standing, the norm from the anatomical "
+    "zero. Enter goniometer angles of standing to compare.",
+    "walking": "No norm band: no usable standing, so these curves start from their own mean in walking.",
+    "stride_mean": "No norm band: measured from its own mean over the stride, the norm is not.",
+    "anatomical": "No norm band: the norm is measured from standing.",
+}
+"""Zero of a curve → why none of the known bands may stand behind it."""
+
+FEW_BAND: Final = f"No norm band: fewer than {COMPARED} strides of a side are compared with nothing."
+"""The same where no side has enough strides."""
+
+DRAWN_STRIDES: Final = 40
+"""Single strides drawn per side at most, spread over the take; more only make the page heavy."""
+
+
+@dataclass(frozen=True, eq=False)
+class SideCurve:
+    """One side of one variable.
+
+    Parameters
+    ----------
+    mean_deg, sd_deg : (101,) over the counted strides; None without strides, sd also with one. NaN where the
+        leg model's knee rests on its limit in most strides.
+    n : strides behind the mean. strides : index in the stride list → (101,) deg, counted strides to draw, NaN
+        where they rest there.
+    foot_off_pct, foot_off_sd : terminal contact, % of cycle, None if not found.
+    """
+
+    mean_deg: Floats | None
+    sd_deg: Floats | None
+    n: int
+    strides: Mapping[int, Floats]
+    foot_off_pct: float | None
+    foot_off_sd: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class CurvePanel:
+    """One chart.
+
+    Parameters
+    ----------
+    title : with the zero in words, "Knee flexion, from standing".
+    zero : what the curves are measured from, None without angles. added_deg : what of it a goniometer read,
+        by side, and was added; empty from standing.
+    low_confidence : frontal and transverse planes, and joints without a sensor on both of their segments.
+    reason : why there is no curve, None if there is one.
+    norm : band to draw, of the same zero; None where there is none. norm_note : what must be said about it,
+        or why there is none though a norm exists.
+    comfortable : the same people's band at their comfortable speed, where `norm` is at the person's own.
+    """
+
+    variable: Variable
+    title: str
+    zero: Zero | None
+    added_deg: Mapping[Side, float]
+    low_confidence: bool
+    reason: str | None
+    norm: NormBand | None
+    norm_note: str
+    sides: Mapping[Side, SideCurve]
+    comfortable: NormBand | None = None
+
+
+def curve_panels(
+    bundle: Bundle, curves: CycleCurves | None, norms: Norms, own: Norms | None = None
+) -> tuple[CurvePanel, ...]:
+    """All panels in reading order; a variable without a curve keeps its place and says why.
+
+    Where a goniometer was used on both sides the curves are anatomical, else from standing.
+
+    Parameters
+    ----------
+    curves : of the bundle's angles over its strides, None without angles.
+    norms, own : published reference, and the clinic's own controls; the first that has a band of the same
+        zero gives it, to a variable that sensors measure.
+    """
+    estimated = list_estimated_variables(bundle.estimator)
+    standing = {} if bundle.angles is None else bundle.angles.standing_deg
+    level = set(anatomical_variables(standing)).difference(estimated)
+    known = () if own is None else (own.bands,)
+    found = []
+    for v in VARIABLES:
+        bands = [b for by_name in (norms.bands, *known) if (b := by_name.get(v.name)) is not None]
+        added = {s: standing_offset_deg(v.name, s, standing) for s in SIDES} if v.name in level else {}
+        panel = _panel(v, curves, added, bands, sure=v.name not in estimated)
+        if panel.norm is not None and panel.norm is norms.bands.get(v.name):
+            panel = replace(panel, comfortable=norms.comfortable_bands.get(v.name))
+        found.append(panel)
+    return tuple(found)
+
+
+def same_zero(before: CurvePanel, after: CurvePanel) -> tuple[CurvePanel, CurvePanel]:
+    """Two panels of a variable to be drawn in one: both from standing unless both are anatomical; the earlier
+    one without curves where only one of them comes from a take in which somebody stood."""
+    if before.zero == after.zero or None in (before.zero, after.zero):
+        return before, after
+    if "walking" in (before.zero, after.zero):
+        # a curve without a level is not drawn over one that has one
+        return replace(before, sides={}, reason=reason_words("no_standing")), after
+    return _from_standing(before), _from_standing(after)
+
+
+def _from_standing(panel: CurvePanel) -> CurvePanel:
+    if panel.zero != "anatomical":
+        return panel
+    sides = {s: _moved(c, -panel.added_deg[s]) for s, c in panel.sides.items()}
+    return replace(
+        panel,
+        title=_title(panel.variable, "standing"),
+        zero="standing",
+        added_deg={},
+        norm=None,
+        norm_note="",
+        sides=sides,
+        comfortable=None,
+    )
+
+
+def _panel(
+    variable: Variable,
+    curves: CycleCurves | None,
+    added: Mapping[Side, float],
+    bands: Sequence[NormBand],
+    *,
+    sure: bool,
+) -> CurvePanel:
+    sides = {} if curves is None else {s: _side(curves, variable.name, s) for s in SIDES}
+    sides = {s: c for s, c in sides.items() if c.mean_deg is not None}
+    sides = {s: _moved(c, added.get(s, 0.0)) for s, c in sides.items()}
+    reason = None if sides else _why_missing(variable, curves)
+    zero: Zero | None = None
+    if curves is not None:
+        zero = "stride_mean" if variable.name in MEAN_ZERO else "anatomical" if added else curves.zero
+    fitting = next((b for b in bands if b.zero == zero), None) if sure and reason is None else None
+    note = "" if fitting is None else fitting.note
+    if fitting is not None and all(c.n < COMPARED for c in sides.values()):
+        fitting, note = None, FEW_BAND
+    elif fitting is None and bands and sure and zero is not None:
+        note = NO_BAND[zero]
+    return CurvePanel(
+        variable=variable,
+        title=_title(variable, zero),
+        zero=zero,
+        added_deg=added,
+        low_confidence=variable.plane != "sagittal" or not sure,
+        reason=reason,
+        norm=fitting,
+        norm_note=note,
+        sides=sides,
+    )
+
+
+def _title(variable: Variable, zero: Zero | None) -> str:
+    return variable.label if zero is None else f"{variable.label}, {ZERO_WORDS[zero]}"
+
+
+def _moved(curve: SideCurve, by_deg: float) -> SideCurve:
+    """The curve with its zero moved."""
+    if by_deg == 0.0 or curve.mean_deg is None:
+        return curve
+    strides = {i: row + by_deg for i, row in curve.strides.items()}
+    return replace(curve, mean_deg=curve.mean_deg + by_deg, strides=strides)
+
+
+def _why_missing(variable: Variable, curves: CycleCurves | None) -> str:
+    if curves is None:
+        return reason_words("not_reached")
+    why = next(iter(curves.why.get(variable.name, {}).values()), None)
+    return reason_words(why or ("no_strides" if variable.name in curves.curves else "joint_missing"))
+
+
+def _side(curves: CycleCurves, name: str, side: Side) -> SideCurve:
+    mean = mean_curve(curves, name, side)
+    rows = curves.curves.get(name, {}).get(side)
+    strides: dict[int, Floats] = {}
+    off = np.empty(0)
+    if rows is not None and mean.n:
+        counted = np.flatnonzero(curves.used[side] & np.isfinite(rows).all(axis=1))
+        off = curves.foot_off_pct[side][counted]
+        off = off[np.isfinite(off)]
+        if len(counted) > DRAWN_STRIDES:
+            counted = counted[np.linspace(0, len(counted) - 1, DRAWN_STRIDES).round().astype(np.int64)]
+        drawn, index = rows[counted], curves.stride_index[side]
+        shown = np.where(rest_at_bound(curves, name, side, drawn), np.nan, np.degrees(drawn))
+        strides = {index[i]: row for i, row in zip(counted, shown, strict=True)}
+    foot_off, foot_off_sd = mean_and_sd(off) if len(off) else (None, None)
+    return SideCurve(
+        mean_deg=None if mean.mean is None else np.degrees(mean.mean),
+        sd_deg=None if mean.sd is None else np.degrees(mean.sd),
+        n=mean.n,
+        strides=strides,
+        foot_off_pct=foot_off,
+        foot_off_sd=foot_off_sd,
+    )

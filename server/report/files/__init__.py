@@ -1,0 +1,1 @@
+"""The files an analysis yields, written and read back."""

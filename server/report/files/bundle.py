@@ -1,0 +1,290 @@
+"""Reads the files of a finished analysis back into the objects they were made from."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, cast
+
+import numpy as np
+
+from sagittal.core.activity.result import ActivityResult
+from sagittal.core.angles import JointAngles
+from sagittal.core.body.model import BodyModel
+from sagittal.core.body.poses import Poses
+from sagittal.core.errors import FormatError, Notice
+from sagittal.core.events.edits import Edit, EditKind
+from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents, Stride, StrideFlag, Strides
+from sagittal.core.events.strides import NOTICES
+from sagittal.core.frames import SEGMENTS, Segment, Side
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.catalogue.entry import FUNCTIONAL
+from sagittal.core.parameters.measure import MeasuredGait
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.rows import Column
+from sagittal.server.report.files import activity_files
+from sagittal.server.report.files.columns import SCHEMA, bools_of, floats_of, read_table
+from sagittal.server.report.files.exports import STRIDE_COLUMNS
+
+EDIT_WORDS: Final[Mapping[EditKind, tuple[str, str]]] = {
+    "move_event": ("event moved", "events moved"),
+    "add_event": ("event added", "events added"),
+    "delete_event": ("event deleted", "events deleted"),
+    "exclude_stride": ("stride left out", "strides left out"),
+    "include_stride": ("stride counted in spite of a rule", "strides counted in spite of a rule"),
+}
+"""Kind of edit → words for one and for several."""
+
+
+ABOUT_FILES: Final = frozenset({"ignored_file", "file_not_read", "file_given_twice"})
+"""Codes of notices about files of an upload that hold nothing for this take; the upload page lists them."""
+
+
+@dataclass(frozen=True)
+class StoredRepetition:
+    """A squat of repetitions.csv; values : measure → number, empty where it does not count."""
+
+    side: Side
+    start_s: float
+    end_s: float
+    values: Mapping[str, float]
+    excluded: str | None
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """A finished analysis as stored; a part that was not reached is None or empty.
+
+    Parameters
+    ----------
+    repetitions : of a take of squats, None of any other. functional : of a functional test, as in
+        analysis.json; None of any other. activity : of a take of daily life, None of any other.
+    quality, calibration, calibration_score, estimator, provenance : the JSON of analysis.json.
+    warnings : its notices but for those that the upload page has told.
+    """
+
+    quality: Mapping[str, Any]
+    calibration: Mapping[str, Any] | None
+    parameters: tuple[Parameter, ...]
+    warnings: tuple[Notice, ...]
+    provenance: Mapping[str, Any]
+    calibration_score: Mapping[str, Any] | None = None
+    estimator: Mapping[str, Any] | None = None
+    angles: JointAngles | None = None
+    events: GaitEvents = field(default_factory=lambda: GaitEvents(()))
+    strides: Strides = field(default_factory=lambda: Strides(()))
+    repetitions: tuple[StoredRepetition, ...] | None = None
+    functional: Mapping[str, Any] | None = None
+    activity: ActivityResult | None = None
+
+
+def load_bundle(files: Mapping[str, bytes]) -> Bundle:
+    """Read the files of `analysis_files`; poses are left to `read_poses`, only the replay needs them.
+
+    Raises
+    ------
+    FormatError
+        `no_analysis` without analysis.json, `newer_analysis` if a later version wrote it.
+    """
+    if "analysis.json" not in files:
+        raise FormatError("no_analysis", "analysis.json is missing; run the analysis again.")
+    data = json.loads(files["analysis.json"])
+    if data.get("schema") != SCHEMA:
+        raise FormatError(
+            "newer_analysis",
+            f"analysis.json has schema {data.get('schema')}, this version reads {SCHEMA}; update Sagittal.",
+        )
+    return Bundle(
+        quality=data["quality"],
+        calibration=data["calibration"],
+        parameters=tuple(Parameter(**row) for row in data["parameters"]),
+        warnings=read_warnings(data),
+        provenance=data["provenance"],
+        calibration_score=data.get("calibration_score"),
+        estimator=data.get("estimator"),
+        angles=read_angles(files["angles.parquet"]) if "angles.parquet" in files else None,
+        events=read_events(files["events.csv"]) if "events.csv" in files else GaitEvents(()),
+        strides=read_strides(files["strides.csv"]) if "strides.csv" in files else Strides(()),
+        repetitions=read_repetitions(files["repetitions.csv"]) if "repetitions.csv" in files else None,
+        functional=data.get("functional"),
+        activity=activity_files.read_activity(files) if activity_files.NAME in files else None,
+    )
+
+
+def read_repetitions(data: bytes) -> tuple[StoredRepetition, ...]:
+    """Squats of repetitions.csv in order of time."""
+    found = []
+    for row in csv.DictReader(io.StringIO(data.decode())):
+        side, start, end = cast("Side", row.pop("side")), float(row.pop("start_s")), float(row.pop("end_s"))
+        excluded = row.pop("excluded_reason") or None
+        values = {name: float(x) for name, x in row.items() if name != "bottom_s" and x}
+        found.append(StoredRepetition(side, start, end, values, excluded))
+    return tuple(found)
+
+
+def read_warnings(data: Mapping[str, Any]) -> tuple[Notice, ...]:
+    """Notices of analysis.json about the take; of files that hold nothing for it the upload page has told."""
+    return keep_told(Notice(**row) for row in data["warnings"])
+
+
+def keep_told(notices: Iterable[Notice]) -> tuple[Notice, ...]:
+    """Those that are told of an analysis, one of every fault."""
+    told = {*ABOUT_FILES, "duplicate_stream"}
+    return join_faults(tuple(n for n in notices if n.severity == "error" or n.code not in told))
+
+
+FAILURE_CAUSES: Final = ("unequal_lengths", "channel_stuck", "gap")
+"""Why a sensor failed (`sensor_failed`), the most precise first."""
+
+FAILURE_EFFECTS: Final = ("foot_missing", "figure_incomplete")
+"""What is missing for want of that very sensor."""
+
+
+def join_faults(notices: Sequence[Notice]) -> tuple[Notice, ...]:
+    """Join what is said of one failed sensor into one notice: why it failed, then what follows."""
+    failed = {n.sensor for n in notices if n.code == "sensor_failed"}
+    causes: dict[str | None, Notice] = {}
+    for code in FAILURE_CAUSES:
+        for n in notices:
+            if n.code == code and n.sensor in failed:
+                causes.setdefault(n.sensor, n)
+    joined = []
+    for n in notices:
+        if n.severity != "error" and n.sensor in failed and n.code in (*FAILURE_CAUSES, *FAILURE_EFFECTS):
+            continue
+        cause = causes.get(n.sensor) if n.code == "sensor_failed" else None
+        if cause is not None:
+            n = replace(n, message=f"{cause.message} {n.message}", t_s=cause.t_s)
+        joined.append(n)
+    return tuple(joined)
+
+
+def apply_review(bundle: Bundle, measured: MeasuredGait, edits: Sequence[Edit]) -> Bundle:
+    """The same analysis with what a person's edits give, and a notice that says so."""
+    done = Counter(EDIT_WORDS[e.kind] for e in edits)
+    notice = Notice(
+        "edited",
+        f"Changed by hand: {', '.join(f'{n} {words[n > 1]}' for words, n in done.items())}. The stored "
+        "analysis stays as it was; its files are those before the changes.",
+        severity="info",
+    )
+    warnings = [n for n in bundle.warnings if n.code not in NOTICES]
+    # a functional test is measured by the analysis; edits of strides leave it
+    of_test = tuple(p for p in bundle.parameters if is_functional(p.name))
+    return replace(
+        bundle,
+        events=measured.events,
+        strides=measured.strides,
+        parameters=(*of_test, *measured.parameters),
+        warnings=(*warnings, *measured.notices, notice),
+        provenance={**bundle.provenance, "edits": len(edits)},
+    )
+
+
+def is_functional(name: str) -> bool:
+    """Is a parameter one of a functional test?"""
+    entry = CATALOGUE.get(name)
+    return entry is not None and entry.group in FUNCTIONAL
+
+
+def read_angles(data: bytes) -> JointAngles:
+    """Joint angles of angles.parquet in rad; null becomes NaN again."""
+    table, meta = read_table(data)
+    found = {
+        name.removesuffix("_deg"): np.radians(floats_of(table, name))
+        for name in table.column_names
+        if name != "t_s"
+    }
+    headings = {name: found.pop(name) for name in tuple(found) if name.endswith("_heading")}
+    zero = {name: math.radians(offset) for name, offset in meta["zero_offset_deg"].items()}
+    standing = dict(meta.get("standing_angles_deg", {}))
+    return JointAngles(
+        floats_of(table, "t_s"),
+        found,
+        zero,
+        meta["angle_zero"],
+        diagnostics={"estimated": tuple(meta.get("estimated", ()))},
+        standing_deg=standing,
+        withheld=dict(meta.get("withheld", {})),
+        bounds={name: math.radians(bound) for name, bound in meta.get("bounds_deg", {}).items()},
+        headings={name.removesuffix("_heading"): course for name, course in headings.items()},
+    )
+
+
+def read_poses(data: bytes) -> Poses:
+    """Segment poses of poses.parquet."""
+    table, meta = read_table(data)
+    present: list[Segment] = [s for s in SEGMENTS if f"{s}_q_w" in table.column_names]
+    return Poses(
+        t_s=floats_of(table, "t_s"),
+        rate_hz=float(meta["rate_hz"]),
+        q={s: np.stack([floats_of(table, f"{s}_q_{c}") for c in "wxyz"], axis=1) for s in present},
+        p={s: np.stack([floats_of(table, f"{s}_p_{c}") for c in "xyz"], axis=1) for s in present},
+        valid=bools_of(table, "valid"),
+        contact={
+            cast("Segment", f"foot_{k}"): bools_of(table, f"contact_{k}")
+            for k in "lr"
+            if f"contact_{k}" in table.column_names
+        },
+        body=BodyModel(**meta["body"]),
+        method=str(meta["method"]),
+    )
+
+
+def read_events(data: bytes) -> GaitEvents:
+    """Contacts of events.csv; the time of detection is not stored, so it is the event time."""
+    return GaitEvents(
+        tuple(
+            GaitEvent(
+                time_s=(t := float(row["time_s"])),
+                side=cast("Side", row["side"]),
+                kind=cast("EventKind", row["kind"]),
+                source=row["source"],
+                detected_s=t,
+                confidence=_number(row.get("confidence") or ""),
+                uncertainty_s=_number(row.get("uncertainty_s") or ""),
+            )
+            for row in _rows(data)
+        )
+    )
+
+
+def read_strides(data: bytes) -> Strides:
+    """The stride list of strides.csv; the parameter columns are derived and not read."""
+    return Strides(
+        tuple(
+            Stride(
+                side=cast("Side", row["side"]),
+                start_s=float(row["start_s"]),
+                tc_s=_number(row["tc_s"]),
+                end_s=float(row["end_s"]),
+                opposite_tc_s=_number(row["opposite_tc_s"]),
+                opposite_ic_s=_number(row["opposite_ic_s"]),
+                turn_rad=None if (turn := _number(row["turn_deg"])) is None else math.radians(turn),
+                excluded_reason=row["excluded_reason"] or None,
+                flags=cast("tuple[StrideFlag, ...]", tuple((row.get("flags") or "").split())),
+            )
+            for row in _rows(data)
+        )
+    )
+
+
+def read_columns(data: bytes) -> dict[str, Column]:
+    """The parameters of strides.csv by name, one entry per stride."""
+    rows = list(_rows(data))
+    known = {*STRIDE_COLUMNS, "flags", "excluded_reason"}
+    names = [name for name in (rows[0] if rows else ()) if name not in known]
+    return {name: tuple(_number(row[name]) for row in rows) for name in names}
+
+
+def _rows(data: bytes) -> csv.DictReader[str]:
+    return csv.DictReader(io.StringIO(data.decode()))
+
+
+def _number(text: str) -> float | None:
+    return float(text) if text else None

@@ -1,0 +1,247 @@
+"""Columns over time as Parquet, and what JSON knows: how every result file is written and read."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
+from itertools import islice
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from sagittal.core.frames import Bools, Floats
+from sagittal.core.signals.memory import give_memory_back
+
+if TYPE_CHECKING:
+    from sagittal.core.events.turns import Turn  # brings numba, which the web process does without
+
+SCHEMA = 1
+"""Version of analysis.json and of the columns beside it; readers refuse a newer one."""
+
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+"""First characters of a text that make a spreadsheet calculate it."""
+
+
+PLAIN: Final = frozenset({str, int, bool, type(None)})
+
+
+def reduce_to_plain(value: object) -> object:
+    """Reduce mappings, sequences and numpy values to what JSON knows; non-finite numbers become null."""
+    kind = type(value)
+    if kind is float:
+        return value if math.isfinite(value) else None  # type: ignore[arg-type]
+    if kind in PLAIN:
+        return value
+    if isinstance(value, Mapping):
+        return {str(k): reduce_to_plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        return reduce_to_plain(value.tolist())
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [reduce_to_plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return reduce_to_plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, (str, int)) else str(value)
+
+
+def list_turns(turns: Iterable[Turn]) -> list[dict[str, object]]:
+    """Turns as analysis.json and activity.json name them: s, degrees, degrees/s."""
+    return [
+        {
+            "start_s": t.start_s,
+            "end_s": t.end_s,
+            "turn_angle_deg": math.degrees(t.angle_rad),
+            "turn_duration_s": t.duration_s,
+            "turn_peak_velocity_dps": math.degrees(t.peak_rad_s),
+            "turn_direction": t.direction,
+        }
+        for t in turns
+    ]
+
+
+def repeat_words(words: Sequence[str], times: int) -> pa.Array[Any]:
+    """A column with every word so many times, each word stored once."""
+    known = list(dict.fromkeys(words))
+    places = np.repeat(np.array([known.index(word) for word in words], np.int16), times)
+    return pa.DictionaryArray.from_arrays(places, pa.array(known, pa.string()))
+
+
+ParquetColumn: TypeAlias = "np.ndarray | pa.Array[Any] | Callable[[slice], np.ndarray]"
+"""Of every row, or what gives those of some rows when they are written."""
+
+GROUP: Final = 1 << 17
+"""Rows that are laid out and written together."""
+
+
+def parquet_file(
+    t_s: Floats,
+    columns: Mapping[str, ParquetColumn],
+    meta: Mapping[str, object],
+    written: Callable[[], None] = lambda: None,
+) -> bytes:
+    """Columns over time as Parquet with `meta` as JSON under "sagittal"; NaN becomes null.
+
+    Parameters
+    ----------
+    written : called after each group of rows.
+    """
+    kept = {"sagittal": json.dumps(reduce_to_plain(meta))}
+    sink, writer = io.BytesIO(), None
+    for first in range(0, max(1, len(t_s)), GROUP):
+        table = _lay_out(t_s, columns, slice(first, first + GROUP)).replace_schema_metadata(kept)
+        if writer is None:
+            # neighbouring samples share their high bytes: splitting the bytes halves the file
+            split = [f.name for f in table.schema if pa.types.is_floating(f.type)]
+            writer = pq.ParquetWriter(
+                sink, table.schema, compression="zstd", use_dictionary=False, use_byte_stream_split=split
+            )
+        writer.write_table(table)
+        del table
+        written()
+        if first + GROUP < len(t_s):
+            give_memory_back()
+    if writer is not None:
+        writer.close()
+    return sink.getvalue()
+
+
+def single_precision(values: Floats, column: int) -> Callable[[slice], np.ndarray]:
+    """A column of (n, k) as `parquet_file` takes it, float32."""
+    return lambda rows: values[rows, column].astype(np.float32)
+
+
+def _lay_out(t_s: Floats, columns: Mapping[str, ParquetColumn], rows: slice) -> pa.Table:
+    arrays: dict[str, pa.Array[Any]] = {"t_s": pa.array(t_s[rows])}
+    for name, column in columns.items():
+        part = column(rows) if callable(column) else column[rows]
+        arrays[name] = part if isinstance(part, pa.Array) else _as_arrow(part)
+    return pa.table(arrays)
+
+
+def _as_arrow(part: np.ndarray) -> pa.Array[Any]:
+    """A column; NaN is looked for here, since Arrow takes twenty times as long where there is none."""
+    is_whole = part.dtype.kind == "f" and not np.isnan(part).any()
+    column: pa.Array[Any] = pa.array(part, from_pandas=not is_whole)
+    return column
+
+
+def read_table(data: bytes) -> tuple[pa.Table, dict[str, Any]]:
+    """A Parquet file of ours and what `parquet_file` wrote beside its columns."""
+    # a file of ours is small: threads cost more than they read, and `pq.read_table` brings in all of
+    # pyarrow.dataset
+    table = pq.ParquetFile(pa.BufferReader(data)).read(use_threads=False)
+    meta: dict[str, Any] = json.loads((table.schema.metadata or {})[b"sagittal"])
+    return table, meta
+
+
+def floats_of(table: pa.Table, name: str) -> Floats:
+    """A column as float64; null becomes NaN."""
+    column = table.column(name).to_numpy(zero_copy_only=False)
+    return np.asarray(column, dtype=np.float64)
+
+
+def bools_of(table: pa.Table, name: str) -> Bools:
+    """A column of truth values."""
+    return np.asarray(table.column(name).to_numpy(zero_copy_only=False), dtype=np.bool_)
+
+
+def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
+    """UTF-8 comma-separated text with a header; None and non-finite numbers are empty, numbers to 1e-6.
+
+    Text that a spreadsheet would take for a formula gets an apostrophe before it (OWASP, "CSV injection").
+    """
+    text, rest = io.StringIO(), iter(rows)
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    while some := list(islice(rest, LINES)):
+        # column by column: most are numbers, which are rounded together
+        columns = [_cells(column) for column in zip(*some, strict=True)]
+        writer.writerows(zip(*columns, strict=True))
+    return text.getvalue().encode()
+
+
+LINES: Final = 1024
+"""Rows of a table that are written together."""
+
+WORDS: Final = frozenset({str, type(None)})
+
+NUMBERS: Final = frozenset({float, type(None), np.float64})
+
+UNSURE: Final = 1e-3
+"""A number so close to half a millionth, in millionths, is rounded as text: its product is off by 1e-4."""
+
+LARGE: Final = 1e6
+"""From here on all are."""
+
+
+def _cells(column: Sequence[object]) -> list[object]:
+    """What stands in a column; a number as Python's `round` has it."""
+    kinds = set(map(type, column))
+    if kinds <= WORDS:
+        written = {word: _cell(word) for word in set(column)}
+        return [written[word] for word in column]
+    if not kinds <= NUMBERS:
+        return [_cell(value) for value in column]
+    values = np.array(column, np.float64)
+    small = np.abs(values) < LARGE
+    millionths = 1e6 * np.where(small, values, 0.0)
+    whole = np.rint(millionths)
+    cells: list[object] = (whole / 1e6 + 0.0).tolist()
+    for k in np.flatnonzero(~small | (np.abs(np.abs(millionths - whole) - 0.5) < UNSURE)).tolist():
+        value = column[k]
+        cells[k] = "" if value is None else _cell(value)
+    return cells
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return round(value, 6) + 0.0 if math.isfinite(value) else ""
+    if isinstance(value, str) and value.startswith(FORMULA_STARTS):
+        return f"'{value}"
+    return "" if value is None else value
+
+
+def write_json(value: object) -> bytes:
+    """What `json.dumps` writes with an indent of 1, most of it by its compiled part, which knows no indent.
+
+    Raises
+    ------
+    ValueError
+        a number is not finite, or a key no text.
+    """
+    return _write_node(value, "\n").encode()
+
+
+def _write_node(value: object, line: str) -> str:
+    """A value as JSON; `line` ends a line and begins one that stands as far in as the value does."""
+    inner = f"{line} "
+    if not value or not isinstance(value, (dict, list, tuple)):
+        return _encoder(inner).encode(value)
+    parts = value.values() if isinstance(value, dict) else value
+    if PLAIN_NUMBERS.issuperset(map(type, parts)):
+        flat = _encoder(inner).encode(value)
+        return f"{flat[0]}{inner}{flat[1:-1]}{line}{flat[-1]}"
+    if isinstance(value, dict):
+        if not all(isinstance(k, str) for k in value):
+            raise ValueError("A key is no text: JSON knows no other.")
+        nodes = [f"{_encoder(inner).encode(k)}: {_write_node(v, inner)}" for k, v in value.items()]
+        return f"{{{inner}{f',{inner}'.join(nodes)}{line}}}"
+    return f"[{inner}{f',{inner}'.join([_write_node(v, inner) for v in value])}{line}]"
+
+
+PLAIN_NUMBERS: Final = PLAIN | {float}
+
+
+@cache
+def _encoder(line: str) -> json.JSONEncoder:
+    """Writes a list or mapping of plain values, `line` between two of them."""
+    return json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(f",{line}", ": "))

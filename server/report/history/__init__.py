@@ -1,0 +1,1 @@
+"""Figures over the visits of a person: trends, comparisons, the leaflet."""

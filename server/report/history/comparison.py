@@ -1,0 +1,130 @@
+"""Two sessions of a person side by side: every figure before and after, the change and its verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from sagittal.core.change import NOT_MEASURED_ALIKE, Change, parameter_changes, withdraw_verdicts
+from sagittal.core.frames import Side
+from sagittal.core.norms import Norms
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server.report.files.columns import write_csv
+from sagittal.server.report.history.numbers import Numbers
+from sagittal.server.report.history.trends import collect_figures
+from sagittal.server.report.view.level import from_standing
+from sagittal.server.report.view.table import ParameterRow
+from sagittal.server.report.words.change_words import SCORE_TERMS, ChangeWords, change_words, find_term
+from sagittal.server.report.words.wording import format_number, reason_words
+
+STANDING: Final = "from standing"
+"""Of what a change is whose row stands for another zero."""
+
+Group = tuple[str, tuple[ParameterRow, ...]]
+
+NormsOfTwo = tuple[Norms, Norms]
+"""References of the earlier and of the later session."""
+
+
+@dataclass(frozen=True)
+class ComparedRow:
+    """A figure of one side, or of the whole take.
+
+    Parameters
+    ----------
+    before, after : as printed, "–" where not measured. reason : why there is no number after, else None.
+    """
+
+    title: str
+    unit: str
+    group: str
+    side: Side | None
+    before: str
+    after: str
+    words: ChangeWords
+    reason: str | None
+    change: Change
+
+
+def compare_figures(
+    before: Numbers, after: Numbers, norms: NormsOfTwo | None = None, affected: Side | None = None
+) -> tuple[Change, ...]:
+    """What changed of every figure that either session has, in the order of the table.
+
+    Parameters
+    ----------
+    norms : of the earlier and of the later session, each at its own speed; without them changes have no
+        direction.
+    """
+    known = None if norms is None else (norms[0].values, norms[1].values)
+    there = {(p.name, p.side) for n in (before, after) for p in collect_figures(n) if p.mean is not None}
+    order = {name: i for i, name in enumerate((*CATALOGUE, *SCORE_TERMS))}
+    found = [
+        c
+        for c in parameter_changes(collect_figures(before), collect_figures(after), affected, known)
+        if (c.name, c.side) in there
+    ]
+    return tuple(sorted(found, key=lambda c: order.get(c.name, len(order))))
+
+
+def compare_rows(
+    before: Numbers,
+    after: Numbers,
+    norms: NormsOfTwo | None = None,
+    affected: Side | None = None,
+    *,
+    comparable: bool = True,
+) -> tuple[ComparedRow, ...]:
+    """The table of a comparison; without verdicts where the two were not walked alike."""
+    reasons = {(p.name, p.side): p.reason for p in collect_figures(after)}
+    rows = []
+    for found in compare_figures(before, after, norms, affected):
+        c = found if comparable else withdraw_verdicts(found)
+        term = find_term(c.name, c.unit)
+        old, new = (
+            "–" if value is None else format_number(value, term.digits) for value in (c.before, c.after)
+        )
+        reason = reason_words(reasons.get((c.name, c.side))) if c.after is None else None
+        rows.append(
+            ComparedRow(term.label, term.unit, term.group, c.side, old, new, change_words(c), reason, c)
+        )
+    return tuple(rows)
+
+
+def add_changes(groups: Sequence[Group], found: Sequence[Change]) -> tuple[Group, ...]:
+    """Rows of a session's table with their change since an earlier one, where both have a number.
+
+    Of a number that is not measured alike it says so. A level from the anatomical zero shows the change of
+    the same one from standing, which every visit has.
+    """
+    words: dict[str, list[ChangeWords]] = {}
+    for c in found:
+        if c.difference is not None or c.reason == NOT_MEASURED_ALIKE:
+            words.setdefault(c.name, []).append(change_words(c))
+
+    def of(row: ParameterRow) -> tuple[ChangeWords, ...]:
+        measured = from_standing(row.name)
+        if measured is None:
+            return tuple(words.get(row.name, ()))
+        there = {side for side, cell in (("left", row.left), ("right", row.right)) if cell is not None}
+        return tuple(replace(w, about=STANDING) for w in words.get(measured, ()) if w.side in {None, *there})
+
+    return tuple((name, tuple(replace(row, change=of(row)) for row in rows)) for name, rows in groups)
+
+
+def comparison_csv(rows: Sequence[ComparedRow]) -> bytes:
+    """One row per figure and side, numbers in full."""
+    header = (
+        *("name", "side", "unit", "before", "after", "change", "verdict", "towards_norm"),
+        *("mdc", "mdc_source", "mcid", "mcid_source", "reason"),
+    )
+
+    def cells() -> Iterator[Sequence[object]]:
+        for c in (r.change for r in rows):
+            yield (
+                *(c.name, c.side or "", c.unit, c.before, c.after, c.difference, c.verdict, c.towards_norm),
+                *(c.limit, c.limit_source, c.mcid, c.mcid_source, c.reason),
+            )
+
+    return write_csv(header, cells())

@@ -1,0 +1,118 @@
+"""What the patient takes home: two or three figures in plain words, beside those of the last time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from sagittal.core.change import NOT_MEASURED_ALIKE, Change
+from sagittal.core.frames import Side
+from sagittal.core.parameters.catalogue import require_entries
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.words.wording import format_number
+
+
+@dataclass(frozen=True)
+class PlainFigure:
+    """How a figure is told to somebody who is not of the field.
+
+    Parameters
+    ----------
+    title : with {side} where it is of a leg. unit, factor, digits : the value in everyday units.
+    up, down : how a real change is called.
+    """
+
+    name: str
+    title: str
+    unit: str
+    factor: float
+    digits: int
+    up: str
+    down: str
+
+
+FIGURES: Final = (
+    PlainFigure("gait_speed_mps", "How fast you walk", "metres in ten seconds", 10.0, 1, "faster", "slower"),
+    PlainFigure(
+        "step_length_m", "How long your {side} step is", "centimetres", 100.0, 0, "longer", "shorter"
+    ),
+    PlainFigure(
+        "knee_flexion_rom_deg",
+        "How far your {side} knee moves",
+        "degrees",
+        1.0,
+        0,
+        "further",
+        "less far",
+    ),
+)
+"""Speed, step and knee: what people who train their walk ask about."""
+
+require_entries((f.name for f in FIGURES), "sagittal.server.report.history.leaflet")
+
+REAL: Final = ("real_change", "clinically_relevant")
+
+
+@dataclass(frozen=True)
+class LeafletFigure:
+    """A figure as the leaflet shows it.
+
+    Parameters
+    ----------
+    now, before : value with its unit; before None = no number that is compared. words : what became of it.
+    estimated : a model of the leg gives it, and no two sensors measure it.
+    """
+
+    title: str
+    now: str
+    before: str | None
+    words: str
+    estimated: bool
+
+
+def list_figures(
+    parameters: Sequence[Parameter], changes: Sequence[Change], affected: Side | None
+) -> tuple[LeafletFigure, ...]:
+    """The figures that were measured; of a leg that of the affected side, else of the smaller value.
+
+    Parameters
+    ----------
+    changes : since the last time, empty without one that can be compared.
+    """
+    found = []
+    for figure in FIGURES:
+        mine = {p.side: (p.mean, p) for p in parameters if p.name == figure.name and p.mean is not None}
+        if not mine:
+            continue
+        side = affected if affected in mine else min(mine, key=lambda s: mine[s][0])
+        value, told = mine[side]
+        change = next((c for c in changes if (c.name, c.side) == (figure.name, side)), None)
+        before = None if change is None or change.difference is None else change.before
+        found.append(
+            LeafletFigure(
+                figure.title.format(side=side),
+                _say(figure, value),
+                None if before is None else _say(figure, before),
+                _judge(figure, change),
+                told.estimated,
+            )
+        )
+    return tuple(found)
+
+
+def _say(figure: PlainFigure, value: float) -> str:
+    return f"{format_number(figure.factor * value, figure.digits)} {figure.unit}"
+
+
+def _judge(figure: PlainFigure, change: Change | None) -> str:
+    """A change is only named where it is larger than the measurement error."""
+    if change is not None and change.reason == NOT_MEASURED_ALIKE:
+        return "It was measured in another way last time, so the two numbers are not compared."
+    if change is None or change.difference is None:
+        return "There is no earlier number to compare with."
+    if change.verdict in REAL:
+        return f"This is {figure.up if change.difference > 0 else figure.down} than last time."
+    if change.verdict is None:
+        return "Nobody can say yet whether this is a change."
+    return "This is about the same as last time."

@@ -1,0 +1,254 @@
+"""Figures over the visits of a person: what changed since the first assessment, and by how much it must.
+
+All of them are walked under one condition. The first assessment is the base: its measurement error is the
+band that a later value must leave to be a real change (docs/norms.md, "Change"). Trainings are shown and
+never the base; with feedback they are not compared with it either.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from sagittal.core.change import Change, find_detectable_change, find_relevant_change, parameter_changes
+from sagittal.core.change.limits import Limb
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.norms import Norms, NormValue
+from sagittal.core.parameters.catalogue import CATALOGUE, require_entries
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.subject.condition import WalkingCondition
+from sagittal.server.report.history.numbers import Numbers
+from sagittal.server.report.words.change_words import SCORE_TERMS, find_term
+from sagittal.server.report.words.wording import Term
+
+VisitKind = Literal["assessment", "training"]
+
+PRIMARY: Final = (
+    "gait_speed_mps",
+    "cadence_spm",
+    "step_length_m",
+    "knee_flexion_rom_deg",
+    "stance_pct",
+    "gps_sagittal_deg",
+)
+"""Figures shown when the reader has chosen none; without any of them the first that are there."""
+
+require_entries((name for name in PRIMARY if name not in SCORE_TERMS), "server.report.history.trends")
+
+SCORE_MODE: Final = "offset_removed"
+"""Shape without level: angles start from the standing of that day."""
+
+
+@dataclass(frozen=True, eq=False)
+class AnalysedVisit:
+    """An analysed session.
+
+    Parameters
+    ----------
+    label : of the planned visit, "PRE" or "T4"; None outside a programme.
+    kind : an unplanned session counts as an assessment, one with feedback as a training.
+    condition : how it was walked. numbers : what was measured.
+    """
+
+    session_id: str
+    performed_on: dt.date
+    title: str
+    label: str | None
+    kind: VisitKind
+    condition: WalkingCondition
+    numbers: Numbers
+
+    @property
+    def feedback(self) -> bool:
+        """It was walked with feedback."""
+        return self.condition.feedback
+
+
+@dataclass(frozen=True)
+class TrendValue:
+    """A value at a visit; `change` = against the base, None for the base itself and with feedback.
+
+    `estimated` : a model of the leg gives it; it is on no line with values that sensors measured.
+    """
+
+    visit: int
+    value: float
+    sd: float | None
+    n: int
+    ci_low: float | None
+    ci_high: float | None
+    change: Change | None
+    estimated: bool = False
+
+
+@dataclass(frozen=True)
+class TrendSeries:
+    """One side of a figure, or the whole take.
+
+    Parameters
+    ----------
+    points : visits with a value, oldest first. base : index of the first assessment among them, of the first
+        that was measured if any was; None = none.
+    latest : index of the last assessment after it, else None: nothing to judge yet.
+    mdc, mcid : around the base; None without a source.
+    """
+
+    side: Side | None
+    points: tuple[TrendValue, ...]
+    base: int | None
+    latest: int | None
+    mdc: float | None
+    mcid: float | None
+
+    @property
+    def start(self) -> float:
+        """Value that the limits lie around: of the base; without one there are no limits."""
+        return self.points[self.base or 0].value
+
+    @property
+    def change(self) -> Change | None:
+        """From the first to the last assessment."""
+        return None if self.latest is None else self.points[self.latest].change
+
+
+@dataclass(frozen=True, eq=False)
+class Trend:
+    """A figure over the visits; `norm` = of people like this one, None where nobody compares."""
+
+    name: str
+    term: Term
+    lines: tuple[TrendSeries, ...]
+    norm: NormValue | None
+
+
+def names_in(visits: Sequence[AnalysedVisit]) -> tuple[str, ...]:
+    """Figures with a value in any visit, in the order of the table."""
+    found = {p.name for visit in visits for p in collect_figures(visit.numbers) if p.mean is not None}
+    known = (*CATALOGUE, *SCORE_TERMS)
+    return (*(n for n in known if n in found), *sorted(found.difference(known)))
+
+
+def follow_figures(
+    visits: Sequence[AnalysedVisit],
+    names: Sequence[str],
+    norms: Sequence[Norms] = (),
+    usual: Mapping[str, NormValue] | None = None,
+    affected: Side | None = None,
+) -> tuple[Trend, ...]:
+    """Follow figures over visits of one condition, oldest first; those without a value are left out.
+
+    Parameters
+    ----------
+    norms : of this person, one of every visit at its speed; empty = none. A trend shows that of the last
+        visit without feedback.
+    usual : of people of this age and sex at their own comfortable speed; the reference of speed itself,
+        which cannot be matched by speed.
+    affected : side, None = none or both.
+    """
+    tables = [{(p.name, p.side): p for p in collect_figures(visit.numbers)} for visit in visits]
+    found = []
+    last = next((i for i in reversed(range(len(visits))) if not visits[i].feedback), len(visits) - 1)
+    for name in names:
+        norm = _norm(name, visits, norms[last] if norms else None, usual or {})
+        lines = [_line(name, side, visits, tables, norms, affected) for side in (None, *SIDES)]
+        kept = tuple(line for line in lines if line is not None)
+        if kept:
+            found.append(Trend(name, find_term(name, _unit(name, tables)), kept, norm))
+    return tuple(found)
+
+
+def collect_figures(numbers: Numbers) -> tuple[Parameter, ...]:
+    """Parameters, and the scores of the two legs as if they were."""
+    made = [
+        Parameter(s.name, s.side, s.n, s.value, None, s.unit, s.reason)
+        for s in numbers.scores
+        if s.name in SCORE_TERMS and s.mode == SCORE_MODE and s.side is not None
+    ]
+    return (*numbers.parameters, *made)
+
+
+Table = Mapping[tuple[str, Side | None], Parameter]
+
+
+def _unit(name: str, tables: Sequence[Table]) -> str:
+    return next(p.unit for table in tables for p in table.values() if p.name == name)
+
+
+def _norm(
+    name: str, visits: Sequence[AnalysedVisit], norms: Norms | None, usual: Mapping[str, NormValue]
+) -> NormValue | None:
+    if name in SCORE_TERMS:
+        return _score_norm(name, visits)
+    norm = None if norms is None else norms.values.get(name)
+    if norm is None and name == "gait_speed_mps":
+        norm = usual.get(name)
+    return norm if norm is not None and norm.comparable else None
+
+
+def _score_norm(name: str, visits: Sequence[AnalysedVisit]) -> NormValue | None:
+    spread = next(
+        (
+            s.healthy
+            for visit in visits
+            for s in visit.numbers.scores
+            if (s.name, s.mode) == ("gps_sagittal_deg", SCORE_MODE) and s.side is not None and s.healthy
+        ),
+        None,
+    )
+    if spread is None:
+        return None
+    # GDI* is 100 ± 10 among the reference people by its definition
+    mean, sd = (spread.mean_deg, spread.sd_deg) if name == "gps_sagittal_deg" else (100.0, 10.0)
+    return NormValue(name, mean, sd, None, "healthy adults", "Fukuchi et al. 2018, leave one out")
+
+
+def _line(
+    name: str,
+    side: Side | None,
+    visits: Sequence[AnalysedVisit],
+    tables: Sequence[Table],
+    norms: Sequence[Norms],
+    affected: Side | None,
+) -> TrendSeries | None:
+    measured = [
+        (i, p, p.mean)
+        for i, table in enumerate(tables)
+        if (p := table.get((name, side))) is not None and p.mean is not None
+    ]
+    if not measured:
+        return None
+    assessed = [k for k, (i, _, _) in enumerate(measured) if visits[i].kind == "assessment"]
+    base = next((k for k in assessed if not measured[k][1].estimated), assessed[0] if assessed else None)
+    first = None if base is None else measured[base][1]
+
+    def change(k: int) -> Change | None:
+        i, p, _ = measured[k]
+        if first is None or k == base or visits[i].feedback:
+            return None
+        at = (norms[measured[base or 0][0]].values, norms[i].values) if norms else None
+        return parameter_changes([first], [p], affected, at)[0]
+
+    points = [
+        TrendValue(i, value, p.sd, p.n, p.ci_low, p.ci_high, change(k), p.estimated)
+        for k, (i, p, value) in enumerate(measured)
+    ]
+    latest = assessed[-1] if base is not None and assessed[-1] > base else None
+    mdc, mcid = (None, None) if first is None else _limits(first, points, latest, affected)
+    return TrendSeries(side, tuple(points), base, latest, mdc, mcid)
+
+
+def _limits(
+    first: Parameter, points: Sequence[TrendValue], latest: int | None, affected: Side | None
+) -> tuple[float | None, float | None]:
+    """What the last assessment is judged by; before there is one, what it will be."""
+    change = None if latest is None else points[latest].change
+    if change is not None and change.difference is not None:
+        return change.limit, change.mcid
+    limb: Limb | None = None
+    if affected is not None and first.side is not None:
+        limb = "affected" if first.side == affected else "unaffected"
+    mdc = None if first.mean is None else find_detectable_change(first.name, first.mean, limb)
+    mcid = find_relevant_change(first.name, limb)
+    return None if mdc is None else mdc.value, None if mcid is None else mcid.value

@@ -1,0 +1,1 @@
+"""An analysis as one page shows it: tables, checks, headline, quality."""

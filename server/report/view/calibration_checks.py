@@ -1,0 +1,156 @@
+"""The score of a calibration as its page shows it: the whole in one sentence, then every sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from sagittal.core.errors import Notice
+from sagittal.core.frames import SEGMENTS
+from sagittal.core.plurals import plural
+from sagittal.server.report.view.quality_box import CALIBRATION_METHODS
+from sagittal.server.report.words.wording import format_number, place_words, speak_places
+
+VERDICT_WORDS: Final[Mapping[str, tuple[str, str]]] = {
+    "pass": ("ok", "pass"),
+    "redo": ("bad", "redo"),
+    "not_judged": ("none", "not judged"),
+}
+"""Verdict → its shape and its word."""
+
+WHOLE: Final = "take"
+"""Stands for the checks that no single sensor has."""
+
+
+@dataclass(frozen=True)
+class CheckRow:
+    """One check: its value and limit as text, a shape and a word for the verdict, why, and what to do."""
+
+    title: str
+    value: str
+    limit: str
+    kind: str
+    word: str
+    why: str
+    todo: str
+
+
+@dataclass(frozen=True)
+class CheckedSegment:
+    """One sensor, or the whole take.
+
+    Parameters
+    ----------
+    id : segment, or `WHOLE`. method : how its forward axis was found, empty where it was not.
+    sigma : uncertainty of that axis as text; empty where the calibration does not say it. told : warnings of
+        the analysis about this sensor, such as that it slipped after the calibration.
+    """
+
+    id: str
+    title: str
+    kind: str
+    word: str
+    method: str
+    sigma: str
+    rows: tuple[CheckRow, ...]
+    told: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class CalibrationChecks:
+    """What the page shows: `kind` and `headline` of the whole, sensors from the trunk down."""
+
+    kind: str
+    headline: str
+    segments: tuple[CheckedSegment, ...]
+
+    @property
+    def of_segment(self) -> Mapping[str, CheckedSegment]:
+        """Segment → its checks, for the picture."""
+        return {s.id: s for s in self.segments}
+
+
+def view_calibration_checks(
+    score: Mapping[str, Any] | None, calibration: Mapping[str, Any] | None, warnings: Sequence[Notice]
+) -> CalibrationChecks | None:
+    """View of `calibration_score`, `calibration` and notices of analysis.json; None without a score."""
+    if score is None:
+        return None
+    told: dict[str | None, list[str]] = {}
+    for notice in warnings:
+        if notice.severity != "info":
+            told.setdefault(notice.sensor, []).append(speak_places(notice.message))
+    checks: Sequence[Mapping[str, Any]] = score["checks"]
+    worn = [s for s in SEGMENTS if s in score["segments"]]
+    mounted = {} if calibration is None else calibration["segments"]
+    whole = [c for c in checks if c["segment"] is None]
+    segments = [_view_segment(s, score["segments"][s], checks, mounted.get(s, {})) for s in worn]
+    segments = [replace(s, told=tuple(told.get(s.id, ()))) for s in segments]
+    if whole:
+        kinds = {c["verdict"] for c in whole}
+        verdict = next((v for v in ("redo", "pass") if v in kinds), "not_judged")
+        kind, word = VERDICT_WORDS[verdict]
+        rows = tuple(_view_check(c) for c in whole)
+        segments.insert(0, CheckedSegment(WHOLE, "Whole take", kind, word, "", "", rows))
+    return CalibrationChecks(
+        VERDICT_WORDS[score["verdict"]][0], say_verdict(score["verdict"], checks), tuple(segments)
+    )
+
+
+def say_verdict(verdict: str, checks: Sequence[Mapping[str, Any]]) -> str:
+    """The overall verdict in one sentence."""
+    judged = [c for c in checks if c["verdict"] != "not_judged"]
+    if verdict == "pass":
+        return plural(
+            len(judged),
+            "The calibration passes the one check that could be judged.",
+            f"The calibration passes all {len(judged)} checks that could be judged.",
+        )
+    if verdict == "not_judged":
+        return "This take allows no check of its calibration."
+    failed = [c for c in checks if c["verdict"] == "redo"]
+    places = list(dict.fromkeys(place_words(c["segment"]) if c["segment"] else "walk" for c in failed))
+    shown = places if len(places) <= 3 else [*places[:2], f"{len(places) - 2} more"]
+    listed = " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))
+    which = plural(len(failed), "checks fails", "checks fail")
+    return f"Calibrate again: {len(failed)} of {len(judged)} {which}, at the {listed}."
+
+
+def _view_segment(
+    segment: str, verdict: str, checks: Sequence[Mapping[str, Any]], mounted: Mapping[str, Any]
+) -> CheckedSegment:
+    kind, word = VERDICT_WORDS[verdict]
+    method = str(mounted.get("method", ""))
+    sigma = mounted.get("forward_sd_deg")
+    return CheckedSegment(
+        id=segment,
+        title=place_words(segment).capitalize(),
+        kind=kind,
+        word=word,
+        method=CALIBRATION_METHODS.get(method, method.replace("_", " ")),
+        sigma=f"± {format_number(sigma, 1)}°" if isinstance(sigma, int | float) else "",
+        rows=tuple(_view_check(c) for c in checks if c["segment"] == segment),
+    )
+
+
+def _view_check(check: Mapping[str, Any]) -> CheckRow:
+    kind, word = VERDICT_WORDS[check["verdict"]]
+    limit = check["limit"]
+    bound = {"least": "at least", "most": "at most"}[check["limit_is"]]
+    return CheckRow(
+        title=check["title"],
+        value="–" if check["value"] is None else _write(check["value"], check["unit"]),
+        limit="" if limit is None else f"{bound} {_write(limit, check['unit'])}",
+        kind=kind,
+        word=word,
+        why=check["why"],
+        todo=check["todo"],
+    )
+
+
+def _write(value: float, unit: str) -> str:
+    """A value with its unit: degrees and percent to a tenth, shares to a hundredth, counts as they are."""
+    if unit:
+        return f"{format_number(value, 1)}{'' if unit == '°' else chr(0x202F)}{unit}"
+    return format_number(value, 0 if value == round(value) and value > 1 else 2)

@@ -1,0 +1,248 @@
+"""Drawings of daily life: the ribbon of a day, trunk inclination below it, walking bouts, steps.
+
+A kind is told by its colour and by the height of its bar; what is not known is hatched or dotted. The rules
+are those of all charts (server/report/charts/svg.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from sagittal.core.activity.result import KINDS, ActivityKind, ActivityResult
+from sagittal.core.frames import Floats
+from sagittal.server.report.charts.svg import PlotArea, find_round_ticks, format_coordinate, make_label
+from sagittal.server.report.view.daily_life import (
+    COURSE_S,
+    DASH,
+    DAY_S,
+    KIND_LABELS,
+    TOTALS,
+    BoutBin,
+    DayTotals,
+    format_hours,
+    inclination_course,
+)
+from sagittal.server.report.words.wording import format_number
+
+RIBBON_PX: Final = 52
+"""Height of a day's ribbon."""
+
+SLOT_S: Final = 30
+"""A ribbon shows what fills most of every half minute; at 1000 px a pixel is almost three of them."""
+
+SLOTS: Final = int(DAY_S) // SLOT_S
+
+LEVELS: Final[dict[ActivityKind, float]] = {
+    "lying": 0.25,
+    "sitting": 0.5,
+    "standing": 0.75,
+    "walking": 1.0,
+    "stairs_up": 1.0,
+    "stairs_down": 1.0,
+    "unknown": 0.5,
+    "non_wear": 0.5,
+    "gap": 0.5,
+}
+"""Height of the bar of each kind, share of the ribbon."""
+
+CSS: Final[dict[ActivityKind, str]] = {
+    "lying": "ak-lie",
+    "sitting": "ak-sit",
+    "standing": "ak-stand",
+    "walking": "ak-walk",
+    "stairs_up": "ak-walk",
+    "stairs_down": "ak-walk",
+}
+"""Class of what is filled with a colour."""
+
+PATTERNS: Final[dict[ActivityKind, str]] = {
+    "stairs_up": "ap-up",
+    "stairs_down": "ap-down",
+    "unknown": "ap-unknown",
+    "non_wear": "ap-off",
+    "gap": "ap-gap",
+}
+"""Pattern over the bar; the page has each once (web/templates/_daily_patterns.html)."""
+
+HOURS: Final = (0, 3, 6, 9, 12, 15, 18, 21, 24)
+LEAN_RANGE: Final = (-90.0, 90.0)
+
+
+def ribbon_svg(found: ActivityResult, day: DayTotals) -> str:
+    """Draw 24 hours of what the person did."""
+    plot = PlotArea((0.0, 1.0), RIBBON_PX)
+    for hour in range(25):
+        plot.add_upright("ax" if hour % 6 == 0 else "g", 1000 * hour / 24)
+    for kind, pieces in _find_pieces(found, day).items():
+        if kind in CSS:
+            plot.add(
+                f'<path class="{CSS[kind]}" d="{"".join(_box(a, b, LEVELS[kind]) for a, b in pieces)}"/>'
+            )
+        if kind in PATTERNS:
+            plot.add_fixed("".join(_patterned(kind, a, b) for a, b in pieces))
+    _add_hours(plot, found)
+    told = ", ".join(f"{c.lower()} {day.times[c]}" for c in TOTALS if day.times[c] != "0:00")
+    return plot.draw("chart ribbon", f"{day.label}, hours and minutes: {told}")
+
+
+def kind_swatch(kind: ActivityKind) -> str:
+    """Draw the sign of a kind for the legend."""
+    width, height = 26, 14
+    top = format_coordinate(height * (1.0 - LEVELS[kind]))
+    box = f'x="0" y="{top}" width="{width}" height="{format_coordinate(height * LEVELS[kind])}"'
+    filled = f'<rect class="{CSS[kind]}" {box}/>' if kind in CSS else ""
+    over = f'<rect fill="url(#{PATTERNS[kind]})" {box}/>' if kind in PATTERNS else ""
+    return (
+        f'<svg class="chart swatch" width="{width}" height="{height}" aria-hidden="true">'
+        f'{filled}{over}<line class="ax" x1="0" x2="{width}" y1="{height}" y2="{height}"/></svg>'
+    )
+
+
+def inclination_svg(found: ActivityResult, day: DayTotals) -> str:
+    """Draw the inclination of the trunk over 24 hours: median and the middle 80 % of every ten minutes."""
+    plot = PlotArea(LEAN_RANGE, RIBBON_PX)
+    for hour in range(0, 25, 6):
+        plot.add_upright("ax", 1000 * hour / 24)
+    for tick in (-90.0, 0.0, 90.0):
+        plot.add_tick("z" if tick == 0.0 else "g", tick, f"{format_number(tick, 0)}°")
+    t_s, course = inclination_course(found, day.start_s, day.end_s)
+    x = 1000 * (t_s - day.midnight_s) / DAY_S
+    wide = 1000 * COURSE_S / DAY_S
+    for run in _known_runs(course[:, 1]):
+        ends = (*x[run].tolist(), float(x[run][-1]) + wide)
+        plot.add(f'<path class="lean-range" d="{_outline(plot, ends, course[run])}"/>')
+        middle = "".join(
+            f"{'L' if k else 'M'}{_point(a, plot.y(v))}L{_point(b, plot.y(v))}"
+            for k, (a, b, v) in enumerate(zip(ends[:-1], ends[1:], course[run, 1].tolist(), strict=True))
+        )
+        plot.add(f'<path class="mb" d="{middle}"/>')
+    _add_hours(plot, found)
+    known = course[np.isfinite(course[:, 1]), 1]
+    told = (
+        f"medians of ten minutes from {known.min():.0f} to {known.max():.0f} degrees"
+        if len(known)
+        else "not known"
+    )
+    return plot.draw("chart ribbon", f"Trunk inclination on {day.label}: {told}")
+
+
+def bouts_svg(bins: Sequence[BoutBin]) -> str:
+    """Draw the number of walking bouts by their length."""
+    bars = [(b.label, float(b.bouts), True) for b in bins]
+    return bars_svg(bars, "Walking bouts by length; the table has the numbers", height=150)
+
+
+def steps_svg(found: ActivityResult, days: Sequence[DayTotals]) -> str:
+    """Draw steps of every day; of a single day steps of every hour."""
+    if len(found.days) > 1:
+        bars = [
+            (d.label, float(own.steps) if own.worn_h > 0.0 else None, d.counted)
+            for d, own in zip(days, found.days, strict=True)
+        ]
+        return bars_svg(bars, "Steps per day; the table has the numbers", height=150)
+    counts = np.zeros(24)
+    for h in found.hours:
+        counts[int((h.start_s - days[0].midnight_s) // 3600) % 24] += h.steps
+    hours = [(str(i) if i % 3 == 0 else "", float(n), True) for i, n in enumerate(counts.tolist())]
+    return bars_svg(hours, "Steps per hour; the table has the numbers", height=150, values=False)
+
+
+def bars_svg(
+    bars: Sequence[tuple[str, float | None, bool]], title: str, height: int, *, values: bool = True
+) -> str:
+    """Draw bars with their numbers above them.
+
+    Parameters
+    ----------
+    bars : label, height (None = not known, a dash), and whether it is full: one that is not is dashed.
+    values : write the numbers.
+    """
+    top = max((value for _, value, _ in bars if value is not None), default=0.0) or 1.0
+    plot = PlotArea((0.0, 1.12 * top), height)
+    ticks, digits = find_round_ticks(0.0, top)
+    for tick in ticks:
+        plot.add_tick("z" if tick == 0.0 else "g", tick, format_number(tick, digits))
+    wide = 1000 / max(len(bars), 1)
+    for i, (label, value, full) in enumerate(bars):
+        middle = (i + 0.5) * wide
+        if value:
+            plot.add_band("bar" if full else "bar part", 0.0, value, middle - 0.35 * wide, 0.7 * wide)
+        at = f"{format_coordinate(middle / 10)}%"
+        plot.add_text(at, height, label, "", "middle", dy=16)
+        if values:
+            text = DASH if value is None else format_number(value, 0)
+            plot.add_text(at, plot.px(value or 0.0), text, "strong", "middle", dy=-5)
+    return plot.draw("chart bars", title)
+
+
+def _find_pieces(found: ActivityResult, day: DayTotals) -> dict[ActivityKind, list[tuple[int, int]]]:
+    """Runs of half minutes [first, last) of every kind; outside the recording there are none."""
+    share = np.zeros((len(KINDS), SLOTS))
+    for s in found.spans:
+        a = (max(s.start_s, day.start_s) - day.midnight_s) / SLOT_S
+        b = (min(s.end_s, day.end_s) - day.midnight_s) / SLOT_S
+        if b <= a:
+            continue
+        row, first, last = share[KINDS.index(s.kind)], int(a), min(int(b), SLOTS - 1)
+        if first >= last:
+            row[last] += b - a
+            continue
+        row[first] += first + 1 - a
+        row[first + 1 : last] += 1.0
+        row[last] += b - last
+    kinds = np.where(share.sum(axis=0) > 0.0, share.argmax(axis=0), -1)
+    edges = [0, *(np.flatnonzero(np.diff(kinds)) + 1).tolist(), SLOTS]
+    pieces: dict[ActivityKind, list[tuple[int, int]]] = {}
+    for a, b in pairwise(edges):
+        if kinds[a] >= 0:
+            pieces.setdefault(KINDS[kinds[a]], []).append((a, b))
+    return pieces
+
+
+def _box(first: int, last: int, level: float) -> str:
+    """A bar of a path, 0 to 1000 both ways."""
+    x, wide = 1000 * first / SLOTS, 1000 * (last - first) / SLOTS
+    return f"M{x:.2f} 1000V{format_coordinate(1000 * (1 - level))}h{wide:.2f}V1000z"
+
+
+def _patterned(kind: ActivityKind, first: int, last: int) -> str:
+    """A bar whose pattern must not stretch."""
+    height = RIBBON_PX * LEVELS[kind]
+    return (
+        f'<rect fill="url(#{PATTERNS[kind]})" x="{100 * first / SLOTS:.3f}%" '
+        f'width="{100 * (last - first) / SLOTS:.3f}%" y="{format_coordinate(RIBBON_PX - height)}" '
+        f'height="{format_coordinate(height)}"><title>{escape(KIND_LABELS[kind])}, '
+        f"{format_hours((last - first) * SLOT_S / 60)} h</title></rect>"
+    )
+
+
+def _add_hours(plot: PlotArea, found: ActivityResult) -> None:
+    unit = ":00" if found.started_at is not None else "\u202fh"
+    for hour in HOURS:
+        anchor = "start" if hour == 0 else "end" if hour == 24 else "middle"
+        at = f"{format_coordinate(100 * hour / 24)}%"
+        plot.add_fixed(make_label(at, plot.height, f"{hour}{unit}", "", anchor, dy=14))
+
+
+def _known_runs(values: Floats) -> list[slice]:
+    """Stretches without NaN."""
+    known = np.concatenate(([False], np.isfinite(values), [False]))
+    starts = np.flatnonzero(~known[:-1] & known[1:]).tolist()
+    ends = np.flatnonzero(known[:-1] & ~known[1:]).tolist()
+    return [slice(a, b) for a, b in zip(starts, ends, strict=True)]
+
+
+def _outline(plot: PlotArea, ends: Sequence[float], course: Floats) -> str:
+    """Steps along the upper values and back along the lower ones."""
+    up = [(x, plot.y(v)) for i, v in enumerate(course[:, 2].tolist()) for x in (ends[i], ends[i + 1])]
+    low = [(x, plot.y(v)) for i, v in enumerate(course[:, 0].tolist()) for x in (ends[i], ends[i + 1])]
+    return "M" + "L".join(_point(x, y) for x, y in (*up, *reversed(low))) + "z"
+
+
+def _point(x: float, y: float) -> str:
+    return f"{x:.2f} {format_coordinate(y)}"

@@ -1,0 +1,440 @@
+"""A recording of daily life in words: days, hours, transitions, walking bouts and trunk inclination.
+
+What the monitor found is core/activity/result.py; the drawings are server/report/view/daily_charts.py.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Final
+
+import numpy as np
+
+from sagittal.core.activity.parameters import WORN_H
+from sagittal.core.activity.result import (
+    KINDS,
+    TRANSITIONS,
+    ActivityBout,
+    ActivityDay,
+    ActivityKind,
+    ActivityResult,
+    PosturalTransition,
+    TransitionCandidate,
+    TransitionKind,
+    TransitionRefusal,
+)
+from sagittal.core.frames import Floats
+from sagittal.core.plurals import plural
+from sagittal.server.report.words.wording import format_number
+
+DAY_S: Final = 86400.0
+HOUR_S: Final = 3600.0
+
+DASH: Final = "–"
+
+KIND_LABELS: Final[Mapping[ActivityKind, str]] = {
+    "lying": "Lying",
+    "sitting": "Sitting",
+    "standing": "Standing",
+    "walking": "Walking",
+    "stairs_up": "Stairs up",
+    "stairs_down": "Stairs down",
+    "unknown": "Unknown",
+    "non_wear": "Not worn",
+    "gap": "Not recorded",
+}
+
+KIND_WORDS: Final[Mapping[ActivityKind, str]] = {
+    "lying": "the trunk is more than 70° from upright and holds still",
+    "sitting": "after a stand-to-sit or before a sit-to-stand, no steps",
+    "standing": "after a sit-to-stand, before a stand-to-sit, or between walks, no steps",
+    "walking": "steps in a row, on the level",
+    "stairs_up": "experimental: walking with the trunk leaning forward and rocking",
+    "stairs_down": "experimental: walking with the trunk rocking strongly; most are missed",
+    "unknown": "worn, but the signals contradict each other or say nothing",
+    "non_wear": "no movement for half an hour or longer, not even breathing",
+    "gap": "the device stored no samples",
+}
+"""How each kind is told, in the words of its definition (docs/science/activity.md)."""
+
+WALKED: Final[tuple[ActivityKind, ...]] = ("walking", "stairs_up", "stairs_down")
+
+TOTALS: Final[Mapping[str, tuple[ActivityKind, ...]]] = {
+    "Lying": ("lying",),
+    "Sitting": ("sitting",),
+    "Standing": ("standing",),
+    "Walking": WALKED,
+    "Unknown": ("unknown",),
+    "Not worn": ("non_wear",),
+    "Not recorded": ("gap",),
+}
+"""Columns of the totals → what they add up."""
+
+TRANSITION_LABELS: Final[Mapping[TransitionKind, str]] = {
+    "sit_to_stand": "Sit to stand",
+    "stand_to_sit": "Stand to sit",
+    "sit_to_lie": "Sit to lie",
+    "lie_to_sit": "Lie to sit",
+}
+
+REFUSALS: Final[Mapping[TransitionRefusal, str]] = {
+    "lean_below_limit": "below the limit: the trunk leaned less than 20°",
+    "chest_did_not_rise": "a bow: the chest did not rise or fall enough",
+    "direction_unclear": "up or down is not clear",
+    "near_lying": "belongs to lying down or getting up",
+    "while_walking": "amid walking",
+}
+
+BIN_EDGES_S: Final = (10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+"""Ends of the bins of walking bouts, s; the last bin is open."""
+
+EVENTS_SHOWN: Final = 300
+"""Rows of the list of transitions on the page; the file holds all."""
+
+COURSE_S: Final = 600
+"""The course of inclination is drawn in windows of this length, s."""
+
+
+@dataclass(frozen=True)
+class DayTotals:
+    """One day in words.
+
+    Parameters
+    ----------
+    label : date, or "Day 2" without a clock. part : which part of it was recorded, empty for the whole day.
+    midnight_s : where its ribbon begins, from the first sample. times : column of TOTALS → h:min.
+    counted : worn long enough for the means.
+    """
+
+    label: str
+    part: str
+    midnight_s: float
+    start_s: float
+    end_s: float
+    worn: str
+    times: Mapping[str, str]
+    steps: str
+    bouts: str
+    longest: str
+    counted: bool
+
+
+@dataclass(frozen=True)
+class HourTotals:
+    """One hour in words; `times` : minutes by column of TOTALS."""
+
+    day: str
+    label: str
+    steps: int
+    times: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class TransitionTotals:
+    """One kind of transition: how often on each day, and how large."""
+
+    label: str
+    per_day: tuple[int, ...]
+    total: int
+    lean: str
+    rise: str
+    inconsistent: int
+
+
+@dataclass(frozen=True)
+class TransitionEvent:
+    """A transition, or a lean that does not count with its reason."""
+
+    when: str
+    label: str
+    lean: str
+    rise: str
+    status: str
+    counts: bool
+
+
+@dataclass(frozen=True)
+class BoutBin:
+    """Walking bouts of one range of length."""
+
+    label: str
+    bouts: int
+    steps: int
+    minutes: float
+    cadence: str
+
+
+@dataclass(frozen=True)
+class LeanRow:
+    """Trunk inclination during one kind, in whole degrees, positive forward."""
+
+    label: str
+    hours: str
+    median: str
+    low: str
+    high: str
+
+
+@dataclass(frozen=True, eq=False)
+class DailyLifeView:
+    """What the page and the week report of daily life show.
+
+    Parameters
+    ----------
+    found : what everything here was made from. place : where the sensor was worn.
+    has_clock : days and hours are those of the device's clock, else they count from the first sample.
+    columns : of the totals that have anything to say. mean : of the days worn long enough, None where there
+        is none. events : the first transitions and candidates in order of time, of `events_total`.
+    lean_reason : why no inclination is known, None where it is.
+    """
+
+    found: ActivityResult
+    place: str
+    has_clock: bool
+    columns: tuple[str, ...]
+    days: tuple[DayTotals, ...]
+    mean: DayTotals | None
+    hours: tuple[HourTotals, ...]
+    transitions: tuple[TransitionTotals, ...]
+    events: tuple[TransitionEvent, ...]
+    events_total: int
+    bins: tuple[BoutBin, ...]
+    stairs_steps: tuple[int, int]
+    leans: tuple[LeanRow, ...]
+    lean_reason: str | None
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values; spans, steps and inclination lie in files of their own."""
+        return {
+            "segment": self.found.segment,
+            "started_at": None if self.found.started_at is None else self.found.started_at.isoformat(),
+            "days": [
+                {**asdict(d), "date": None if d.date is None else d.date.isoformat()} for d in self.found.days
+            ],
+            "bouts": [asdict(b) for b in self.bins],
+            "inclination": [asdict(row) for row in self.leans],
+            "sub_threshold": len(self.found.sub_threshold),
+        }
+
+
+def daily_life_view(found: ActivityResult | None) -> DailyLifeView | None:
+    """Put a recording of daily life into words; None of any other take."""
+    if found is None:
+        return None
+    days = tuple(_describe_day(found, i, d) for i, d in enumerate(found.days))
+    shown = tuple(
+        c for c, kinds in TOTALS.items() if c != "Not recorded" or any(found.minutes(k) for k in kinds)
+    )
+    events: list[PosturalTransition | TransitionCandidate] = [*found.transitions, *found.candidates]
+    events.sort(key=lambda e: e.time_s)
+    leans = _describe_leans(found)
+    return DailyLifeView(
+        found=found,
+        place="chest" if found.segment == "chest" else "lower back",
+        has_clock=found.started_at is not None,
+        columns=shown,
+        days=days,
+        mean=_average(found.days),
+        hours=tuple(
+            HourTotals(
+                _day_of(found, h.start_s),
+                clock_label(found, h.start_s),
+                h.steps,
+                {c: format_number(_sum(h.minutes, TOTALS[c]), 0) for c in shown},
+            )
+            for h in found.hours
+        ),
+        transitions=tuple(_count_transitions(found, kind) for kind in TRANSITIONS),
+        events=tuple(_describe_event(found, e) for e in events[:EVENTS_SHOWN]),
+        events_total=len(events),
+        bins=bin_bouts(found.bouts),
+        stairs_steps=(
+            sum(b.stairs_up_steps for b in found.bouts),
+            sum(b.stairs_down_steps for b in found.bouts),
+        ),
+        leans=leans,
+        lean_reason=None if leans else "not known: no lean of the trunk showed which way is forward",
+    )
+
+
+def format_hours(minutes: float) -> str:
+    """Format minutes as h:min, "7:40"."""
+    whole = round(minutes)
+    return f"{whole // 60}:{whole % 60:02d}"
+
+
+def find_midnight(found: ActivityResult, at_s: float) -> float:
+    """Where the day of a moment begins, s from the first sample (below 0 on the first day of a clock)."""
+    return float(np.floor((at_s + _since_midnight(found)) / DAY_S) * DAY_S - _since_midnight(found))
+
+
+def clock_label(found: ActivityResult, at_s: float) -> str:
+    """Time of day as "14:05", or hours and minutes since the first sample without a clock."""
+    minutes = int((at_s + _since_midnight(found)) // 60)
+    return f"{minutes // 60 % 24:02d}:{minutes % 60:02d}"
+
+
+def bin_bouts(bouts: Sequence[ActivityBout]) -> tuple[BoutBin, ...]:
+    """Sort walking bouts by their length."""
+    ends = [*BIN_EDGES_S, np.inf]
+    places = np.searchsorted(BIN_EDGES_S, [b.duration_s for b in bouts], "right")
+    rows = []
+    for i, end in enumerate(ends):
+        own = [b for b, place in zip(bouts, places.tolist(), strict=True) if place == i]
+        steps = sum(b.steps for b in own)
+        rows.append(
+            BoutBin(
+                label=_bin_label(ends[i - 1] if i else 0.0, end),
+                bouts=len(own),
+                steps=steps,
+                minutes=sum(b.duration_s for b in own) / 60.0,
+                cadence=format_number(sum(b.cadence_spm * b.steps for b in own) / steps, 0)
+                if steps
+                else DASH,
+            )
+        )
+    return tuple(rows)
+
+
+def _bin_label(low: float, high: float) -> str:
+    if not low:
+        return f"below {high:.0f}\u202fs"
+    unit, size = ("s", 1.0) if low < 60.0 else ("min", 60.0)
+    if np.isinf(high):
+        return f"{low / size:.0f}\u202f{unit} or longer"
+    if low < 60.0 <= high:
+        return f"{low:.0f}–{high:.0f}\u202fs"
+    return f"{low / size:.0f}–{high / size:.0f}\u202f{unit}"
+
+
+def _since_midnight(found: ActivityResult) -> float:
+    at = found.started_at
+    return 0.0 if at is None else at.hour * HOUR_S + at.minute * 60.0 + at.second + at.microsecond * 1e-6
+
+
+def _day_of(found: ActivityResult, at_s: float) -> str:
+    for i, d in enumerate(found.days):
+        if d.start_s <= at_s < d.end_s:
+            return _day_label(i, d.date)
+    return ""
+
+
+def _day_label(number: int, date: dt.date | None) -> str:
+    return f"Day {number + 1}" if date is None else f"{date:%a} {date.day} {date:%b}"
+
+
+def _describe_day(found: ActivityResult, i: int, d: ActivityDay) -> DayTotals:
+    begins = f"{clock_label(found, d.start_s)}–" if found.started_at is not None else ""
+    whole = d.end_s - d.start_s > DAY_S - 60.0
+    ends = clock_label(found, d.end_s) if begins else f"first {format_hours((d.end_s - d.start_s) / 60)} h"
+    worn = d.worn_h > 0.0
+    return DayTotals(
+        label=_day_label(i, d.date),
+        part="" if whole else begins + (ends if ends != "00:00" else "24:00"),
+        midnight_s=find_midnight(found, d.start_s),
+        start_s=d.start_s,
+        end_s=d.end_s,
+        worn=format_hours(60.0 * d.worn_h),
+        times={c: format_hours(_sum(d.minutes, kinds)) for c, kinds in TOTALS.items()},
+        steps=format_number(d.steps, 0) if worn else DASH,
+        bouts=str(d.bouts) if worn else DASH,
+        longest=DASH if d.longest_bout_s is None else format_number(d.longest_bout_s / 60.0, 1),
+        counted=d.worn_h >= WORN_H,
+    )
+
+
+def _average(days: Sequence[ActivityDay]) -> DayTotals | None:
+    """Mean of the days worn long enough."""
+    own = [d for d in days if d.worn_h >= WORN_H]
+    if not own:
+        return None
+    n = len(own)
+    longest = [d.longest_bout_s for d in own if d.longest_bout_s is not None]
+    return DayTotals(
+        label=f"Mean of {n} {plural(n, 'day', 'days')}",
+        part="",
+        midnight_s=0.0,
+        start_s=0.0,
+        end_s=0.0,
+        worn=format_hours(60.0 * sum(d.worn_h for d in own) / n),
+        times={c: format_hours(sum(_sum(d.minutes, k) for d in own) / n) for c, k in TOTALS.items()},
+        steps=format_number(sum(d.steps for d in own) / n, 0),
+        bouts=format_number(sum(d.bouts for d in own) / n, 0),
+        longest=format_number(sum(longest) / len(longest) / 60.0, 1) if longest else DASH,
+        counted=True,
+    )
+
+
+def _sum(minutes: Mapping[ActivityKind, float], kinds: Sequence[ActivityKind]) -> float:
+    return sum(minutes.get(kind, 0.0) for kind in kinds)
+
+
+def _count_transitions(found: ActivityResult, kind: TransitionKind) -> TransitionTotals:
+    own = [t for t in found.transitions if t.kind == kind]
+    rises = [abs(t.rise_m) for t in own if t.rise_m is not None]
+    return TransitionTotals(
+        label=TRANSITION_LABELS[kind],
+        per_day=tuple(d.transitions.get(kind, 0) for d in found.days),
+        total=len(own),
+        lean=format_number(float(np.median([t.lean_deg for t in own])), 0) if own else DASH,
+        rise=format_number(float(np.median(rises)), 2) if rises else DASH,
+        inconsistent=Counter(t.consistent for t in own)[False],
+    )
+
+
+def _describe_event(found: ActivityResult, e: PosturalTransition | TransitionCandidate) -> TransitionEvent:
+    when = f"{_day_of(found, e.time_s)} {clock_label(found, e.time_s)}"
+    lean = format_number(e.lean_deg, 0)
+    rise = DASH if e.rise_m is None else format_number(e.rise_m, 2)
+    if isinstance(e, TransitionCandidate):
+        label = "" if e.likely is None else f"{TRANSITION_LABELS[e.likely]}?"
+        return TransitionEvent(when, label or DASH, lean, rise, REFUSALS[e.refused], counts=False)
+    status = "counts" if e.consistent else "counts, but the posture before it does not fit"
+    return TransitionEvent(when, TRANSITION_LABELS[e.kind], lean, rise, status, counts=True)
+
+
+def _describe_leans(found: ActivityResult) -> tuple[LeanRow, ...]:
+    """Median and the middle 90 % of inclination in each kind; not of lying: on a side none is forward."""
+    values, kinds = found.inclination_deg, label_seconds(found)
+    rows = []
+    for i, kind in enumerate(KINDS):
+        own = values[kinds == i]
+        own = own[np.isfinite(own)]
+        if not len(own) or kind in {"lying", "unknown", "non_wear", "gap"}:
+            continue
+        low, median, high = (format_number(float(x), 0) for x in np.percentile(own, (5, 50, 95)))
+        rows.append(LeanRow(KIND_LABELS[kind], format_hours(len(own) / 60.0), median, low, high))
+    return tuple(rows)
+
+
+def label_seconds(found: ActivityResult) -> np.ndarray:
+    """(seconds,) index into KINDS of what the middle of every second is."""
+    seconds = np.arange(len(found.inclination_deg)) + 0.5
+    places = np.searchsorted([s.start_s for s in found.spans], seconds, "right") - 1
+    kinds = np.array([KINDS.index(s.kind) for s in found.spans], dtype=np.intp)
+    return kinds[np.maximum(places, 0)] if len(kinds) else np.full(len(seconds), KINDS.index("gap"))
+
+
+def inclination_course(found: ActivityResult, start_s: float, end_s: float) -> tuple[Floats, Floats]:
+    """Course of inclination in windows of COURSE_S.
+
+    Returns
+    -------
+    t_s : (n,) start of each window. course : (n, 3) 10 %, 50 % and 90 % of its seconds, NaN where fewer than
+        a tenth of them are known.
+    """
+    first, last = int(start_s), min(int(np.ceil(end_s)), len(found.inclination_deg))
+    n = max(0, -(-(last - first) // COURSE_S))
+    rows = np.full((n, COURSE_S), np.nan)
+    rows.flat[: max(0, last - first)] = found.inclination_deg[first:last]
+    rows.sort(axis=1)
+    known = np.isfinite(rows).sum(axis=1)
+    course = np.full((n, 3), np.nan)
+    enough = known * 10 >= COURSE_S
+    for k, share in enumerate((0.1, 0.5, 0.9)):
+        place = np.round(share * np.maximum(known - 1, 0)).astype(np.intp)
+        course[enough, k] = rows[np.arange(n), place][enough]
+    return first + COURSE_S * np.arange(n, dtype=np.float64), course

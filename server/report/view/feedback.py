@@ -1,0 +1,179 @@
+"""What feedback did in a session: strides with and without it, probes, level, side effects, retention."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Final
+
+from sagittal.core.change.limits import Limb
+from sagittal.core.events.result import Strides
+from sagittal.core.feedback import AnalysedStride, FeedbackSplit, GuardState, Prescription
+from sagittal.core.feedback.cue import Summary
+from sagittal.core.feedback.guard import FIRST, LAST
+from sagittal.core.feedback.summary import Kind
+from sagittal.core.parameters.rows import Column
+from sagittal.core.plurals import plural
+from sagittal.server.report.charts.feedback_chart import feedback_svg
+from sagittal.server.report.files.columns import reduce_to_plain
+from sagittal.server.report.view.feedback_beside import (
+    PreviousTraining,
+    Retention,
+    SideEffectRow,
+    compare_retention,
+    describe_effects,
+)
+from sagittal.server.report.view.feedback_rows import FeedbackRow, describe_summary, format_signed
+from sagittal.server.report.words.feedback_words import (
+    digits_of,
+    format_quantity,
+    name_target,
+    prescription_words,
+    target_words,
+)
+from sagittal.server.report.words.wording import Term, format_number, parameter_term
+
+KINDS: Final[tuple[tuple[Kind, str, bool], ...]] = (
+    ("baseline", "Before feedback, first strides", False),
+    ("retention", "Retention test, first strides", False),
+    ("with", "With feedback", False),
+    ("without", "Without feedback", False),
+    ("probe", "of these in probe blocks", True),
+    ("faded", "of these left out by the schedule", True),
+    ("off", "of these while off, paused or stale", True),
+    ("stopped", "of these after the end", True),
+)
+"""Kind of stride, its words, and whether it is a part of the one above."""
+
+_HOW_TO_READ: Final = (
+    "Values are those of the finished analysis, the zone is that of the level at that stride. Only strides "
+    "without feedback show what stays when it goes."
+)
+
+
+@dataclass(frozen=True)
+class ProbeComparison:
+    """A probe block beside the training strides right before it."""
+
+    number: int
+    start_s: float
+    before: FeedbackRow
+    probe: FeedbackRow
+
+
+@dataclass(frozen=True)
+class FeedbackView:
+    """The section of a session page, of its print, and of the interface."""
+
+    title: str
+    words: tuple[tuple[str, str], ...]
+    content: Prescription
+    term: Term
+    rows: tuple[FeedbackRow, ...]
+    probes: tuple[ProbeComparison, ...]
+    levels: tuple[tuple[int, float, int], ...]
+    effects: tuple[SideEffectRow, ...]
+    retention: Retention | None
+    notes: tuple[str, ...]
+    svg: str
+    split: FeedbackSplit
+
+    @property
+    def target(self) -> str:
+        """Mean ± sd and who they are of."""
+        return target_words(self.content)
+
+    @property
+    def retention_words(self) -> str:
+        """How much the first strides of this visit differ from the last ones trained."""
+        return "" if self.retention is None else format_signed(self.retention.difference, self.term)
+
+    def to_json(self) -> dict[str, object]:
+        """Plain JSON with every stride."""
+        shown = reduce_to_plain(
+            {
+                "prescription": self.content.to_json(),
+                "words": [f"{label}: {text}" for label, text in self.words],
+                "reason": None,
+                "parameter": self.content.parameter,
+                "unit": self.term.unit,
+                "side": self.content.side,
+                "rows": [asdict(r) for r in self.rows],
+                "probes": [asdict(p) for p in self.probes],
+                "levels": [{"n": n, "t_s": t, "level": level} for n, t, level in self.levels],
+                "effects": [asdict(e) for e in self.effects],
+                "retention": None if self.retention is None else asdict(self.retention),
+                "notes": list(self.notes),
+                "strides": [
+                    {**m.cue.to_json(), "value": m.value, "live_value": m.cue.value, "in_zone": m.inside}
+                    for m in self.split.strides
+                ],
+            }
+        )
+        return shown if isinstance(shown, dict) else {}
+
+
+def list_analysed_strides(strides: Strides, column: Column) -> tuple[AnalysedStride, ...]:
+    """The stride list with the value of the trained parameter."""
+    return tuple(
+        AnalysedStride(s.side, s.start_s, value, s.excluded_reason is None)
+        for s, value in zip(strides.strides, column, strict=True)
+    )
+
+
+def feedback_view(
+    content: Prescription,
+    split: FeedbackSplit,
+    guard: GuardState,
+    before: PreviousTraining | None = None,
+    limb: Limb | None = None,
+) -> FeedbackView:
+    """Put the result of a take into words.
+
+    Parameters
+    ----------
+    before : the visit whose end the retention block is held against. limb : of the trained side.
+    """
+    term = parameter_term(content.parameter)
+    rows = tuple(
+        describe_summary(kind, label, part, split.kinds.get(kind, Summary()), digits_of(content))
+        for kind, label, part in KINDS
+        if kind in {"with", "without"} or kind in split.kinds
+    )
+    return FeedbackView(
+        title=name_target(content),
+        words=tuple(prescription_words(content)),
+        content=content,
+        term=term,
+        rows=rows,
+        probes=tuple(
+            ProbeComparison(
+                p.number,
+                p.start_s,
+                describe_summary("with", "before", False, p.before, digits_of(content)),
+                describe_summary("probe", "probe", False, p.probe, digits_of(content)),
+            )
+            for p in split.probes
+        ),
+        levels=tuple((s.n, s.t_s, s.level) for s in split.levels),
+        effects=describe_effects(content, guard, term),
+        retention=None if before is None else compare_retention(content, split, before, term, limb),
+        notes=_notes(split, term),
+        svg=feedback_svg(split, content, term) if split.strides else "",
+        split=split,
+    )
+
+
+def _notes(split: FeedbackSplit, term: Term) -> tuple[str, ...]:
+    """How to read it, and what could not be used."""
+    said = [_HOW_TO_READ, f"Side effects: the last {LAST} strides against the first {FIRST} of the take."]
+    live = split.live_difference
+    if live.mean is not None and live.sd is not None:
+        said.append(
+            f"What was fed back differed from the analysis by {format_number(live.mean, term.digits + 1)} ± "
+            f"{format_quantity(live.sd, term, term.digits + 1)}."
+        )
+    for n, what in ((split.unmatched, "no stride"), (split.left_out, "a stride that does not count")):
+        if n:
+            cues = plural(n, "1 cue, left out, has", f"{n} cues, left out, have")
+            said.append(f"{cues} {what} in the analysis.")
+    return tuple(said)

@@ -1,0 +1,303 @@
+"""A comparison of filters as its page shows it: sentences, table, charts, and the reference."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+from sagittal.core.frames import SEGMENTS, SIDES, SUFFIX, Floats, Side
+from sagittal.core.fusion.algorithms.listed import ENGINES
+from sagittal.core.plurals import plural
+from sagittal.server.report.charts.filter_charts import Over, draw_agreement, draw_spread
+from sagittal.server.report.words.filter_list import GRADES_IN_WORDS
+from sagittal.server.report.words.wording import VARIABLES, format_number, place_words
+
+NAME: Final = "filters.json"
+
+PARTS: Final = ("pelvis", "chest", "thigh", "shank", "foot")
+QUANTITIES: Final = {"inclination": "Inclination of segments", "heading": "Heading of segments"}
+
+HEADLINE: Final = (
+    ("knee_flexion", "", "knee flexion"),
+    ("hip_flexion", "", "hip flexion"),
+    ("ankle_dorsiflexion", "", "ankle dorsiflexion"),
+    ("foot", "_inclination", "inclination of the foot"),
+    ("pelvis", "_inclination", "inclination of the pelvis"),
+)
+"""What the sentence speaks of, the first that there is: name, ending, words."""
+
+CLEAR: Final = 1.05
+"""Room above the highest curve."""
+
+
+@dataclass(frozen=True)
+class SpreadPanel:
+    """One chart; `numbers` = side letter or "", and the RMS over the take in degrees."""
+
+    title: str
+    svg: str
+    numbers: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class SpreadRow:
+    """A quantity of one side in the table: texts of degrees, over the take, in stance, in swing, largest."""
+
+    title: str
+    side: Side | None
+    numbers: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class FilterRow:
+    """A filter in the table; numbers are texts, "" where there is none; told = what went wrong."""
+
+    name: str | None
+    label: str
+    engine: str
+    grade: str
+    cost: str
+    to_median: tuple[str, str]
+    to_own: tuple[str, str]
+    told: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ReferenceRow:
+    """A filter against the reference in the chosen quantity: texts of degrees."""
+
+    name: str | None
+    label: str
+    errors: tuple[str, ...]
+    shown: bool
+
+
+@dataclass(frozen=True)
+class ReferenceView:
+    """What is said of the reference.
+
+    Parameters
+    ----------
+    choices : (value, words, chosen) of what it can be looked at for. heads : of the table's columns.
+    """
+
+    source: str
+    sentences: tuple[str, ...]
+    choices: tuple[tuple[str, str, bool], ...]
+    of: str
+    heads: tuple[str, ...]
+    rows: tuple[ReferenceRow, ...]
+    figures: tuple[tuple[str, str], ...]
+    figure_of: str
+
+
+@dataclass(frozen=True)
+class ComparisonView:
+    """Everything of the page that is of one comparison."""
+
+    headline: str
+    sentences: tuple[str, ...]
+    rows: tuple[FilterRow, ...]
+    over: Over
+    groups: tuple[tuple[str, tuple[SpreadPanel, ...]], ...]
+    table: tuple[SpreadRow, ...]
+    reference: ReferenceView | None
+
+
+def view_comparison(
+    content: bytes, over: Over, of: str | None = None, filter_name: str | None = None
+) -> ComparisonView:
+    """Read filters.json into what the page shows.
+
+    Parameters
+    ----------
+    of : segment or joint angle that is held against the reference. filter_name : whose plot is drawn.
+    """
+    found: dict[str, Any] = json.loads(content)
+    spreads = {s["name"]: s for s in found["spreads"]}
+    end = found["t_s"][-1] if found["t_s"] else 1.0
+    has_cycles = any(s["cycle_sd"] for s in found["spreads"])
+    over = over if has_cycles else "time"
+    ran = sum(f["to_median"] is not None for f in found["filters"]) - 1
+    rows = tuple(_row(f) for f in found["filters"])
+    drawn: Mapping[str, Any] = spreads
+    if ran < 2:  # a single filter is its own median: 0° everywhere, which would read as agreement
+        rows, drawn = tuple(replace(row, to_median=("", "")) for row in rows), {}
+    return ComparisonView(
+        headline=_headline(spreads, ran, len(found["segments"])),
+        sentences=(*_notes(found, has_cycles), *(n["message"] for n in found["notices"])),
+        rows=rows,
+        over=over,
+        groups=(
+            ("Joint angles", _panels([(v.label, _sides(drawn, v.name, "")) for v in VARIABLES], over, end)),
+            *(
+                (title, _panels([(p.capitalize(), _sides(drawn, p, f"_{q}")) for p in PARTS], over, end))
+                for q, title in QUANTITIES.items()
+            ),
+        ),
+        table=tuple(row for s in drawn.values() for row in _spread_rows(s)),
+        reference=None if found["reference"] is None else _reference(found, of, filter_name),
+    )
+
+
+def _headline(spreads: Mapping[str, Any], ran: int, sensors: int) -> str:
+    """What the choice of a filter changes, in one sentence."""
+    filters, worn = (
+        f"{n} {plural(n, word, f'{word}s')}" for n, word in ((ran, "filter"), (sensors, "sensor"))
+    )
+    for name, ending, words in HEADLINE:
+        found = _sides(spreads, name, ending)
+        if found and ran > 1:
+            values = " and ".join(f"{format_number(s['rms'], 1)}° {side or ''}" for side, s in found.items())
+            return f"{filters} on {worn}: their {words} differs by {values.strip()} (standard deviation)."
+    if ran == 1:
+        return f"{filters} on {worn}: it has no other to differ from. It is held against Sagittal's own."
+    return f"{filters} on {worn}."
+
+
+def _notes(found: Mapping[str, Any], has_cycles: bool) -> list[str]:
+    used = "used where a filter can" if found["magnetometer"] else "not used"
+    counted = " and ".join(f"{found['strides'].get(side, 0)} {side}" for side in SIDES)
+    cycles = f"Over the gait cycle: {counted} strides." if has_cycles else "No stride counts: over time only."
+    return [f"Magnetometer: {used}. {cycles}"]
+
+
+def _sides(spreads: Mapping[str, Any], name: str, ending: str) -> dict[Side | None, Any]:
+    """Spreads of a quantity by side; of one that has no side under None."""
+    if name == "pelvis_rotation":
+        name, ending = "pelvis", "_heading"
+    if f"{name}{ending}" in spreads:
+        return {None: spreads[f"{name}{ending}"]}
+    return {side: spreads[key] for side in SIDES if (key := f"{name}_{SUFFIX[side]}{ending}") in spreads}
+
+
+def _panels(
+    quantities: Sequence[tuple[str, dict[Side | None, Any]]], over: Over, end: float
+) -> tuple[SpreadPanel, ...]:
+    """Charts of quantities that are known, on one value axis."""
+    drawn = []
+    for title, found in quantities:
+        lines: dict[Side | None, Floats] = {}
+        for side, s in found.items():
+            curves = {side: s["sd"]} if over == "time" else s["cycle_sd"]
+            for key, values in curves.items():
+                lines[key] = np.array([np.nan if x is None else x for x in values])
+        lines = {key: x for key, x in lines.items() if np.isfinite(x).any()}
+        if lines:
+            drawn.append((title, found, lines))
+    top = max((float(np.nanmax(x)) for _, _, lines in drawn for x in lines.values()), default=0.0)
+    return tuple(
+        SpreadPanel(
+            title,
+            draw_spread(title, lines, max(CLEAR * top, 0.1), end, over),
+            tuple(
+                ("" if side is None else SUFFIX[side], format_number(s["rms"], 1))
+                for side, s in found.items()
+            ),
+        )
+        for title, found, lines in drawn
+    )
+
+
+def _spread_rows(s: Mapping[str, Any]) -> list[SpreadRow]:
+    """One row; of what belongs to both legs one for the cycles of each."""
+    sides: list[Side | None] = list(s["stance"]) or [None]
+    return [
+        SpreadRow(
+            name_quantity(s["name"]),
+            None if side is None or len(sides) == 1 else side,
+            tuple(_text(x) for x in (s["rms"], s["stance"].get(side), s["swing"].get(side), s["largest"])),
+        )
+        for side in sides
+    ]
+
+
+def _row(f: Mapping[str, Any]) -> FilterRow:
+    def pair(score: Mapping[str, float] | None) -> tuple[str, str]:
+        return ("", "") if score is None else (_text(score["inclination"]), _text(score["heading"]))
+
+    told = tuple(
+        f"{place_words(n['sensor']).capitalize()}: {n['message']}" if n["sensor"] else n["message"]
+        for n in f["told"]
+    )
+    engine = "" if f["engine"] is None else f"{f['engine']} {ENGINES[f['engine']]}"
+    grade = "" if f["grade"] is None else GRADES_IN_WORDS[f["grade"]]
+    cost = "" if f["cost_us"] is None else format_number(f["cost_us"], 2)
+    return FilterRow(
+        f["name"], f["label"], engine, grade, cost, pair(f["to_median"]), pair(f["to_own"]), told
+    )
+
+
+def _text(value: float | None) -> str:
+    return "" if value is None or not math.isfinite(value) else format_number(value, 1)
+
+
+def _reference(found: Mapping[str, Any], of: str | None, filter_name: str | None) -> ReferenceView:
+    r = found["reference"]
+    pairs = {(b["filter"], b["quantity"]): b for b in r["agreement"]}
+    scores = {(s["filter"], s["segment"]): s for s in r["scores"]}
+    segments = [s for s in SEGMENTS if s in r["segments"]]
+    joints = [q for q in dict.fromkeys(q for _, q in pairs) if not q.endswith(tuple(QUANTITIES))]
+    names = {s: place_words(s).capitalize() for s in segments} | {q: name_quantity(q) for q in joints}
+    chosen: str = of if of is not None and of in names else next(iter(names), "")
+    labels = {f["name"]: f["label"] for f in found["filters"]}
+    is_segment = chosen in segments
+    quantities = [f"{chosen}_{q}" for q in QUANTITIES] if is_segment else [chosen]
+    rows = []
+    shown = filter_name if (filter_name, quantities[0]) in pairs else None
+    for name, label in labels.items():
+        errors: list[str] = []
+        if is_segment:
+            score = scores.get((name, chosen), {})
+            errors += [_text(score.get(part)) for part in ("total", "inclination", "heading")]
+        for quantity in quantities:
+            b = pairs.get((name, quantity))
+            if not is_segment:
+                errors.append("" if b is None else _text(b["rmse"]))
+            errors += (
+                ["", ""] if b is None else [_text(b["bias"]), f"{_text(b['low'])} to {_text(b['high'])}"]
+            )
+        if any(errors):
+            rows.append(ReferenceRow(name, label, tuple(errors), name == shown))
+    figures = [
+        (q.rpartition("_")[2].capitalize() if is_segment else names[chosen], _figure(pairs[shown, q], q))
+        for q in quantities
+        if (shown, q) in pairs
+    ]
+    limits = ("bias", "95 % limits")
+    heads = (
+        ("RMSE total", "inclination", "heading", *(f"{q} {x}" for q in QUANTITIES for x in limits))
+        if is_segment
+        else ("RMSE", *limits)
+    )
+    return ReferenceView(
+        r["source"],
+        tuple(n["message"] for n in r["notices"]),
+        tuple((value, words, value == chosen) for value, words in names.items()),
+        names.get(chosen, ""),
+        heads,
+        tuple(rows),
+        tuple(figures),
+        labels.get(shown, ""),
+    )
+
+
+def _figure(b: Mapping[str, Any], quantity: str) -> str:
+    return draw_agreement(
+        quantity.replace("_", " "), b["middle"], b["difference"], [b["bias"], b["low"], b["high"]]
+    )
+
+
+def name_quantity(name: str) -> str:
+    """A quantity in words: "Knee flexion, left", "Left shank, heading"."""
+    base, _, suffix = name.rpartition("_")
+    if suffix in QUANTITIES:
+        return f"{place_words(base).capitalize()}, {suffix}"
+    side = next((s for s in SIDES if SUFFIX[s] == suffix), None)
+    label = next((v.label for v in VARIABLES if v.name == (name if side is None else base)), name)
+    return label if side is None else f"{label}, {side}"

@@ -1,0 +1,214 @@
+"""A functional test on the session page: its total, its segments as a bar and a table, norm, last visit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from sagittal.core.norms.functional import (
+    COMFORTABLE_SPEED_SOURCE,
+    SIX_MINUTE_SOURCE,
+    TEST_NORMS,
+    find_comfortable_speed,
+    find_six_minute_norm,
+    find_test_norm,
+)
+from sagittal.core.parameters.catalogue import CATALOGUE, require_entries
+from sagittal.core.parameters.result import Parameter
+from sagittal.server.report.charts.svg import format_coordinate, stretch
+from sagittal.server.report.files.bundle import Bundle
+from sagittal.server.report.words.wording import (
+    format_number,
+    format_uncertainty,
+    parameter_term,
+    place_words,
+    reason_words,
+)
+
+TOTALS: Final = (
+    "tug_duration_s",
+    "five_sit_to_stand_s",
+    "walk_10m_speed_mps",
+    "walk_6min_distance_m",
+    "sway_rms_mps2",
+)
+"""The figure that stands for a test, by what was measured."""
+
+require_entries(TOTALS, "sagittal.server.report.view.functional")
+
+SEGMENTS: Final[Mapping[str, str]] = {
+    "sit_to_stand": "Rising",
+    "walk_out": "Way out",
+    "turn": "Turn",
+    "walk_back": "Way back",
+    "turn_to_sit": "Turn and sitting down",
+    "stand_to_sit": "Sitting down",
+    "speeding_up": "Speeding up",
+    "timed_metres": "Timed metres",
+    "slowing_down": "Slowing down",
+    "standing": "Quiet standing",
+}
+"""Name of a segment → its words; minutes count themselves."""
+
+MEANT: Final[Mapping[str, str]] = {
+    "tug_duration_s": "From the first lean forward to the end of sitting down.",
+    "five_sit_to_stand_s": "From the first lean forward to the end of the fifth sitting down.",
+    "walk_10m_speed_mps": "Over the middle of the longest straight walk, two metres at either end left out.",
+    "walk_6min_distance_m": "By the strides of the feet, turns included.",
+    "sway_rms_mps2": "Of the horizontal acceleration below 3.5 Hz; which way is forward is not known.",
+}
+"""How the total of a test is meant."""
+
+TEST_NORM_NOTE: Final = "The norm of a test, where there is one, stands below its segments."
+"""Below the table of a test's parameters."""
+
+NO_NORM: Final = "No norm: none whose source gives figures for this test."
+NO_AGE: Final = "No norm: enter the year of birth."
+NO_SEX: Final = "No norm: enter the sex."
+OTHER_AGE: Final = "No norm for this age."
+
+
+@dataclass(frozen=True)
+class SegmentRow:
+    """A part of a test in words; `length_s` for the bar."""
+
+    label: str
+    start: str
+    duration: str
+    length_s: float
+
+
+@dataclass(frozen=True)
+class FunctionalView:
+    """A functional test as the page shows it.
+
+    Parameters
+    ----------
+    name, title, unit : of the figure that stands for it. value : as printed, "–" without one; then `reason`.
+    plus_minus : what it is known to. norm : of healthy people with its source, or why there is none.
+    previous : the same figure at the visit before, as printed, "" without one.
+    start_s, end_s : of the test, None where not found. sensor : that tells. corrected : a person set them.
+    """
+
+    name: str
+    title: str
+    value: str
+    unit: str
+    plus_minus: str
+    reason: str | None
+    norm: str
+    meant: str
+    segments: tuple[SegmentRow, ...]
+    start_s: float | None
+    end_s: float | None
+    sensor: str
+    corrected: bool
+    previous: str = ""
+
+    @property
+    def bar(self) -> str:
+        """The segments side by side as SVG, as long as they take."""
+        total = sum(s.length_s for s in self.segments)
+        if total <= 0.0 or len(self.segments) < 2:
+            return ""
+        at, shapes = 0.0, []
+        for i, segment in enumerate(self.segments):
+            width = 1000.0 * segment.length_s / total
+            wide = format_coordinate(max(width - 3.0, 1.0))
+            box = f'x="{format_coordinate(at)}" y="0" width="{wide}" height="1000"'
+            shapes.append(f'<rect class="seg1" {box}/>' if i % 2 else f'<rect class="seg0" {box}/>')
+            at += width
+        said = ", ".join(f"{s.label} {s.duration} s" for s in self.segments)
+        return (
+            f'<svg class="chart segbar" width="100%" height="28" role="img" aria-label="{said}">'
+            f"{stretch(''.join(shapes))}</svg>"
+        )
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values."""
+        return {**vars(self), "segments": [vars(s) for s in self.segments]}
+
+    def compare_with(self, before: Sequence[Parameter]) -> FunctionalView:
+        """The same with the figure of an earlier visit."""
+        value = next((p.mean for p in before if p.name == self.name), None)
+        if value is None:
+            return self
+        return replace(self, previous=format_number(value, parameter_term(self.name).digits))
+
+
+def functional_view(
+    bundle: Bundle, age: float | None = None, sex: str | None = None
+) -> FunctionalView | None:
+    """The functional test of a finished analysis; None of any other take."""
+    if bundle.functional is None:
+        return None
+    found = {p.name: p for p in bundle.parameters}
+    total = next((found[name] for name in TOTALS if name in found), None)
+    if total is None:
+        return None
+    term, test = parameter_term(total.name), bundle.functional
+    sure = "" if total.uncertainty is None else format_uncertainty(total.uncertainty, term.digits)
+    return FunctionalView(
+        name=total.name,
+        title=CATALOGUE[total.name].label,
+        value="–" if total.mean is None else format_number(total.mean, term.digits),
+        unit=term.unit,
+        plus_minus=sure,
+        reason=reason_words(total.reason) if total.mean is None else None,
+        norm=norm_words(total.name, age, sex),
+        meant=MEANT[total.name],
+        segments=tuple(_segment(row) for row in test["segments"]),
+        start_s=test["start_s"],
+        end_s=test["end_s"],
+        sensor=place_words(test["sensor"]) if test["sensor"] else "feet",
+        corrected=bool(test["corrected"]),
+    )
+
+
+def _segment(row: Mapping[str, Any]) -> SegmentRow:
+    name, start, end = str(row["name"]), float(row["start_s"]), float(row["end_s"])
+    return SegmentRow(
+        segment_label(name), format_number(start, 1), format_number(end - start, 1), end - start
+    )
+
+
+def segment_label(name: str) -> str:
+    """Words of a segment."""
+    return SEGMENTS.get(name, name.replace("_", " ").capitalize())
+
+
+def norm_words(name: str, age: float | None, sex: str | None = None) -> str:
+    """What healthy people reach in a test, with the source; else why no norm is shown."""
+    if name in ("walk_10m_speed_mps", "walk_6min_distance_m"):
+        if age is None or sex is None:
+            return NO_AGE if age is None else NO_SEX
+        return _speed_words(age, sex) if name == "walk_10m_speed_mps" else _distance_words(age, sex)
+    if name not in TEST_NORMS:
+        return NO_NORM
+    norm = find_test_norm(name, age)
+    if norm is None:
+        return NO_AGE if age is None else OTHER_AGE
+    limit = format_number(norm.limit_s, 1)
+    people = f"{norm.ages[0]} to {norm.ages[1]} years"
+    mean = "" if norm.mean_s is None else f"mean {format_number(norm.mean_s, 1)} s, "
+    return f"Healthy people of {people}: {mean}slower than average above {limit} s ({norm.source})."
+
+
+def _distance_words(age: float, sex: str) -> str:
+    norm = find_six_minute_norm(age, sex)
+    if norm is None:
+        return OTHER_AGE
+    people = f"{'Men' if sex == 'male' else 'Women'} of {norm.ages[0]} to {norm.ages[1]} years"
+    mean, spread = format_number(norm.mean_m, 0), format_number(norm.sd_m, 0)
+    far = f"{mean} m on average, standard deviation {spread} m"
+    return f"Healthy {people.lower()} walk {far} ({SIX_MINUTE_SOURCE})."
+
+
+def _speed_words(age: float, sex: str) -> str:
+    norm = find_comfortable_speed(age, sex)
+    if norm is None:
+        return OTHER_AGE
+    people = f"{'Men' if sex == 'male' else 'Women'} of {norm.ages[0]} to {norm.ages[1]} years"
+    mean = format_number(norm.mean_mps, 2)
+    return f"{people} walk at {mean} m/s on average, at their own pace ({COMFORTABLE_SPEED_SOURCE})."

@@ -1,0 +1,130 @@
+"""Angles from the anatomical zero: rows beside those from standing, where a goniometer was used."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
+from typing import Final
+
+from sagittal.core.events.result import Strides
+from sagittal.core.frames import SIDES
+from sagittal.core.norms import Norms
+from sagittal.core.parameters.anatomical_zero import anatomical_parameters, standing_name, standing_offset_deg
+from sagittal.core.parameters.catalogue import find_entry
+from sagittal.core.parameters.result import CycleCurves, Parameter
+from sagittal.core.parameters.rows import Column
+from sagittal.core.subject.standing_angles import JOINTS, PELVIS
+from sagittal.server.report.view.table import ParameterRow, parameter_rows
+from sagittal.server.report.words.wording import title_of
+
+GROUP = "Angles from the anatomical zero"
+
+STANDING: Final = "from the person's own standing"
+"""Words of definitions that do not hold for an anatomical angle."""
+
+ANATOMICAL: Final = "from the anatomical zero"
+"""Words in their place."""
+
+_SUFFIX: Final = "_anatomical_deg"
+
+
+def from_standing(name: str) -> str | None:
+    """Name of the same figure from standing; None for any other row."""
+    return f"{name.removesuffix(_SUFFIX)}_deg" if name.endswith(_SUFFIX) else None
+
+
+def define_parameter(name: str) -> str:
+    """What a figure is, in a sentence, "" where the catalogue has none; from the anatomical zero too."""
+    entry = find_entry(from_standing(name) or name)
+    if entry is None or from_standing(name) is None:
+        return "" if entry is None else entry.definition
+    return entry.definition.replace(STANDING, ANATOMICAL)
+
+
+def label_parameter(name: str) -> str:
+    """What a figure is called, the name itself where the catalogue has none; a level says its zero."""
+    standing = from_standing(name)
+    entry = find_entry(standing or name)
+    if entry is None:
+        return name
+    return entry.label if standing is None else title_of(standing, entry.label, "anatomical")
+
+
+def level_column(
+    name: str, strides: Strides, columns: Mapping[str, Column], standing_deg: Mapping[str, float]
+) -> Column | None:
+    """The figure of every stride from the anatomical zero: that from standing plus what was read."""
+    column = columns.get(from_standing(name) or "")
+    if column is None:
+        return None
+    variable = next((v for v in (*PELVIS, *JOINTS) if name.startswith(f"{v}_")), "")
+    read = {
+        s: standing_offset_deg(variable, s, standing_deg)
+        for s in SIDES
+        if standing_name(variable, s) in standing_deg
+    }
+    return tuple(
+        None if v is None or (zero := read.get(s.side)) is None else v + zero
+        for s, v in zip(strides.strides, column, strict=True)
+    )
+
+
+def level_parameters(
+    curves: CycleCurves, standing_deg: Mapping[str, float], estimated: Collection[str] = ()
+) -> tuple[Parameter, ...]:
+    """Figures of the variables and sides whose standing angle was entered, named "…_anatomical_deg".
+
+    Parameters
+    ----------
+    estimated : variables that no two sensors measure; a goniometer does not help them.
+    """
+    found = _measured_parameters(curves, standing_deg, estimated)
+    return tuple(replace(p, name=_level_name(p.name)) for p in found)
+
+
+def level_rows(
+    curves: CycleCurves,
+    standing_deg: Mapping[str, float],
+    norms: Norms,
+    estimated: Collection[str] = (),
+) -> tuple[ParameterRow, ...]:
+    """Rows of `level_parameters`.
+
+    Parameters
+    ----------
+    norms : of this person, looked up with `anatomical` = the variables of `anatomical_variables`.
+    """
+    found = _measured_parameters(curves, standing_deg, estimated)
+    rows = parameter_rows(found, norms, zero="anatomical")
+    return tuple(replace(row, name=_level_name(row.name), group=GROUP) for row in rows)
+
+
+def choose_zero(rows: Iterable[ParameterRow], anatomical: Collection[str]) -> tuple[ParameterRow, ...]:
+    """Rows of a page: every joint angle once, measured from the zero of its curve.
+
+    Parameters
+    ----------
+    anatomical : variables whose curves are drawn from the anatomical zero.
+    """
+    given = tuple(rows)
+    names = {row.name for row in given}
+
+    def is_of_page(row: ParameterRow) -> bool:
+        entry = find_entry(from_standing(row.name) or row.name)
+        is_anatomical = entry is not None and entry.curve is not None and entry.curve.variable in anatomical
+        if from_standing(row.name) is not None:
+            return is_anatomical
+        return not (is_anatomical and _level_name(row.name) in names)
+
+    return tuple(row for row in given if is_of_page(row))
+
+
+def _measured_parameters(
+    curves: CycleCurves, standing_deg: Mapping[str, float], estimated: Collection[str]
+) -> tuple[Parameter, ...]:
+    measured = replace(curves, curves={v: c for v, c in curves.curves.items() if v not in estimated})
+    return anatomical_parameters(measured, standing_deg)
+
+
+def _level_name(name: str) -> str:
+    return f"{name.removesuffix('_deg')}{_SUFFIX}"

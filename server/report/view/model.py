@@ -1,0 +1,499 @@
+"""Bundle + norms → what a page, a print or an API client shows: degrees and words, no arrays of signals.
+
+A pure function of stored results (law 10): under 50 ms for a 10 min session.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+
+from sagittal.core.errors import Notice
+from sagittal.core.flags import Flag, judge_flags
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.norms.adults import adult_reference_at_speed
+from sagittal.core.norms.controls import ControlGroup
+from sagittal.core.norms.kinematics import NormBand
+from sagittal.core.norms.lookup import Norms, look_up_norms
+from sagittal.core.norms.profile import CurveReference
+from sagittal.core.norms.scores import Scores, score_curves
+from sagittal.core.parameters import cycle_curves
+from sagittal.core.parameters.anatomical_zero import anatomical_variables
+from sagittal.core.parameters.catalogue import require_entries
+from sagittal.core.parameters.result import CycleCurves
+from sagittal.core.parameters.uncertainty import mark_estimated
+from sagittal.server.report.charts.panels import CurvePanel, SideCurve, curve_panels
+from sagittal.server.report.files.bundle import Bundle
+from sagittal.server.report.files.columns import reduce_to_plain
+from sagittal.server.report.view.daily_life import DailyLifeView, daily_life_view
+from sagittal.server.report.view.functional import TEST_NORM_NOTE, FunctionalView, functional_view
+from sagittal.server.report.view.headline import Headline, find_standouts, say_badge
+from sagittal.server.report.view.level import choose_zero, level_rows
+from sagittal.server.report.view.notes import curve_notes, norm_note
+from sagittal.server.report.view.profile import ProfileView, profile_view
+from sagittal.server.report.view.quality_box import QualityBox, quality_box
+from sagittal.server.report.view.squat import NORM_NOTE, UNSURE_FIGURES, SquatView, squat_view
+from sagittal.server.report.view.table import ParameterRow, group_rows, parameter_rows
+from sagittal.server.report.words.estimator import (
+    EstimatorView,
+    estimator_view,
+    list_estimated_angles,
+    list_estimated_variables,
+)
+from sagittal.server.report.words.limits import LimitsView, limits_view
+from sagittal.server.report.words.wording import explain_exclusion, place_words, speak_places
+
+Sex = Literal["female", "male"]
+
+KEY_NUMBERS: Final = (
+    "gait_speed_mps",
+    "cadence_spm",
+    "step_length_m",
+    "knee_flexion_rom_deg",
+    "stride_time_s",
+    "stance_pct",
+    "squat_depth_deg",
+    "squat_knee_valgus_deg",
+    "squat_hip_drop_m",
+    "squat_duration_s",
+    "daily_step_count",
+    "daily_walking_min",
+    "daily_sitting_min",
+    "daily_rise_count",
+)
+"""Parameters for the overview, in this order of preference."""
+
+require_entries(KEY_NUMBERS, "sagittal.server.report.view.model")
+
+SHOWN_LARGE: Final = 4
+"""So many of them are shown, those that were measured."""
+
+KEY_CURVE: Final = "knee_flexion"
+
+_KINDS: Final = {"error": "bad", "warning": "warn", "info": "info"}
+
+
+@dataclass(frozen=True)
+class KeyNumber:
+    """One large number, or a left-right pair, with its meaning in words."""
+
+    name: str
+    title: str
+    unit: str
+    pair: bool
+    text: str
+    left: str
+    right: str
+    words: str
+
+
+@dataclass(frozen=True)
+class ReportWarning:
+    """A notice for the reader: `kind` is bad, warn or info."""
+
+    kind: str
+    code: str
+    title: str
+    message: str
+    sensor: str | None
+    t_s: float | None
+
+
+@dataclass(frozen=True)
+class StrideRow:
+    """A stride of the list; `excluded` says in words why it does not count."""
+
+    side: Side
+    start_s: float
+    tc_s: float | None
+    end_s: float
+    used: bool
+    excluded: str | None
+
+
+@dataclass(frozen=True)
+class PreviousVisit:
+    """The visit before this one that its table is compared with."""
+
+    session_id: str
+    performed_on: dt.date
+
+
+@dataclass(frozen=True, eq=False)
+class ReportModel:
+    """Everything a session page shows.
+
+    Parameters
+    ----------
+    problem : what stopped the analysis, None when it ran to its end.
+    estimator : which pose estimator ran and its health, None when it was not reached.
+    limits : values against limits, None where no stride counts.
+    profile : distance of the curves from healthy adults, None without curves.
+    groups : parameter rows under their headings. key_curve : the panel shown on the overview.
+    norm_note : source, number and speed of the reference people, or why there is none.
+    curve_notes : how to read the curves, in sentences: zero, offsets, confidence, what is drawn.
+    since : the visit that `change` of the rows refers to, None without an earlier one walked alike.
+    condition : how the take was walked, in words.
+    squats : of a take of squats, None of any other. functional : of a functional test, likewise.
+    daily : of a take of daily life, None of any other.
+    headline : what stands out and what changed, in sentences; None where there is no walk to speak of.
+    """
+
+    problem: str | None
+    quality: QualityBox
+    warnings: tuple[ReportWarning, ...]
+    kpis: tuple[KeyNumber, ...]
+    groups: tuple[tuple[str, tuple[ParameterRow, ...]], ...]
+    panels: tuple[CurvePanel, ...]
+    strides: tuple[StrideRow, ...]
+    duration_s: float
+    norm_note: str
+    norm_source: str | None
+    curve_notes: tuple[str, ...]
+    angle_zero: str | None
+    zero_offset_deg: Mapping[str, float]
+    provenance: Mapping[str, object]
+    estimator: EstimatorView | None = None
+    profile: ProfileView | None = None
+    limits: LimitsView | None = None
+    since: PreviousVisit | None = None
+    condition: str = ""
+    squats: SquatView | None = None
+    headline: Headline | None = None
+    functional: FunctionalView | None = None
+    daily: DailyLifeView | None = None
+
+    @property
+    def key_curve(self) -> CurvePanel:
+        """Panel of knee flexion."""
+        return next(p for p in self.panels if p.variable.name == KEY_CURVE)
+
+    @property
+    def page_groups(self) -> tuple[tuple[str, tuple[ParameterRow, ...]], ...]:
+        """The groups as a page shows them: every joint angle once, measured from the zero of its curve."""
+        rows = (row for _, group in self.groups for row in group)
+        return group_rows(choose_zero(rows, _list_anatomical(self.panels)))
+
+    @property
+    def has_sides(self) -> bool:
+        """The table has columns of left and right: all but a test of which no value is of one side."""
+        rows = [row for _, group in self.groups for row in group]
+        return self.functional is None or any(row.left or row.right for row in rows)
+
+    @property
+    def at_speed(self) -> bool:
+        """A band is of people at the person's speed, the line beside it of people at their own."""
+        return any(p.comfortable is not None for p in self.panels)
+
+    @property
+    def used(self) -> dict[Side, int]:
+        """Strides that count, by side."""
+        return {side: sum(s.used for s in self.strides if s.side == side) for side in SIDES}
+
+    @property
+    def replay(self) -> dict[str, object]:
+        """What the clock of the page needs: duration, strides, mean curves by variable and side (deg).
+
+        Of squats these take the place of strides.
+        """
+        if self.squats is not None:
+            means = self.squats.means_deg
+            return {
+                "duration_s": self.duration_s,
+                "called": "squat",
+                "strides": [asdict(span) for span in self.squats.spans],
+                "curves": {
+                    name: {side: round_curve(mean) for side, mean in of.items()} for name, of in means.items()
+                },
+            }
+        return {
+            "duration_s": self.duration_s,
+            "strides": [
+                {"side": s.side, "start_s": s.start_s, "end_s": s.end_s, "used": s.used} for s in self.strides
+            ],
+            "curves": {
+                p.variable.name: {side: round_curve(c.mean_deg) for side, c in p.sides.items()}
+                for p in self.panels
+            },
+        }
+
+    def to_json(self) -> dict[str, object]:
+        """Plain JSON; single strides are left to curves.csv and angles.parquet."""
+        result = reduce_to_plain(
+            {
+                "problem": self.problem,
+                "quality": asdict(self.quality),
+                "warnings": [asdict(w) for w in self.warnings],
+                "key_numbers": [asdict(k) for k in self.kpis],
+                "parameters": [asdict(row) for _, rows in self.groups for row in rows],
+                "curves": [_panel_json(p) for p in self.panels],
+                "strides": [asdict(s) for s in self.strides],
+                "duration_s": self.duration_s,
+                "norm_note": self.norm_note,
+                "curve_notes": self.curve_notes,
+                "angle_zero": self.angle_zero,
+                "zero_offset_deg": self.zero_offset_deg,
+                "estimator": None if self.estimator is None else asdict(self.estimator),
+                "profile": None if self.profile is None else _profile_json(self.profile),
+                "limits": None if self.limits is None else asdict(self.limits),
+                "since": None if self.since is None else asdict(self.since),
+                "condition": self.condition,
+                "squats": None if self.squats is None else self.squats.to_json(),
+                "functional": None if self.functional is None else self.functional.to_json(),
+                "headline": None if self.headline is None else asdict(self.headline),
+                "daily": None if self.daily is None else self.daily.to_json(),
+                "provenance": self.provenance,
+            }
+        )
+        return result if isinstance(result, dict) else {}
+
+
+def report_model(
+    bundle: Bundle,
+    *,
+    age: float | None = None,
+    sex: Sex | None = None,
+    speed_mps: float | None = None,
+    height_m: float | None = None,
+    affected: Side | None = None,
+    controls: ControlGroup | None = None,
+    treadmill: bool = False,
+) -> ReportModel:
+    """Build the report of a finished analysis.
+
+    Parameters
+    ----------
+    age : years at the visit; without it curves are compared with all adults, timing with nobody.
+    speed_mps : walking speed, None = the take's own. treadmill : it was walked on a belt.
+    height_m : makes the speed dimensionless, so that legs of any length find their reference.
+    affected : side, None = none or both. controls : the clinic's own, where no published norm compares.
+    """
+    if speed_mps is None:
+        speed_mps = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
+    contacts_s = bundle.events.contact_uncertainty_s
+    norms = look_up_norms(age, sex, speed_mps, height_m, treadmill=treadmill, contacts_s=contacts_s)
+    own = None if controls is None else controls.norms(speed_mps, height_m)
+    if own is not None:
+        compared = {name: v for name, v in norms.values.items() if v.comparable or name not in own.values}
+        norms = replace(norms, values={**own.values, **compared})
+    marked = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
+    marked = tuple(replace(p, estimated=True) if p.name.startswith(UNSURE_FIGURES) else p for p in marked)
+    rows = parameter_rows(marked, norms, affected)
+    curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
+    panels = curve_panels(bundle, curves, norms, own)
+    standing = {} if bundle.angles is None else bundle.angles.standing_deg
+    if curves is not None and standing:
+        level = look_up_norms(age, sex, speed_mps, height_m, anatomical_variables(standing))
+        rows += level_rows(curves, standing, level, list_estimated_variables(bundle.estimator))
+    stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
+    angles = bundle.angles
+    quality = quality_box(bundle)
+    flags = _judge_limits(bundle, curves, height_m, age, own)
+    by_trunk = bundle.functional is not None and not bundle.strides.strides
+    return ReportModel(
+        problem=None if stopped is None else speak_places(stopped),
+        quality=quality,
+        warnings=tuple(_warning(n) for n in bundle.warnings),
+        kpis=tuple(
+            _key_number(r)
+            for name in KEY_NUMBERS
+            for r in rows
+            if r.name == name and r.reason is None and not r.low_confidence
+        )[:SHOWN_LARGE],
+        groups=group_rows(rows),
+        panels=panels,
+        strides=tuple(
+            StrideRow(
+                s.side,
+                s.start_s,
+                s.tc_s,
+                s.end_s,
+                s.excluded_reason is None,
+                None if s.excluded_reason is None else explain_exclusion(s.excluded_reason),
+            )
+            for s in bundle.strides.strides
+        ),
+        duration_s=_duration(bundle),
+        norm_note=TEST_NORM_NOTE
+        if by_trunk
+        else _norm_note(bundle) or norm_note(rows, panels, norms, controls),
+        norm_source=next((p.norm.source for p in panels if p.norm is not None), None),
+        curve_notes=curve_notes(bundle, panels),
+        angle_zero=None if angles is None else angles.zero,
+        zero_offset_deg={}
+        if angles is None
+        else {k: float(np.degrees(v)) for k, v in angles.zero_offset.items() if k in angles.angles},
+        provenance=bundle.provenance,
+        estimator=estimator_view(bundle.estimator),
+        squats=squat_view(bundle),
+        functional=functional_view(bundle, age, sex),
+        limits=limits_view(flags) if flags else None,
+        headline=None
+        if bundle.repetitions is not None or bundle.activity is not None or by_trunk
+        else _headline(bundle, quality, choose_zero(rows, _list_anatomical(panels)), norms, flags),
+        daily=daily_life_view(bundle.activity),
+        profile=None
+        if curves is None
+        else profile_view(
+            _scores(bundle, curves, age),
+            None
+            if (matched := adult_reference_at_speed(age, norms.speed)) is None
+            else _scores(bundle, curves, age, matched),
+        ),
+    )
+
+
+def _list_anatomical(panels: Sequence[CurvePanel]) -> set[str]:
+    return {p.variable.name for p in panels if p.zero == "anatomical"}
+
+
+def _scores(
+    bundle: Bundle, curves: CycleCurves, age: float | None, reference: CurveReference | None = None
+) -> Scores:
+    standing = {} if bundle.angles is None else bundle.angles.standing_deg
+    unsure = list_estimated_variables(bundle.estimator)
+    return score_curves(curves, standing, reference, estimated=unsure, age=age)
+
+
+def _judge_limits(
+    bundle: Bundle,
+    curves: CycleCurves | None,
+    height_m: float | None,
+    age: float | None,
+    own: Norms | None,
+) -> tuple[Flag, ...]:
+    """Values against limits, none where no stride counts. Estimated angles are not held against anything."""
+    if not bundle.strides.select_used():
+        return ()
+    unsure = list_estimated_variables(bundle.estimator)
+    if curves is not None:
+        measured = {v: c for v, c in curves.curves.items() if v not in unsure}
+        curves = replace(curves, curves=measured)
+    standing = {} if bundle.angles is None else bundle.angles.standing_deg
+    return judge_flags(curves, bundle.parameters, standing, height_m, own, age)
+
+
+def _headline(
+    bundle: Bundle,
+    quality: QualityBox,
+    rows: Sequence[ParameterRow],
+    norms: Norms,
+    flags: Sequence[Flag],
+) -> Headline:
+    """Poor data say nothing of the person: then the badge alone speaks."""
+    badge = say_badge(quality.kind, bundle.strides)
+    if quality.kind == "bad":
+        return Headline(badge)
+    standouts, looked_at = find_standouts(rows, norms, flags)
+    return Headline(badge, standouts, looked_at=looked_at)
+
+
+def round_curve(values: Floats | None) -> list[float | None] | None:
+    """A curve for the wire, to 0.01°; None where it has no value."""
+    if values is None:
+        return None
+    return [x if np.isfinite(x) else None for x in np.round(values, 2).tolist()]
+
+
+def _duration(bundle: Bundle) -> float:
+    if bundle.angles is not None and len(bundle.angles.t_s):
+        return float(bundle.angles.t_s[-1])
+    return float(bundle.quality.get("duration_s") or 0.0)
+
+
+def _norm_note(bundle: Bundle) -> str | None:
+    """What is said where nobody has a norm for the movement, None of walking."""
+    if bundle.activity is not None:
+        return "Daily life is held against no norm."
+    return NORM_NOTE if bundle.repetitions is not None else None
+
+
+def _warning(n: Notice) -> ReportWarning:
+    title = n.code.replace("_", " ").capitalize()
+    where = "" if n.sensor is None else f", {place_words(n.sensor)}"
+    return ReportWarning(
+        kind=_KINDS[n.severity],
+        code=n.code,
+        title=f"{title}{where}",
+        message=speak_places(n.message),
+        sensor=n.sensor,
+        t_s=n.t_s,
+    )
+
+
+def _key_number(row: ParameterRow) -> KeyNumber:
+    pair = row.both is None
+    norm = f"norm {row.norm}" if row.norm else ""
+    cells = {"": row.both} if row.both is not None else {" left": row.left, " right": row.right}
+    few = ", ".join(f"{c.few}{side}" for side, c in cells.items() if c is not None and c.few)
+    return KeyNumber(
+        name=row.name,
+        title=row.title,
+        unit=row.unit,
+        pair=pair,
+        text="" if row.both is None else row.both.text,
+        left="–" if row.left is None else row.left.text,
+        right="–" if row.right is None else row.right.text,
+        words=", ".join(w for w in (_plus_minus(row), few, row.difference, norm) if w),
+    )
+
+
+def _plus_minus(row: ParameterRow) -> str:
+    """What the numbers are known to: "± 0.02", of two sides "± 4 | 5" where they differ, "± 4 | –" of one."""
+    cells = (row.both,) if row.both is not None else (row.left, row.right)
+    found = ["" if c is None else c.plus_minus for c in cells]
+    if not any(found):
+        return ""
+    if len(set(found)) == 1:
+        return found[0]
+    return f"± {' | '.join(x.removeprefix('± ') or '–' for x in found)}"
+
+
+def _profile_json(profile: ProfileView) -> dict[str, object]:
+    rows = [{k: v for k, v in asdict(row).items() if k != "svg"} for row in profile.rows]
+    return {"rows": rows, "index": profile.index, "note": profile.note, "at_speed": profile.at_speed}
+
+
+def _panel_json(p: CurvePanel) -> dict[str, object]:
+    v = p.variable
+    return {
+        "variable": v.name,
+        "title": p.title,
+        "plane": v.plane,
+        "zero": p.zero,
+        "low_confidence": p.low_confidence,
+        "reason": p.reason,
+        "y_range_deg": v.y_range,
+        "up": v.up,
+        "down": v.down,
+        "norm": _band_json(p.norm),
+        "comfortable": _band_json(p.comfortable),
+        "norm_note": p.norm_note,
+        "sides": {side: _side_json(c) for side, c in p.sides.items()},
+    }
+
+
+def _band_json(band: NormBand | None) -> dict[str, object] | None:
+    if band is None:
+        return None
+    return {
+        "mean_deg": round_curve(band.mean_deg),
+        "sd_deg": round_curve(band.sd_deg),
+        "n": band.n,
+        "group": band.group,
+        "source": band.source,
+    }
+
+
+def _side_json(c: SideCurve) -> dict[str, object]:
+    return {
+        "n": c.n,
+        "mean_deg": round_curve(c.mean_deg),
+        "sd_deg": round_curve(c.sd_deg),
+        "foot_off_pct": c.foot_off_pct,
+        "foot_off_sd": c.foot_off_sd,
+    }

@@ -1,0 +1,149 @@
+"""What must be said beside tables and curves: who the norm's people are, what the zero is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from sagittal.core.norms.at_speed import ASKED, SOURCE
+from sagittal.core.norms.controls import ControlGroup
+from sagittal.core.norms.lookup import Norms
+from sagittal.core.norms.values import is_angle
+from sagittal.server.report.charts.panels import DRAWN_STRIDES, CurvePanel
+from sagittal.server.report.files.bundle import Bundle
+from sagittal.server.report.view.table import FEW_NOTE, ParameterRow
+from sagittal.server.report.words.estimator import estimator_view
+from sagittal.server.report.words.wording import GROUPS, NO_NORM, VARIABLES, format_number
+
+SPEED: Final = "gait_speed_mps"
+
+
+def norm_note(
+    rows: Sequence[ParameterRow],
+    panels: Sequence[CurvePanel],
+    norms: Norms,
+    controls: ControlGroup | None = None,
+) -> str:
+    """Who the reference people are, or why there are none; always something."""
+    sentences = []
+    if norms.reason is not None:
+        sentences.append(NO_NORM.get(norms.reason, norms.reason))
+    used = any(p.norm is not None and p.norm.zero == "anatomical" for p in panels)
+    angles = used or any(r.norm is not None and is_angle(r.name) for r in rows)
+    matched = bool(norms.comfortable_bands)
+    if matched and any(r.norm_group == ASKED for r in rows):
+        sentences.append(_matched_note(norms))
+    bands = norms.comfortable_bands if matched else norms.bands
+    band = next(iter(bands.values()), None)
+    if band is not None and angles:
+        who = GROUPS.get(band.group, band.group)
+        sentences.append(
+            f"{'Comfortable' if matched else 'Norm'}: {band.n} {who}, overground at their comfortable "
+            f"1.25 ± 0.16 m/s, mean ± 1 SD ({band.source})."
+        )
+    if norms.timing_reason is not None and norms.timing_reason != norms.reason:
+        sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
+    elif shown := [
+        r
+        for r in rows
+        if r.norm is not None
+        and r.norm_group != ASKED
+        and r.name != SPEED
+        and not is_angle(r.name)
+        and r.unit != "°"
+    ]:
+        sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
+    if any(r.norm_note == FEW_NOTE for r in rows):
+        sentences.append(FEW_NOTE)
+    if any(r.name == SPEED and r.norm is not None for r in rows):
+        usual = norms.values[SPEED]
+        sentences.append(f"Gait speed: {GROUPS.get(usual.group, usual.group)} ({usual.source}).")
+    if controls is not None:
+        sentences.append(_own_note(controls))
+    return " ".join(sentences)
+
+
+def _matched_note(norms: Norms) -> str:
+    """Who was asked to walk at this speed, and what they are not."""
+    at = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
+    return (
+        f"Norm: {ASKED}{at}, overground, mean ± 1 SD ({SOURCE}). They are not people who are slow from habit "
+        "or age."
+    )
+
+
+def _own_note(controls: ControlGroup) -> str:
+    """Who the clinic's own controls are, or that they are too few."""
+    if controls.reason is not None:
+        return f"Own controls who walk as fast: {controls.n}, too few to compare with."
+    small = ", a small group" if controls.note == "small_group" else ""
+    return f"Where no published norm compares: {controls.group}, {controls.n} people{small}."
+
+
+def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]:
+    """How to read the curves, in sentences: zero, offsets, confidence, what is drawn."""
+    if bundle.angles is None:
+        return ()
+    labels = {v.name: v.label.lower() for v in VARIABLES if v.plane == "sagittal"}
+    offsets = []
+    for name, value in bundle.angles.zero_offset.items():
+        if name not in bundle.angles.angles:
+            continue
+        base, _, suffix = name.rpartition("_")
+        side = {"l": " left", "r": " right"}.get(suffix)
+        label = labels.get(base if side else name)
+        if label is not None:
+            offsets.append(f"{label}{side or ''} {format_number(float(np.degrees(value)))}°")
+    about_zero = []
+    if any(p.zero == "standing" and p.reason is None for p in panels):
+        about_zero.append(
+            "Curves named from standing have the posture of the standing part at 0°. "
+            f"Subtracted: {', '.join(offsets)}. A person who stands bent gets curves shifted by that much."
+        )
+    if any(p.zero == "walking" and p.reason is None for p in panels):
+        about_zero.append(
+            "Nobody stood still in this take: these curves start from their own mean in straight walking. "
+            "Read their shape and range; they have no level."
+        )
+    if any(p.zero == "anatomical" and p.reason is None for p in panels):
+        about_zero.append(
+            "Curves named anatomical start from what the goniometer read in standing, as the norm does."
+        )
+    view = estimator_view(bundle.estimator)
+    notes = [
+        *about_zero,
+        *([view.estimated] if view is not None and view.estimated else []),
+        *_interrupted(panels),
+        *_norm_notes(panels),
+    ]
+    drawn = max((len(c.strides) for p in panels for c in p.sides.values()), default=0)
+    most = max((c.n for p in panels for c in p.sides.values()), default=0)
+    if most > drawn:
+        notes.append(
+            f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the take; means are of all."
+        )
+    return tuple(notes)
+
+
+def _interrupted(panels: Sequence[CurvePanel]) -> list[str]:
+    """Which curves have no value at some of their points."""
+    broken = [
+        p.variable.label
+        for p in panels
+        if any(c.mean_deg is not None and np.isnan(c.mean_deg).any() for c in p.sides.values())
+    ]
+    why = "interrupted where the leg model's knee rests on its limit in most strides"
+    return [f"{', '.join(broken).capitalize()}: {why}; nothing is measured there."] if broken else []
+
+
+def _norm_notes(panels: Sequence[CurvePanel]) -> list[str]:
+    """What must be said about the norm, once for all variables it concerns."""
+    concerned: dict[str, list[str]] = {}
+    for p in panels:
+        if p.norm_note and p.reason is None:
+            concerned.setdefault(p.norm_note, []).append(p.variable.label)
+    return [
+        f"{', '.join(labels).capitalize()}: {note[0].lower()}{note[1:]}" for note, labels in concerned.items()
+    ]

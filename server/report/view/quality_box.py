@@ -1,0 +1,300 @@
+"""Is the data good: the box above everything else, in words and a few numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, cast
+
+from sagittal.core.activity.parameters import WORN_H
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.plurals import plural
+from sagittal.core.quality import concern_paths_alone, find_shown_level
+from sagittal.core.quality.assessment import Verdict
+from sagittal.core.squat.repetitions import FOOT_LIFTED
+from sagittal.server.report.files.bundle import Bundle, is_functional
+from sagittal.server.report.words.estimator import estimator_view
+from sagittal.server.report.words.wording import format_number, place_words, speak_places
+
+CALIBRATION_METHODS: Final[Mapping[str, str]] = {
+    "walking_direction": "from standing and walking",
+    "gyro_pca": "from leg rotation",
+    "declared": "mounting as declared",
+    "neighbour": "guessed from neighbours",
+    "fixed_offset": "put on as agreed",
+    "table_top": "carried from a table",
+    "hip_swing": "from swings of the leg",
+    "trunk_bow": "from bows of the trunk",
+}
+"""Method of a calibration → words."""
+
+NO_WHOLE_DAY: Final = f"No day has {WORN_H:g} hours of wear time, so no values per day are reported."
+IN_DOUBT: Final = "Numbers are withheld or in doubt."
+
+
+@dataclass(frozen=True)
+class QualityItem:
+    """One fact: a text, or a count of strides per side.
+
+    Parameters
+    ----------
+    kind : ok, warn or bad where it is a judgement. page : of the session, where more about it stands.
+    """
+
+    label: str
+    value: str = ""
+    extra: str = ""
+    kind: str | None = None
+    page: str | None = None
+    sides: bool = False
+    left: int = 0
+    left_of: int = 0
+    right: int = 0
+    right_of: int = 0
+
+
+@dataclass(frozen=True)
+class QualityBox:
+    """Verdict (`kind` ok, warn, bad and its word) and the facts behind it.
+
+    Parameters
+    ----------
+    reason : why the data are not good, in sentences; empty where they are.
+    more : warnings beside that reason.
+    """
+
+    kind: str
+    word: str
+    items: tuple[QualityItem, ...]
+    reason: str = ""
+    more: int = 0
+
+
+def quality_box(bundle: Bundle) -> QualityBox:
+    """Judge a finished analysis.
+
+    Bad when the analysis stopped, no stride counts, the signals are poor or the pose estimator cannot stand
+    behind its result; warn when the signals are only usable, the estimator doubts, any stage has a warning or
+    no day of daily life is complete; else ok. A notice for information changes nothing.
+    """
+    kind, word = data_verdict(
+        bundle.quality, bundle.estimator, {n.severity for n in bundle.warnings}, bundle.parameters
+    )
+    items = [
+        *_counted(bundle),
+        *_signals(bundle.quality, rest=bundle.activity is None),
+        *_calibration(
+            bundle.calibration,
+            bundle.calibration_score,
+            needed=bundle.activity is None
+            and (
+                bool(bundle.strides.strides)
+                or not (_trunk_steps(bundle.parameters) or is_test(bundle.parameters))
+            ),
+        ),
+        *_estimator(bundle.estimator),
+    ]
+    reason, more = explain_verdict(kind, bundle)
+    return QualityBox(kind, word, tuple(items), reason, more)
+
+
+def explain_verdict(kind: str, bundle: Bundle) -> tuple[str, int]:
+    """Why the data are not good, and how many warnings there are besides.
+
+    What stopped the analysis goes first, then sensors that contradict each other, a sensor that failed, and
+    the first of the other warnings.
+    """
+    if kind == "ok":
+        return "", 0
+    daily = _daily_steps(bundle.parameters)
+    if kind == "warn" and daily is not None and not daily.n:
+        return NO_WHOLE_DAY, sum(n.severity == "warning" for n in bundle.warnings)
+    told = [n for n in bundle.warnings if n.severity in ("error", "warning")]
+    told.sort(key=lambda n: (n.severity != "error", n.code != "sensor_failed"))
+    health = None if bundle.estimator is None else bundle.estimator["verdict"]
+    reasons = tuple(bundle.quality.get("reasons", ()))
+    if kind == "bad" and health == "bad" and reasons and not (told and told[0].severity == "error"):
+        return speak_places(reasons[-1]), len(told)
+    if told:
+        return speak_places(told[0].message), len(told) - 1
+    if reasons:
+        return speak_places(reasons[0]), 0
+    return (IN_DOUBT if kind == "bad" else ""), 0
+
+
+def data_verdict(
+    quality: Mapping[str, Any],
+    estimator: Mapping[str, Any] | None,
+    severities: Collection[str],
+    parameters: Sequence[Parameter],
+) -> tuple[str, str]:
+    """Shape (ok, warn, bad) and word for the data of an analysis; the same in every list and on its page.
+
+    Parameters
+    ----------
+    quality, estimator : of analysis.json. severities : of its notices. parameters : as they count.
+    """
+    health = None if estimator is None else cast("Verdict", estimator["verdict"])
+    level = find_shown_level(quality.get("level", "good"), health)
+    if "error" in severities:
+        return "bad", "Analysis stopped"
+    squats = _squats(parameters)
+    if squats and not any(p.n for p in squats):
+        return "bad", "No squats"
+    if is_test(parameters):
+        total = next((p for p in parameters if is_functional(p.name) and p.mean is not None), None)
+        if total is None:
+            return "bad", "Test not found"
+    walked = (
+        is_test(parameters)
+        or any(p.name == "stride_time_s" and p.n for p in parameters)
+        or _trunk_steps(parameters)
+    )
+    daily = _daily_steps(parameters)
+    if not squats and daily is None and not walked:
+        return "bad", "No strides"
+    if level == "poor":
+        return "bad", "Poor data" if estimator is None or health != "bad" else _name_bad_estimate(estimator)
+    if level == "usable" or "warning" in severities:
+        return "warn", "Usable, see notices"
+    if daily is not None and not daily.n:
+        return "warn", "No complete day"
+    return "ok", "Good data"
+
+
+def _name_bad_estimate(estimator: Mapping[str, Any]) -> str:
+    """What disagrees: the sensors, or the path of a foot with its own rests."""
+    bad = [f["name"] for f in estimator.get("health", ()) if f["verdict"] == "bad"]
+    return "Foot path in doubt" if concern_paths_alone(bad) else "Sensors disagree"
+
+
+def _trunk_steps(parameters: Sequence[Parameter]) -> int:
+    """Steps that a trunk sensor told, where no foot carries one."""
+    return next((int(p.mean) for p in parameters if p.name == "step_count" and p.mean is not None), 0)
+
+
+def is_test(parameters: Sequence[Parameter]) -> bool:
+    """Is the take a functional test?"""
+    return any(is_functional(p.name) for p in parameters)
+
+
+def _squats(parameters: Sequence[Parameter]) -> list[Parameter]:
+    """The depth of each leg of a take of squats, with the number of those that count; none of any other."""
+    return [p for p in parameters if p.name == "squat_depth_deg"]
+
+
+def _daily_steps(parameters: Sequence[Parameter]) -> Parameter | None:
+    """Steps a day of a take of daily life, with the number of days behind them; None of any other take."""
+    return next((p for p in parameters if p.name == "daily_step_count"), None)
+
+
+def _counted(bundle: Bundle) -> list[QualityItem]:
+    """Strides of the feet, or steps of the trunk where there are none; of squats those that count.
+
+    Of daily life the hours worn, and the days that were worn long enough.
+    """
+    if bundle.activity is not None:
+        worn = sum(day.worn_h for day in bundle.activity.days)
+        whole, days = _daily_steps(bundle.parameters), len(bundle.activity.days)
+        return [
+            QualityItem("Worn", f"{format_number(worn, 1)}\u202fh"),
+            QualityItem(
+                "Days that count", f"{0 if whole is None else whole.n} of {days}", "worn 10 h or longer"
+            ),
+        ]
+    if is_test(bundle.parameters) and not bundle.strides.strides:
+        return []
+    squats = _squats(bundle.parameters)
+    if squats:
+        done = [p for p in squats if p.n] or squats
+        if len(done) == 1:
+            return [QualityItem("Squats used", str(done[0].n), f"{done[0].side} leg")]
+        return [_squats_of_both(bundle)]
+    steps = _trunk_steps(bundle.parameters)
+    if steps and not bundle.strides.strides:
+        return [QualityItem("Steps", str(steps), "trunk sensor")]
+    return [_strides(bundle)]
+
+
+def _squats_of_both(bundle: Bundle) -> QualityItem:
+    own = [r for r in bundle.repetitions or () if r.excluded != FOOT_LIFTED]
+    left, right = ([r for r in own if r.side == side] for side in ("left", "right"))
+    return QualityItem(
+        "Squats used",
+        sides=True,
+        left=sum(r.excluded is None for r in left),
+        left_of=len(left),
+        right=sum(r.excluded is None for r in right),
+        right_of=len(right),
+    )
+
+
+def _strides(bundle: Bundle) -> QualityItem:
+    left, right = ([s for s in bundle.strides.strides if s.side == side] for side in ("left", "right"))
+    return QualityItem(
+        "Strides used",
+        sides=True,
+        left=sum(s.excluded_reason is None for s in left),
+        left_of=len(left),
+        right=sum(s.excluded_reason is None for s in right),
+        right_of=len(right),
+    )
+
+
+def _signals(quality: Mapping[str, Any], *, rest: bool) -> list[QualityItem]:
+    """Lost samples of the worst sensor, magnetic field, and rest where the analysis looked for it."""
+    items = []
+    sensors = [s for s in quality.get("sensors", ()) if isinstance(s, Mapping)]
+    lost = [(float(s["lost_pct"]), _sensor_name(s)) for s in sensors if s.get("lost_pct") is not None]
+    if lost:
+        worst, name = max(lost)
+        extra = "" if worst == 0 else f"at most, {name}"
+        items.append(QualityItem("Lost samples", f"{format_number(worst, 1)} %", extra))
+    still = quality.get("rest_s") if rest else None
+    if still is not None:
+        total = sum(end - start for start, end in still)
+        times = f"in {len(still)} parts" if len(still) > 1 else ""
+        items.append(QualityItem("Standing still", f"{format_number(total, 1)} s", times))
+    magnetic = [float(s["magnetic_pct"]) for s in sensors if s.get("magnetic_pct") is not None]
+    if magnetic:
+        share = f"disturbed {format_number(max(magnetic))} % of the time" if max(magnetic) >= 1 else "steady"
+        items.append(QualityItem("Magnetic field", share, "not used"))
+    return items
+
+
+def _calibration(
+    calibration: Mapping[str, Any] | None, score: Mapping[str, Any] | None, *, needed: bool
+) -> list[QualityItem]:
+    """How it was done and how many of its checks it passes, and what an angle of zero is."""
+    if calibration is None:
+        # steps of a trunk sensor are read from it as it sits
+        return [] if not needed else [QualityItem("Calibration", "not reached", kind="bad")]
+    method = CALIBRATION_METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
+    if calibration.get("posture") == "walking" and calibration["method"] == "walking_direction":
+        method = "from walking alone"
+    judged = [c["verdict"] for c in (score or {"checks": ()})["checks"] if c["verdict"] != "not_judged"]
+    if judged:
+        passed = judged.count("pass")
+        kind = None if passed == len(judged) else "warn"
+        value = f"{passed} of {len(judged)} {plural(len(judged), 'check', 'checks')}"
+        items = [QualityItem("Calibration", value, method, kind=kind, page="calibration")]
+    else:
+        items = [QualityItem("Calibration", method)]
+    if calibration.get("posture", "standing") == "walking":
+        items.append(QualityItem("Posture", "from walking", "no usable standing", kind="warn"))
+    if calibration.get("angle_zero") is not None:
+        items.append(QualityItem("Angle zero", str(calibration["angle_zero"])))
+    return items
+
+
+def _estimator(section: Mapping[str, Any] | None) -> list[QualityItem]:
+    view = estimator_view(section)
+    if view is None:
+        return []
+    extra = view.reduced or view.verdict
+    kind = None if view.kind == "ok" and view.reduced is None else view.kind
+    return [QualityItem("Poses by", view.name, extra, kind="warn" if kind == "ok" else kind, page="data")]
+
+
+def _sensor_name(sensor: Mapping[str, Any]) -> str:
+    return place_words(str(sensor.get("segment") or sensor.get("device_id") or ""))

@@ -1,0 +1,95 @@
+"""What was checked of every sensor's clock and place, in words; also where nothing could be judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from sagittal.server.report.words.wording import format_number, place_words
+
+NOT_JUDGED: Final = "cannot be judged"
+
+
+@dataclass(frozen=True)
+class SensorCheck:
+    """One sensor: words for its clock and its place, with a kind (ok, warn, or none where not judged)."""
+
+    sensor: str
+    clock: str
+    clock_kind: str
+    place: str
+    place_kind: str
+
+
+@dataclass(frozen=True)
+class SensorChecks:
+    """All sensors of a take.
+
+    Parameters
+    ----------
+    exchanged : pairs that were found on each other's segments, in words; empty where none.
+    notes : what the table cannot say, in sentences.
+    """
+
+    rows: tuple[SensorCheck, ...]
+    exchanged: str
+    notes: tuple[str, ...]
+
+
+def sensor_checks(found: Mapping[str, Any] | None) -> SensorChecks | None:
+    """View of `agreement` in analysis.json; None where an older version wrote it or one sensor was worn."""
+    if found is None or len(found["sensors"]) < 2:
+        return None
+    rows = tuple(_row(s) for s in found["sensors"])
+    pairs = [f"{place_words(a)} and {place_words(b)}" for a, b in found["exchanged"]]
+    unclear = [s for s in found["sensors"] if s.get("place_judged_s") is None]
+    notes = []
+    if any(s["sensor"] == "pelvis" for s in unclear):
+        notes.append(
+            "A slip of the pelvis sensor cannot be seen: in walking its hips move by ± 10° anyway. "
+            "Compare hip angles with care if its belt was loose."
+        )
+    if any(s["sensor"] != "pelvis" for s in unclear):
+        notes.append(
+            "That a sensor stayed is said where a slip would have been seen for most of the walk. Stand "
+            "still before and after it, or walk for longer."
+        )
+    if not all(s["clock_judged"] for s in found["sensors"]):
+        notes.append("A clock is judged where a neighbour across a hip, knee or ankle is worn, in walking.")
+    if len(unclear) < len(found["sensors"]):
+        notes.append("Straps that loosen slowly, and a second slip of a sensor, are not found.")
+    return SensorChecks(rows, "; ".join(pairs), tuple(notes))
+
+
+def _row(s: Mapping[str, Any]) -> SensorCheck:
+    return SensorCheck(place_words(str(s["sensor"])).capitalize(), *_clock(s), *_place(s))
+
+
+def _clock(s: Mapping[str, Any]) -> tuple[str, str]:
+    done = "put right" if s["shifted"] else "left so"
+    if s["drift_ms"] is not None:
+        which = "slow" if s["drift_ms"] > 0 else "fast"
+        return (
+            f"Clock runs {which}, {format_number(abs(s['drift_ms']))}\u202fms over the take, {done}",
+            "warn",
+        )
+    if s["lag_ms"] is not None:
+        which = "late" if s["lag_ms"] > 0 else "early"
+        return f"Clock {format_number(abs(s['lag_ms']))}\u202fms {which}, {done}", "warn"
+    if s.get("clock_doubted"):
+        return "Clock seems wrong, see notices", "warn"
+    return ("Clock agrees", "ok") if s["clock_judged"] else (f"Clock {NOT_JUDGED}", "")
+
+
+def _place(s: Mapping[str, Any]) -> tuple[str, str]:
+    if s["slip_deg"] is not None:
+        return (
+            f"Slipped {format_number(abs(s['slip_deg']))}° about {format_number(s['slip_at_s'])}\u202fs",
+            "warn",
+        )
+    # an older version did not say from when to when it could judge
+    if (judged := s.get("place_judged_s")) is None:
+        return f"Place {NOT_JUDGED}", ""
+    start, end = (format_number(x) for x in judged)
+    return f"Stayed from {start} to {end}\u202fs", "ok"

@@ -1,0 +1,213 @@
+"""A take of squats on the session page: every repetition, and the courses of the legs' angles over it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.squat.curves import VALGUS, cut_curves
+from sagittal.core.squat.repetitions import FOOT_LIFTED
+from sagittal.server.report.charts.curves import SQUAT, cycle_svg
+from sagittal.server.report.charts.panels import CurvePanel, SideCurve
+from sagittal.server.report.files.bundle import Bundle, StoredRepetition
+from sagittal.server.report.words.wording import Variable, explain_repetition, format_number
+
+HEIGHT: Final = 158
+"""Of a chart, px."""
+
+BEND: Final = ((-30.0, 130.0), (0.0, 30.0, 60.0, 90.0, 120.0), "Flexion", "Extension")
+FOOT: Final = ((-20.0, 60.0), (-20.0, 0.0, 20.0, 40.0, 60.0), "Dorsiflexion", "Plantarflexion")
+IN: Final = ((-20.0, 40.0), (-20.0, 0.0, 20.0, 40.0), "Inward", "Outward")
+ASIDE: Final = ((-25.0, 25.0), (-20.0, 0.0, 20.0), "Adduction", "Abduction")
+TURN: Final = ((-30.0, 30.0), (-30.0, 0.0, 30.0), "Internal", "External")
+
+VARIABLES: Final = (
+    Variable("knee_flexion", "Knee flexion", "sagittal", *BEND),
+    Variable("hip_flexion", "Hip flexion", "sagittal", *BEND),
+    Variable("ankle_dorsiflexion", "Ankle dorsiflexion", "sagittal", *FOOT),
+    Variable(VALGUS, "Dynamic knee valgus", "frontal", *IN),
+    Variable("hip_adduction", "Hip adduction", "frontal", *ASIDE),
+    Variable("hip_rotation", "Hip rotation", "transverse", *TURN),
+)
+"""Charts of a squat; the knee bends further than in walking, so the axes are their own."""
+
+NORM_NOTE: Final = "Squats have no norm."
+
+SURE: Final = ("knee_flexion", "hip_flexion", "ankle_dorsiflexion")
+"""Of the others the level is not, or less surely, known (docs/science/squat.md, "Limits")."""
+
+
+UNSURE_FIGURES: Final = ("squat_knee_valgus", "squat_hip_adduction", "squat_hip_rotation")
+"""Beginnings of the figures that are read from these others."""
+
+
+@dataclass(frozen=True)
+class RepetitionRow:
+    """One squat in words; `excluded` says why it does not count, and then the numbers are empty.
+
+    Parameters
+    ----------
+    number : among the squats of its leg.
+    """
+
+    number: int
+    side: Side
+    start: str
+    depth: str
+    valgus: str
+    drop: str
+    duration: str
+    excluded: str | None
+
+
+@dataclass(frozen=True)
+class SquatSpan:
+    """When a squat was, for the clock of the page, s."""
+
+    side: Side
+    start_s: float
+    end_s: float
+    used: bool
+
+
+@dataclass(frozen=True, eq=False)
+class SquatView:
+    """The squats of a take.
+
+    Parameters
+    ----------
+    sides : legs that squatted. rows : in order of time. used : leg → squats that count.
+    lifted : leg → bends of its knee with the foot off the floor, which are no squats of it.
+    charts : titles and drawings, empty without a squat that counts. means_deg : variable → leg → (101,).
+    spans : of all rows.
+    """
+
+    sides: tuple[Side, ...]
+    rows: tuple[RepetitionRow, ...]
+    used: Mapping[Side, int]
+    lifted: Mapping[Side, int]
+    charts: tuple[dict[str, object], ...]
+    means_deg: Mapping[str, Mapping[Side, Floats]]
+    spans: tuple[SquatSpan, ...]
+
+    @property
+    def title(self) -> str:
+        """Which legs squatted."""
+        return f"{self.sides[0]} leg" if len(self.sides) == 1 else "both legs"
+
+    @property
+    def not_listed(self) -> str:
+        """What was left out of the rows, in a sentence; empty where there is nothing."""
+        legs = [f"{n} of the {side} knee" for side, n in self.lifted.items() if n]
+        if not legs:
+            return ""
+        return f"Bends with the foot off the floor are no squats: {' and '.join(legs)}."
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values; curves lie in angles.parquet, every figure in repetitions.csv."""
+        return {
+            "sides": self.sides,
+            "used": self.used,
+            "bends_with_lifted_foot": self.lifted,
+            "repetitions": [vars(row) for row in self.rows],
+        }
+
+
+def squat_view(bundle: Bundle) -> SquatView | None:
+    """The squats of a finished analysis; None of another movement, and where nobody squatted."""
+    found = [r for r in bundle.repetitions or () if r.excluded != FOOT_LIFTED]
+    if not found:
+        return None
+    lifted = Counter(r.side for r in bundle.repetitions or () if r.excluded == FOOT_LIFTED)
+    numbers: Counter[Side] = Counter()
+    rows = []
+    for r in found:
+        numbers[r.side] += 1
+        rows.append(_row(numbers[r.side], r))
+    curves = {
+        side: _curves(bundle, side, [r for r in found if r.side == side and r.excluded is None])
+        for side in SIDES
+        if numbers[side]
+    }
+    panels = [p for v in VARIABLES if (p := _panel(v, curves)) is not None]
+    return SquatView(
+        sides=tuple(curves),
+        rows=tuple(rows),
+        used={side: sum(r.excluded is None for r in found if r.side == side) for side in curves},
+        lifted={side: lifted[side] for side in SIDES if lifted[side]},
+        charts=tuple(
+            {
+                "title": p.title,
+                "zero": "",
+                "low": p.low_confidence,
+                "reason": p.reason,
+                "svg": cycle_svg(p, height=HEIGHT, x_unit=True, over=SQUAT),
+            }
+            for p in panels
+        ),
+        means_deg={
+            p.variable.name: {s: c.mean_deg for s, c in p.sides.items() if c.mean_deg is not None}
+            for p in panels
+        },
+        spans=tuple(SquatSpan(r.side, r.start_s, r.end_s, r.excluded is None) for r in found),
+    )
+
+
+def _row(number: int, r: StoredRepetition) -> RepetitionRow:
+    def words(name: str, digits: int) -> str:
+        return format_number(r.values[name], digits) if name in r.values else "–"
+
+    return RepetitionRow(
+        number=number,
+        side=r.side,
+        start=format_number(r.start_s, 1),
+        depth=words("squat_depth_deg", 0),
+        valgus=words("squat_knee_valgus_deg", 0),
+        drop=words("squat_hip_drop_m", 2),
+        duration=words("squat_duration_s", 1),
+        excluded=None if r.excluded is None else explain_repetition(r.excluded),
+    )
+
+
+def _curves(bundle: Bundle, side: Side, counted: Sequence[StoredRepetition]) -> dict[str, Floats]:
+    """Variable → (counted, 101) degrees."""
+    if bundle.angles is None or not counted:
+        return {}
+    found = cut_curves(bundle.angles, side, [(r.start_s, r.end_s) for r in counted])
+    return {name: np.degrees(rows) for name, rows in found.items()}
+
+
+def _panel(variable: Variable, curves: Mapping[Side, Mapping[str, Floats]]) -> CurvePanel | None:
+    """The courses of a variable over the squats of every leg; None where no leg has it."""
+    legs = {side: of_leg[variable.name] for side, of_leg in curves.items() if variable.name in of_leg}
+    if not legs:
+        return None
+    sides, first = {}, 0
+    for side, rows in legs.items():
+        known: Sequence[int] = np.flatnonzero(np.isfinite(rows).all(axis=1)).tolist()
+        if known:
+            sides[side] = SideCurve(
+                mean_deg=rows[known].mean(axis=0),
+                sd_deg=rows[known].std(axis=0, ddof=1) if len(known) > 1 else None,
+                n=len(known),
+                strides={first + i: rows[i] for i in known},
+                foot_off_pct=None,
+                foot_off_sd=None,
+            )
+        first += len(rows)
+    return CurvePanel(
+        variable=variable,
+        title=variable.label,
+        zero="standing",
+        added_deg={},
+        low_confidence=variable.name not in SURE,
+        reason=None if sides else "not known throughout any squat",
+        norm=None,
+        norm_note="",
+        sides=sides,
+    )

@@ -1,0 +1,1 @@
+"""How figures, findings and devices are named in sentences."""

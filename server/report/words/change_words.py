@@ -1,0 +1,123 @@
+"""A change between two sessions in words: how much, beyond measurement error or not, relevant or not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+from sagittal.core.change import NOT_MEASURED_ALIKE, UNLIKE, Change
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.variability import TOO_FEW
+from sagittal.server.report.words.wording import Term, format_number, parameter_term, title_of
+
+VERDICTS: Final[Mapping[str, str]] = {
+    "within_measurement_error": "within measurement error",
+    "real_change": "real change",
+    "clinically_relevant": "real change, clinically relevant",
+}
+"""Verdict → words (docs/science/change.md, "Verdict")."""
+
+NO_LIMIT: Final = "no measurement error known"
+SHORT: Final[Mapping[str, str]] = {NO_LIMIT: "no limit known"}
+TOO_FEW_WORDS: Final = "too few strides to compare"
+NOT_ALIKE_WORDS: Final = "not compared: one is measured, the other estimated"
+UNLIKE_WORDS: Final = "not judged, the conditions differ"
+
+SCORE_TERMS: Final[Mapping[str, Term]] = {
+    "gps_sagittal_deg": Term(
+        "Sagittal profile score", "°", "Distance from healthy adults", 1, (0, 20), ("larger", "smaller")
+    ),
+    "gdi_star_sagittal": Term(
+        "GDI*, sagittal", "points", "Distance from healthy adults", 0, (40, 120), ("larger", "smaller")
+    ),
+}
+"""Scores that are followed over visits, after the parameters: shape of the curves, offsets removed."""
+
+
+@dataclass(frozen=True)
+class ChangeWords:
+    """A change as a table or a chart says it.
+
+    Parameters
+    ----------
+    size : "+0.22" or "0.00" in the unit of the figure. mark : "up" or "down" beyond the measurement error,
+        "" within it, "none" where no verdict is possible.
+    verdict : in words. limits : the limits behind it with their sources, in sentences.
+    about : what changed where that is not the number beside it, else "".
+    """
+
+    side: str | None
+    size: str
+    mark: str
+    verdict: str
+    limits: tuple[str, ...]
+    about: str = ""
+
+    @property
+    def short(self) -> str:
+        """The verdict in two words where there are such."""
+        if self.mark in {"up", "down"}:
+            return "changed"
+        return "within error" if not self.mark else SHORT.get(self.verdict, self.verdict)
+
+
+def find_term(name: str, unit: str = "") -> Term:
+    """How a figure is called; one without wording shows its own name."""
+    if name in CATALOGUE:
+        term = parameter_term(name)
+        return replace(term, label=title_of(name, term.label))
+    known = SCORE_TERMS.get(name)
+    shown = "°" if unit == "deg" else unit
+    return known or Term(name, shown, "Other", 2, (0.0, 1.0), ("larger", "smaller"))
+
+
+def change_words(change: Change) -> ChangeWords:
+    """Say a change in words."""
+    term = find_term(change.name, change.unit)
+    if change.difference is None:
+        said = NOT_ALIKE_WORDS if change.reason == NOT_MEASURED_ALIKE else "not measured in both"
+        return ChangeWords(change.side, "–", "none", said, limit_words(change))
+    mark = "none" if change.verdict is None else ""
+    if change.verdict in {"real_change", "clinically_relevant"}:
+        mark = "up" if change.difference > 0 else "down"
+    return ChangeWords(
+        change.side, format_difference(change.difference, term), mark, _verdict(change), limit_words(change)
+    )
+
+
+def format_difference(difference: float, term: Term) -> str:
+    """A difference with its sign, "+0.22"; without one where it rounds to nothing."""
+    text = format_number(difference, term.digits)
+    return f"+{text}" if difference > 0 and float(f"{difference:.{term.digits}f}") else text
+
+
+def limit_words(change: Change) -> tuple[str, ...]:
+    """The limits of a figure with their sources, whoever they were found on."""
+    term = find_term(change.name, change.unit)
+    unit = "" if not term.unit else term.unit if term.unit in "°%" else f"\u202f{term.unit}"
+    said = []
+    if change.limit is not None:
+        people = f" ({change.people})" if change.people else ""
+        said.append(f"MDC {format_limit(change.limit, term)}{unit}: {change.limit_source}{people}.")
+    if change.mcid is not None:
+        said.append(f"MCID {format_limit(change.mcid, term)}{unit}: {change.mcid_source}.")
+    return tuple(said)
+
+
+def format_limit(limit: float, term: Term) -> str:
+    """A limit of change without its unit: a decimal more than tenths need, metres in millimetres."""
+    return format_number(limit, max(term.digits, 3 if term.unit == "m" else 1))
+
+
+def _verdict(change: Change) -> str:
+    if change.verdict is None:
+        return {TOO_FEW: TOO_FEW_WORDS, UNLIKE: UNLIKE_WORDS}.get(change.reason or "", NO_LIMIT)
+    said = VERDICTS[change.verdict]
+    if change.verdict == "real_change" and change.mcid is not None:
+        said += ", smaller than clinically relevant"
+    if change.verdict != "within_measurement_error" and change.towards_norm is not None:
+        said += ", towards the norm" if change.towards_norm else ", away from the norm"
+    if change.note == "from_standing":
+        said += "; includes how the person stood"
+    return said

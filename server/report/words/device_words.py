@@ -1,0 +1,83 @@
+"""What is said of a sensor by its checks: a verdict, why, what to do (docs/science/devices.md, "Limits")."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import degrees
+from typing import Final
+
+from sagittal.core.quality.device_course import DeviceCourse, DeviceFinding
+from sagittal.core.quality.devices import DeviceCheck
+from sagittal.server.report.words.wording import format_number
+from sagittal.web.words import day
+
+NOT_MEASURED: Final = {
+    "no_rest": "It was never at rest for a second. Let the person stand still at the start.",
+    "no_gyroscope": "It sent no rate of turn.",
+    "unit_suspect": "What it reads at rest cannot be gravity. Check the unit of the export.",
+}
+"""Reason of a check → a sentence."""
+
+ADVICE: Final = {
+    "gyro_bias": "Let it warm up for ten minutes and record again; if it stays, recalibrate it.",
+    "scale": "Let it warm up for ten minutes and record again; if it stays, recalibrate its accelerometer.",
+    "scale_off": "Recalibrate its accelerometer.",
+    "gyro_noise": "Check strap and case. A trembling wearer does this too.",
+    "acc_noise": "Check strap and case. A trembling wearer does this too.",
+}
+"""Quantity of a finding → what to do."""
+
+
+@dataclass(frozen=True)
+class DeviceVerdict:
+    """What people read of a sensor.
+
+    Parameters
+    ----------
+    kind : look of the state, "ok", "warn" or "none". reasons : sentences, each with what to do.
+    """
+
+    kind: str
+    word: str
+    reasons: tuple[str, ...]
+
+
+def judge_device(
+    course: DeviceCourse, checks: Sequence[DeviceCheck], days: Sequence[dt.date]
+) -> DeviceVerdict:
+    """Put a course in words; `checks` and their `days` are the ones it was followed over."""
+    if course.newest is None:
+        return DeviceVerdict("none", "Not measured", (NOT_MEASURED[checks[-1].reason or "no_rest"],))
+    late: tuple[str, ...] = ()
+    if checks[-1].reason is not None:
+        said = NOT_MEASURED[checks[-1].reason]
+        late = (f"Measured last on {day(days[course.newest])}, not in its newest take. {said}",)
+    if course.findings:
+        told = [_tell(f, days) for f in course.findings]
+        others = ["" if what == told[0] else f"{what}. " for what in told]
+        reasons = [f"{what}{ADVICE[f.quantity]}" for what, f in zip(others, course.findings, strict=True)]
+        return DeviceVerdict("warn", told[0], (*reasons, *late))
+    if course.compared == 0:
+        return DeviceVerdict("none", "First check", ("There is nothing to compare with yet.", *late))
+    return DeviceVerdict("ok", "Steady", late)
+
+
+def _tell(f: DeviceFinding, days: Sequence[dt.date]) -> str:
+    since = "" if f.since is None else f" since {day(days[f.since])}"
+    if f.quantity == "gyro_bias":
+        return f"Bias moved by {format_number(degrees(f.value), 1)} °/s{since}"
+    if f.quantity == "scale":
+        percent = format_number(100 * abs(f.value), 1)
+        if f.since is None:
+            return f"Gravity reads {percent} % more" if f.value > 0 else f"Gravity reads {percent} % less"
+        moved = day(days[f.since])
+        if f.value > 0:
+            return f"Gravity reads {percent} % more since {moved}"
+        return f"Gravity reads {percent} % less since {moved}"
+    if f.quantity == "scale_off":
+        way = "much" if f.value > 0 else "little"
+        return f"Gravity reads {format_number(100 * abs(f.value), 1)} % too {way}"
+    what = "Gyroscope" if f.quantity == "gyro_noise" else "Accelerometer"
+    return f"{what} noise {format_number(f.value, 1)} times its usual{since}"

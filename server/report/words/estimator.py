@@ -1,0 +1,193 @@
+"""Which pose estimator ran, on what, and what it measured about itself, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from sagittal.core.estimators import (
+    AUTO,
+    BY_METHOD,
+    BY_NAME,
+    NO_FIGURE,
+    NO_FIGURE_LABEL,
+    NO_FIGURE_NOTE,
+    PaperReference,
+)
+from sagittal.server.report.words.wording import format_number, place_words
+
+KINDS: Final[Mapping[str, str]] = {"good": "ok", "warn": "warn", "bad": "bad"}
+VERDICTS: Final[Mapping[str, str]] = {"good": "consistent", "warn": "doubtful in part", "bad": "inconsistent"}
+NOT_JUDGED: Final = "does not check itself"
+"""Of an estimator that has no quantity with a limit."""
+
+REDUCED: Final[Mapping[str, str]] = {
+    "sensor_failed": "reduced: a sensor failed in this take",
+    "not_calibrated": "reduced: which way a sensor faces is not known",
+    "no_standing": "none: no usable standing in this take",
+    "estimator_failed": "reduced: the better estimator could not finish",
+}
+
+QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
+    "joint_residual_mm": ("Joint ends apart", 0, "mm"),
+    "zero_velocity_refused_pct": ("Rests refused", 1, "%"),
+    "contact_pct": ("Foot at rest, of the take", 0, "%"),
+    "longest_moving_s": ("Longest without rest", 1, "s"),
+    "climb_pct": ("Floor rises or falls, of the way", 1, "%"),
+    "gap_s": ("Longest loss", 1, "s"),
+    "start_heading_off_deg": ("First heading off", 0, "°"),
+    "heading_sd_deg": ("Heading uncertain by", 1, "°"),
+    "min_eigenvalue": ("Smallest eigenvalue of P", 0, ""),
+    "forward_axis_turned_deg": ("Forward axis turned", 0, "°"),
+    "leg_excess_mm": ("Leg longer than it is", 1, "mm"),
+    "hinge_mm": ("Joint off its hinge", 1, "mm"),
+    "knee_straight_pct": ("Knee straight", 0, "%"),
+    "foot_turned_deg": ("Foot sensor turned", 0, "°"),
+    "feet_out_of_place_pct": ("Feet not under the hips", 0, "%"),
+    "phase_off_pct": ("Feet out of step by", 0, "% of a stride"),
+    "toward_foot_mps2": ("Pelvis falls toward the standing foot", 2, "m/s²"),
+    "inner_foot_m": ("Inner foot ahead in turns; up to the limit, sides are undecided", 2, "m/rad"),
+    "pelvis_rise_cm": ("Pelvis rises and sinks by", 0, "cm"),
+    "places_moved_mm": ("Places still moving by", 1, "mm"),
+    "pelvis_tilt_sd_deg": ("Pelvis tilt, standard deviation", 1, "°"),
+}
+"""Name of a finding → label, decimals, unit."""
+
+HIDDEN: Final = ("min_eigenvalue",)
+"""For those who check numbers: in analysis.json, not on the page."""
+
+
+@dataclass(frozen=True)
+class HealthRow:
+    """One measured quantity: the worst of its kind and where, its limit, and the verdict."""
+
+    label: str
+    where: str
+    text: str
+    limit: str
+    kind: str
+
+
+@dataclass(frozen=True)
+class EstimatorView:
+    """The estimator of an analysis.
+
+    Parameters
+    ----------
+    kind, verdict : ok, warn or bad and its word. reduced : words, None when the take allowed what is worn.
+    choices : (value, words, asked for now) of what can be asked for on these sensors.
+    estimated : sentence about angles that no two sensors measure, empty when there are none.
+    paper : where the method comes from; None = our own, or one that this version does not know.
+    """
+
+    name: str
+    meaning: str
+    sensors: int
+    kind: str
+    verdict: str
+    reduced: str | None
+    health: tuple[HealthRow, ...]
+    choices: tuple[tuple[str, str, bool], ...]
+    estimated: str
+    paper: PaperReference | None
+
+
+def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
+    """View of `estimator` in analysis.json; None when the analysis stopped before the poses."""
+    if e is None:
+        return None
+    name, verdict, asked = str(e["name"]), str(e["verdict"]), str(e["requested"])
+    reduced = e["reduced"]
+    judged = any(f["warn"] is not None or f["bad"] is not None for f in e["health"])
+    return EstimatorView(
+        name=method_label(name),
+        meaning=_method_note(name),
+        sensors=len(e["sensors"]),
+        kind=KINDS[verdict],
+        verdict=VERDICTS[verdict] if judged else NOT_JUDGED,
+        reduced=None if reduced is None else REDUCED.get(reduced, str(reduced)),
+        health=_rows(e["health"]),
+        choices=(
+            (AUTO, "Automatic: the best for what is worn", asked == AUTO),
+            *((x, choice_label(x), asked == x) for x in e["possible"]),
+        ),
+        estimated=_estimated(_told(list_estimated_angles(e), name)),
+        paper=BY_METHOD[name].paper if name in BY_METHOD else None,
+    )
+
+
+def method_label(method: str) -> str:
+    """Name of `Poses.method` as people read it; one that this version does not know as it is."""
+    known = BY_METHOD.get(method)
+    return known.label if known is not None else NO_FIGURE_LABEL if method == NO_FIGURE else method
+
+
+def choice_label(name: str) -> str:
+    """What a form offers as this estimator; one that this version does not know as it is."""
+    return BY_NAME[name].choice if name in BY_NAME else name
+
+
+def _method_note(method: str) -> str:
+    known = BY_METHOD.get(method)
+    return known.note if known is not None else NO_FIGURE_NOTE if method == NO_FIGURE else ""
+
+
+def list_estimated_angles(e: Mapping[str, Any] | None) -> frozenset[str]:
+    """Angles with their side that the estimator's model gives rather than two sensors."""
+    return frozenset() if e is None else frozenset(e["estimated_angles"])
+
+
+def list_estimated_variables(e: Mapping[str, Any] | None) -> frozenset[str]:
+    """The same without the side."""
+    return frozenset(a.removesuffix("_l").removesuffix("_r") for a in list_estimated_angles(e))
+
+
+def _told(angles: frozenset[str], method: str) -> frozenset[str]:
+    """Those that are a result: not what the model holds fixed."""
+    fixed = BY_METHOD[method].fixed if method in BY_METHOD else ()
+    return frozenset(a for a in angles if a.removesuffix("_l").removesuffix("_r") not in fixed)
+
+
+def _estimated(angles: frozenset[str]) -> str:
+    if not angles:
+        return ""
+    joints = sorted({a.split("_")[0] for a in angles})
+    sides = {"l": "left", "r": "right"}
+    on = sorted({sides[a[-1]] for a in angles if a[-2:] in ("_l", "_r")})
+    who = "both sides" if len(on) > 1 else f"the {on[0]} side" if on else "the pelvis"
+    return (
+        f"{', '.join(joints).capitalize()} angles of {who} are estimated by the leg model, not measured by "
+        "two sensors: low confidence."
+    )
+
+
+def _rows(health: list[Mapping[str, Any]]) -> tuple[HealthRow, ...]:
+    """The worst finding of each name, judged ones first."""
+    worst: dict[str, Mapping[str, Any]] = {}
+    for f in health:
+        was = worst.get(f["name"])
+        if was is None or f["value"] is None or (was["value"] is not None and f["value"] > was["value"]):
+            worst[f["name"]] = f
+    shown = [f for name, f in worst.items() if name not in HIDDEN]
+    shown.sort(key=lambda f: f["warn"] is None and f["bad"] is None)
+    return tuple(_row(f) for f in shown)
+
+
+def _row(f: Mapping[str, Any]) -> HealthRow:
+    name = str(f["name"])
+    label, digits, unit = QUANTITIES.get(name, (name.replace("_", " ").capitalize(), 2, ""))
+    gap = "" if unit == "°" else "\u202f"
+    limit = f["bad"] if f["warn"] is None else f["warn"]
+    where = " and ".join(place_words(part) for part in str(f["of"] or "").split("-") if part)
+    return HealthRow(
+        label=label,
+        where=where,
+        text="not measured"
+        if f["value"] is None
+        else f"{format_number(float(f['value']), digits)}{gap}{unit}",
+        limit=""
+        if limit is None
+        else f"≤ {format_number(float(limit), 0 if float(limit).is_integer() else digits)}{gap}{unit}",
+        kind=KINDS[str(f["verdict"])],
+    )

@@ -1,0 +1,1 @@
+"""Analyses, edits of them, and what is compared, prescribed and read from them."""

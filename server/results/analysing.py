@@ -1,0 +1,128 @@
+"""Files of a take in, result files out: what command line and worker run, without a database."""
+
+from __future__ import annotations
+
+import gc
+import json
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final
+
+from sagittal.core.signals.memory import give_memory_back
+from sagittal.server.provenance import CODE_VERSION
+
+if TYPE_CHECKING:
+    from sagittal.core.formats.source import SourceFile
+    from sagittal.core.pipeline import Progress, TakeAnalysis
+
+
+REPAIRED: Final = "repaired.json"
+"""The manifest that puts a wrong set-up right, where an analysis proposes one; nobody has confirmed it."""
+
+
+def run(
+    files: Sequence[SourceFile],
+    manifest: bytes | None,
+    config: Mapping[str, Any] | None,
+    progress: Progress,
+) -> dict[str, bytes]:
+    """Files of one take in, result files out (server/report/files/exports.py); as `analyse_files`."""
+    from sagittal.core.formats.json_tree import read_json
+    from sagittal.server.report.files.exports import analysis_files
+
+    results = [analyse_files(files, manifest, config, progress, resumable=False)]
+    setup = results[0].setup
+    # by no name here: what is written is let go of
+    found = analysis_files(results.pop(), give_memory_back)
+    if setup is not None and setup.can_be_applied:
+        declared = read_json(manifest) if manifest is not None else {}
+        assert isinstance(declared, dict)  # noqa: S101 - `parse_manifest` has read it
+        repaired = setup.complete_manifest(declared)
+        found[REPAIRED] = json.dumps(repaired, ensure_ascii=False, indent=1).encode()
+    return found
+
+
+def analyse_files(
+    files: Sequence[SourceFile],
+    manifest: bytes | None,
+    config: Mapping[str, Any] | None,
+    progress: Progress,
+    *,
+    resumable: bool = True,
+) -> TakeAnalysis:
+    """Files of one take through the whole chain; pure but for `progress`.
+
+    Parameters
+    ----------
+    manifest : JSON text, None = nothing declared.
+    config : overrides of PipelineConfig by stage, {"fusion": {"k_acc": 1.0}}; without any those of an archive
+        of a visit among the files, else the defaults.
+    resumable : as `sagittal.core.pipeline.analyse`.
+
+    Raises
+    ------
+    SagittalError
+        nothing can be analysed; the code and the sentence say why.
+    """
+    from sagittal.core.formats import read_recording
+    from sagittal.core.formats.manifest import parse_manifest
+    from sagittal.core.pipeline import PipelineConfig, analyse
+    from sagittal.core.pipeline.config import override_config
+
+    def tell(stage: str, share: float) -> None:
+        give_memory_back()
+        progress(stage, share)
+
+    _keep_libraries()
+    tell("reading", 0.0)
+    chosen = override_config(PipelineConfig(), choose_config(files, config))
+    declared = parse_manifest(manifest) if manifest is not None else None
+    # by no name of its own: `analyse` lets go of parts of it
+    return analyse(read_recording(files, declared), chosen, tell, CODE_VERSION, resumable=resumable)
+
+
+@cache
+def _keep_libraries() -> None:
+    """What libraries hold is never garbage: looking through it takes each analysis 70 ms."""
+    gc.freeze()
+
+
+def choose_config(files: Sequence[SourceFile], config: Mapping[str, Any] | None) -> Mapping[str, Any]:
+    """The settings that were asked for, else those that came with an archive of a visit; none without one.
+
+    Raises
+    ------
+    ArchiveError
+        the archive is damaged, or its settings are no JSON.
+    """
+    from sagittal.core.errors import ArchiveError
+    from sagittal.core.formats.archive import read_episode_config
+    from sagittal.core.formats.json_tree import read_json
+
+    if config:
+        return config
+    said = read_episode_config(files)
+    try:
+        found = {} if said is None else read_json(said)
+    except ValueError as error:
+        raise ArchiveError("zip_bad", f"The archive's settings are not valid JSON: {error}.") from error
+    return found if isinstance(found, dict) else {}
+
+
+def inspect(files: Sequence[SourceFile], manifest: Mapping[str, Any] | None, progress: Progress) -> bytes:
+    """What is in the files, as JSON, before any mapping; only `sources` of the manifest is heeded.
+
+    Raises
+    ------
+    SagittalError
+        the files cannot be read; the code and the sentence say why.
+    """
+    from sagittal.core import quality
+    from sagittal.core.formats import read_recording
+    from sagittal.core.formats.manifest import manifest_of
+
+    progress("reading", 0.0)
+    sources = (manifest or {}).get("sources")
+    take = read_recording(files, manifest_of({"sources": sources}) if sources else None)
+    progress("looking", 0.7)
+    return json.dumps(quality.describe(take).to_json(), ensure_ascii=False, allow_nan=False).encode()

@@ -1,0 +1,158 @@
+"""Which two sessions of a patient are compared: any two with a result, or one and the one before it."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sqlalchemy import Connection
+
+from sagittal.core.norms import Norms, look_up_norms
+from sagittal.core.subject.condition import compare_conditions, is_comparable
+from sagittal.server.clinic import patients, programmes, sessions
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.clinic.sessions import Session
+from sagittal.server.errors import Conflict
+from sagittal.server.report.history.comparison import ComparedRow, compare_rows
+from sagittal.server.report.history.numbers import Numbers
+from sagittal.server.report.history.trends import VisitKind
+from sagittal.server.results import analyses, edit_log
+from sagittal.server.results.histories import AnalysedSession, classify_visit
+from sagittal.server.results.reviewed import ReviewedAnalyses
+
+
+@dataclass(frozen=True)
+class SessionPair:
+    """Two analysed sessions of a patient, the earlier one first."""
+
+    patient: Patient
+    before: AnalysedSession
+    after: AnalysedSession
+
+    @property
+    def comparable(self) -> bool:
+        """Whether a difference can be called a change of the person."""
+        return is_comparable(self.before.condition, self.after.condition)
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """Why a difference may come from how was walked or measured, in sentences."""
+        said = []
+        old, new = self.before, self.after
+        if unlike := compare_conditions(old.condition, new.condition):
+            said.append(
+                f"The conditions differ: {'; '.join(unlike)}. What differs may come from that, so no "
+                "difference is called a change."
+            )
+        elif old.session.feedback:
+            said.append("Both were walked with feedback, so no difference is called a change.")
+        elif unstated := new.condition.unstated:
+            said.append(f"Not stated in either session: {', '.join(unstated)}. They are taken to be alike.")
+        if _sensors(old) != _sensors(new):
+            said.append("Other segments carried sensors in the two sessions.")
+        if old.found.config_sha256 != new.found.config_sha256:
+            said.append("The two analyses have different settings; run the earlier one again to compare.")
+        elif old.found.code_version != new.found.code_version:
+            said.append(
+                f"The analyses are of different versions ({old.found.code_version}, "
+                f"{new.found.code_version}); run the earlier one again to compare."
+            )
+        return tuple(said)
+
+
+def pair(c: Connection, session_id: str, other_id: str) -> SessionPair:
+    """Two sessions to compare, in whatever order they are named.
+
+    Raises
+    ------
+    NotFound: a session or its result. Conflict: other_patient, same_session.
+    """
+    if session_id == other_id:
+        raise Conflict("same_session", "A session is compared with another one, not with itself.")
+    both = [_analysed(c, sid) for sid in (session_id, other_id)]
+    if both[0].session.patient_id != both[1].session.patient_id:
+        raise Conflict("other_patient", "These sessions belong to different patients.")
+    both.sort(key=lambda a: _moment(a.session))
+    return SessionPair(patients.get(c, both[0].session.patient_id), *both)
+
+
+def list_comparable(
+    c: Connection, session: Session, done: Sequence[AnalysedSession]
+) -> list[tuple[AnalysedSession, VisitKind]]:
+    """The analysed sessions of earlier days that a session is compared with, oldest first, then itself.
+
+    All were walked under its condition. Of an assessment they are the assessments, so that a training does
+    not stand for the course. Takes of one day walked alike are one visit, not a change of each other. A
+    session with feedback stands alone, and none before has feedback. Empty where it has no result itself.
+
+    Parameters
+    ----------
+    done : the analysed sessions of the patient, oldest first (histories.list_analysed).
+    """
+    this = next((a for a in done if a.session.id == session.id), None)
+    if this is None:
+        return []
+    planned = programmes.list_kinds(c, [session.patient_id])
+    kind = classify_visit(session, planned.get(session.id))
+    earlier = [
+        (a, classify_visit(a.session, planned.get(a.session.id)))
+        for a in done
+        if is_comparable(a.condition, this.condition) and a.session.performed_on < session.performed_on
+    ]
+    return [*(e for e in earlier if kind == "training" or e[1] == "assessment"), (this, kind)]
+
+
+def find_previous(c: Connection, session: Session, done: Sequence[AnalysedSession]) -> AnalysedSession | None:
+    """The last session before this one in `list_comparable`: what its table is compared with; None = none."""
+    return pick_previous(list_comparable(c, session, done))
+
+
+def pick_previous(alike: Sequence[tuple[AnalysedSession, VisitKind]]) -> AnalysedSession | None:
+    """The last but one of `list_comparable`; None = there is none."""
+    return alike[-2][0] if len(alike) > 1 else None
+
+
+def _moment(session: Session) -> tuple[dt.date, dt.datetime]:
+    return session.performed_on, session.created_at
+
+
+def compare_sessions(reviewed: ReviewedAnalyses, found: SessionPair) -> tuple[ComparedRow, ...]:
+    """The table of a comparison; raises IntegrityError."""
+    old = reviewed.read_numbers(found.before.found, found.before.edits)
+    new = reviewed.read_numbers(found.after.found, found.after.edits)
+    known = pair_norms(found.patient, (found.before.session, old), (found.after.session, new))
+    return compare_rows(old, new, known, found.patient.affected_side, comparable=found.comparable)
+
+
+def pair_norms(
+    patient: Patient, before: tuple[Session, Numbers], after: tuple[Session, Numbers]
+) -> tuple[Norms, Norms]:
+    """The references of a person at two sessions, each at its own speed."""
+    return find_norms(patient, *before), find_norms(patient, *after)
+
+
+def find_norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
+    """The reference of a person on the day of a session, at its speed."""
+    speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
+    age = patient.find_age(session.performed_on)
+    height = patient.find_height(session)
+    return look_up_norms(
+        age,
+        patient.sex,
+        speed,
+        height,
+        treadmill=session.protocol == "treadmill",
+        contacts_s=numbers.contacts_s,
+    )
+
+
+def _analysed(c: Connection, session_id: str) -> AnalysedSession:
+    session = sessions.get(c, session_id)
+    found = analyses.get_shown(c, session_id)
+    return AnalysedSession(session, found, edit_log.edits_of(c, found.id))
+
+
+def _sensors(a: AnalysedSession) -> frozenset[str]:
+    mapped = (a.found.manifest or {}).get("sensors") or {}
+    return frozenset(segment for segment in mapped.values() if segment)

@@ -1,0 +1,138 @@
+"""What came of the feedback in a session's live take: its cues put to the strides of the analysis."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from sqlalchemy import Connection
+
+from sagittal.core.change.limits import Limb
+from sagittal.core.feedback import AnalysedStride, Cue, split
+from sagittal.core.frames import Side
+from sagittal.core.parameters import cycle_curves
+from sagittal.core.parameters.rows import Column
+from sagittal.core.subject.condition import is_alike
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.report.files.bundle import Bundle
+from sagittal.server.report.view import feedback as report
+from sagittal.server.report.view.feedback import FeedbackView
+from sagittal.server.report.view.feedback_beside import PreviousTraining, side_effects
+from sagittal.server.results import prescriptions
+from sagittal.server.results.histories import AnalysedSession
+from sagittal.server.results.prescriptions import TrainedTake
+from sagittal.server.results.reviewed import ReviewedAnalyses
+
+REASONS: Final = {
+    "no_feedback": "No live take of this session gave feedback.",
+    "not_analysed": "The live take with feedback is not analysed yet.",
+    "other_recording": "The analysis is of another recording than the live take with feedback.",
+}
+"""Why there is no result, in sentences."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedSession:
+    """A session with feedback: its analysis, what was trained in it, and the cues of the analysed take."""
+
+    at: AnalysedSession
+    training: TrainedTake
+    cues: tuple[Cue, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FeedbackRecords:
+    """What the database knows of the feedback in a session.
+
+    Parameters
+    ----------
+    this : None with a `reason`. before : the visit before with the same training, walked alike.
+    """
+
+    patient: Patient
+    this: TrainedSession | None
+    before: TrainedSession | None = None
+    reason: str | None = None
+
+
+def gather(
+    c: Connection, patient: Patient, session_id: str, done: Sequence[AnalysedSession]
+) -> FeedbackRecords:
+    """Read all that `view` needs of a session of this patient.
+
+    Parameters
+    ----------
+    done : the analysed sessions of the patient (histories.analysed).
+    """
+    at = {a.session.id: a for a in done}
+    given = prescriptions.trainings(c, patient.id)
+    here = [t for t in given if t.session_id == session_id]
+    if not here:
+        return FeedbackRecords(patient, None, reason="no_feedback")
+    this = _analysed_take(at.get(session_id), here)
+    if isinstance(this, str):
+        return FeedbackRecords(patient, None, reason=this)
+    earlier = (
+        t
+        for t in reversed(given[: given.index(here[0])])
+        if prescriptions.same_training(t.content, this.content)
+        and _analysed_take(at.get(t.session_id), [t]) is t
+        and is_alike(at[t.session_id].condition, at[session_id].condition)
+    )
+    both = [this, *itertools.islice(earlier, 1)]
+    cues = prescriptions.cues(c, [t.take_id for t in both])
+    trained = [TrainedSession(at[t.session_id], t, tuple(cues[t.take_id])) for t in both]
+    return FeedbackRecords(patient, trained[0], trained[1] if len(trained) == 2 else None)
+
+
+def view(reviewed: ReviewedAnalyses, gathered: FeedbackRecords) -> FeedbackView | None:
+    """Put cues and strides together; None where there is nothing, `reason` says why; IntegrityError."""
+    this, before = gathered.this, gathered.before
+    if this is None:
+        return None
+    content = this.training.content
+    bundle, strides = _strides(reviewed, this)
+    stood = bundle.angles is not None and bundle.angles.zero == "standing"
+    curves = cycle_curves(bundle.angles, bundle.strides) if stood and bundle.angles else None
+    earlier = None
+    if before is not None:
+        there = before.at.session
+        earlier = PreviousTraining(
+            there.id, there.performed_on, split(_strides(reviewed, before)[1], before.cues)
+        )
+    return report.feedback_view(
+        content,
+        split(strides, this.cues),
+        side_effects(content, this.training.baseline, strides, curves),
+        earlier,
+        _limb(gathered.patient, content.side),
+    )
+
+
+def _strides(
+    reviewed: ReviewedAnalyses, trained: TrainedSession
+) -> tuple[Bundle, tuple[AnalysedStride, ...]]:
+    """The strides of an analysis with its edits, each with the value of what was trained."""
+    bundle = reviewed.read_bundle(trained.at.found, trained.at.edits)
+    columns = reviewed.read_columns(trained.at.found, trained.at.edits)
+    nothing: Column = (None,) * len(bundle.strides.strides)
+    column = columns.get(trained.training.content.parameter, nothing)
+    return bundle, report.list_analysed_strides(bundle.strides, column)
+
+
+def _analysed_take(at: AnalysedSession | None, takes: Sequence[TrainedTake]) -> TrainedTake | str:
+    """The take that the analysis of a session is of, or the reason why there is none."""
+    if at is None:
+        return "not_analysed"
+    take = next((t for t in takes if t.recording_id == at.found.recording_id), None)
+    if take is not None:
+        return take
+    return "not_analysed" if takes[-1].recording_id is None else "other_recording"
+
+
+def _limb(patient: Patient, side: Side | None) -> Limb | None:
+    if patient.affected_side is None or side is None:
+        return None
+    return "affected" if side == patient.affected_side else "unaffected"

@@ -1,0 +1,225 @@
+"""All analysed visits of a patient with their numbers as they count, for trends over those walked alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
+
+from sqlalchemy import Connection
+
+from sagittal.core.norms import Norms, NormValue, look_up_norms, temporal_values
+from sagittal.core.subject.condition import WalkingCondition, is_alike
+from sagittal.server.clinic import programmes, sessions
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.clinic.programmes import Programme
+from sagittal.server.clinic.sessions import Session
+from sagittal.server.errors import NotFound
+from sagittal.server.report.history import daily_trend
+from sagittal.server.report.history.daily_trend import CapacityVisit, PerformanceDay
+from sagittal.server.report.history.numbers import Numbers
+from sagittal.server.report.history.trends import AnalysedVisit, VisitKind
+from sagittal.server.results import analyses, edit_log
+from sagittal.server.results.reviewed import ReviewedAnalyses
+
+
+@dataclass(frozen=True, eq=False)
+class PatientHistory:
+    """The visits of a patient that can be compared.
+
+    Parameters
+    ----------
+    condition : under which all of them were walked, some perhaps with feedback; None without a visit.
+    visits : analysed, oldest first. others : visits walked otherwise, by condition. programmes : newest
+    first.
+    """
+
+    patient: Patient
+    condition: WalkingCondition | None
+    visits: tuple[AnalysedVisit, ...]
+    others: tuple[OtherWalks, ...]
+    programmes: tuple[Programme, ...]
+
+    @cached_property
+    def norms(self) -> tuple[Norms, ...]:
+        """Of this person at every visit, at its speed."""
+        return tuple(self._find_norms(visit.numbers) for visit in self.visits)
+
+    def _find_norms(self, numbers: Numbers) -> Norms:
+        speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
+        belt = self.condition is not None and self.condition.protocol == "treadmill"
+        return look_up_norms(
+            self._age,
+            self.patient.sex,
+            speed,
+            self.patient.height_m,
+            treadmill=belt,
+            contacts_s=numbers.contacts_s,
+        )
+
+    @property
+    def usual(self) -> dict[str, NormValue]:
+        """Of people of this age and sex at their comfortable speed."""
+        return dict(temporal_values(self._age, self.patient.sex).values)
+
+    @property
+    def _age(self) -> int | None:
+        return self.patient.find_age(self.visits[-1].performed_on) if self.visits else None
+
+
+@dataclass(frozen=True)
+class OtherWalks:
+    """Analysed visits under another condition: how many, and the newest of them."""
+
+    condition: WalkingCondition
+    count: int
+    session_id: str
+
+
+@dataclass(frozen=True)
+class AnalysedSession:
+    """A session with the analysis that counts and its edits."""
+
+    session: Session
+    found: analyses.AnalysisRecord
+    edits: edit_log.EditHistory
+
+    @property
+    def condition(self) -> WalkingCondition:
+        """How it was walked."""
+        return self.session.walked(_belt(self.found.manifest))
+
+
+def list_analysed(c: Connection, patient_id: str) -> list[AnalysedSession]:
+    """The sessions of a patient with a result, oldest first."""
+    there = sessions.of_patient(c, patient_id)
+    shown = analyses.latest_of(c, [s.id for s in there])
+    edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
+    return [
+        AnalysedSession(s, found, edits[found.id])
+        for s in reversed(there)
+        if (found := shown.get(s.id)) is not None
+    ]
+
+
+def baseline(done: Sequence[AnalysedSession]) -> AnalysedSession | None:
+    """The newest visit that says how somebody walks: at own pace where there is one, never with feedback.
+
+    Tests and squats only without a walk over ground or on a belt, daily life where there is nothing else.
+
+    Parameters
+    ----------
+    done : oldest first.
+    """
+    untold = [a for a in reversed(done) if not a.session.feedback]
+    walks = [a for a in untold if a.session.protocol in sessions.WALKS]
+    untold = walks or [a for a in untold if a.session.protocol != "activity"] or untold
+    return next((a for a in untold if a.condition.is_at_own_pace), untold[0] if untold else None)
+
+
+def read_history(
+    reviewed: ReviewedAnalyses,
+    patient: Patient,
+    done: Sequence[AnalysedSession],
+    plans: Sequence[Programme],
+    protocol: str | None = None,
+    like: str | None = None,
+) -> PatientHistory:
+    """Read the numbers of the visits walked under one condition; raises IntegrityError, NotFound.
+
+    Parameters
+    ----------
+    protocol : only visits of this one. like : under the condition of this session; None = of `baseline`, else
+        of the newest visit.
+    """
+    asked = [a for a in done if protocol in {None, a.session.protocol}]
+    if like is None:
+        chosen = baseline(asked) or (asked[-1] if asked else None)
+    else:
+        chosen = next((a for a in done if a.session.id == like), None)
+        if chosen is None:
+            raise NotFound("analysed visit of this patient", like)
+    planned = {v.session_id: v for plan in plans for v in plan.visits if v.session_id is not None}
+    visits = []
+    for a in asked:
+        if chosen is None or not is_alike(a.condition, chosen.condition):
+            continue
+        plan = planned.get(a.session.id)
+        label = None if plan is None else plan.label
+        kind = classify_visit(a.session, None if plan is None else plan.kind)
+        visits.append(read_visit(reviewed, a, kind, label))
+    shown = {v.session_id for v in visits}
+    rest = [a for a in done if a.session.id not in shown]
+    condition = None if chosen is None else replace(chosen.condition, feedback=False)
+    return PatientHistory(patient, condition, tuple(visits), _others(rest), tuple(plans))
+
+
+def read_visit(
+    reviewed: ReviewedAnalyses, a: AnalysedSession, kind: VisitKind, label: str | None = None
+) -> AnalysedVisit:
+    """The numbers of a visit as they count; raises IntegrityError. `kind`, `label` : as of AnalysedVisit."""
+    return AnalysedVisit(
+        a.session.id,
+        a.session.performed_on,
+        a.session.title,
+        label,
+        kind,
+        a.condition,
+        reviewed.read_numbers(a.found, a.edits),
+    )
+
+
+def read_performance(reviewed: ReviewedAnalyses, done: Sequence[AnalysedSession]) -> list[PerformanceDay]:
+    """Read the days of all recordings of daily life, oldest first; raises IntegrityError."""
+
+    def read(a: AnalysedSession) -> list[PerformanceDay]:
+        found = reviewed.read_bundle(a.found, a.edits).activity
+        if found is None:
+            return []
+        return daily_trend.read_performance(a.session.id, a.session.performed_on, found)
+
+    days: list[PerformanceDay] = []
+    for a in done:
+        if a.session.protocol == "activity":
+            days += reviewed.keep_part((a.found.id, "performance"), partial(read, a))
+    return sorted(days, key=lambda d: d.day)
+
+
+def read_capacity(history: PatientHistory) -> list[CapacityVisit]:
+    """Read what the walks of a history say, oldest first; none of daily life."""
+    found = (
+        daily_trend.read_capacity(v.session_id, v.performed_on, v.title, v.numbers.parameters)
+        for v in history.visits
+        if v.condition.protocol != "activity"
+    )
+    return [v for v in found if v is not None]
+
+
+def classify_visit(session: Session, planned: VisitKind | None) -> VisitKind:
+    """Whether a visit is judged: a walk with feedback is a training whatever was planned."""
+    if session.feedback:
+        return "training"
+    return planned or "assessment"
+
+
+def _others(rest: Sequence[AnalysedSession]) -> tuple[OtherWalks, ...]:
+    """Visits by condition, that of the newest first."""
+    groups: list[list[AnalysedSession]] = []
+    for a in reversed(rest):
+        alike = next((g for g in groups if is_alike(g[0].condition, a.condition)), None)
+        if alike is None:
+            groups.append([a])
+        else:
+            alike.append(a)
+    return tuple(OtherWalks(replace(g[0].condition, feedback=False), len(g), g[0].session.id) for g in groups)
+
+
+def _belt(manifest: Mapping[str, Any] | None) -> float | None:
+    speed = (manifest or {}).get("belt_speed_mps")
+    return None if speed is None else float(speed)
+
+
+def read(c: Connection, patient: Patient) -> tuple[list[AnalysedSession], list[programmes.Programme]]:
+    """What `read_history` needs of the database."""
+    return list_analysed(c, patient.id), programmes.of_patient(c, patient.id)

@@ -1,0 +1,317 @@
+"""Prescriptions of biofeedback: written, replaced, ended, and made ready for a live take.
+
+A record never changes: to change it ends it and writes another, so that every take and its cues point to what
+was in force. One is in force at a time; one parameter is trained (docs/feedback.md).
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+from sqlalchemy import Connection, Select, bindparam, insert, select, update
+
+from sagittal.core.change import ChangeLimit, find_detectable_change
+from sagittal.core.change.limits import Limb
+from sagittal.core.feedback import Baseline, Cue, Prescription
+from sagittal.core.frames import Side
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.server import audit
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.errors import Conflict, NotFound, ServiceError
+from sagittal.server.results import targets
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.server.results.targets import AnalysedWalk
+from sagittal.server.storage.live_tables import live_event, live_take
+from sagittal.server.storage.tables import new_id, now, prescription, session, user
+
+
+@dataclass(frozen=True)
+class PatientPrescription:
+    """A prescription of a patient.
+
+    Parameters
+    ----------
+    content : what is trained, its target in numbers as of that day. by : who wrote it, None = the program.
+    ended_at : None while in force.
+    """
+
+    id: str
+    patient_id: str
+    content: Prescription
+    created_at: dt.datetime
+    by: str | None
+    ended_at: dt.datetime | None
+
+
+def write(
+    c: Connection,
+    reviewed: ReviewedAnalyses,
+    actor: audit.Actor | None,
+    patient_id: str,
+    content: Mapping[str, object],
+) -> PatientPrescription:
+    """Prescribe feedback; what was in force ends.
+
+    Raises
+    ------
+    NotFound: the patient. ParameterError, ServiceError bad_prescription: a field is not as expected.
+    ServiceError no_target: its source gives no numbers for this person; the sentence says why. both_sides: a
+    side is named of what both share.
+    """
+    patient = patients.get(c, patient_id)
+    asked = Prescription.from_json(content)
+    entry = CATALOGUE[asked.parameter]
+    if entry.shared and asked.side is not None:
+        raise ServiceError(
+            "both_sides",
+            f"{entry.label} is the same for both sides of a walk, so the {asked.side} side is not trained "
+            "alone. Expected both sides, or another parameter.",
+        )
+    made = _with_target(c, reviewed, patient, asked)
+    before = in_force(c, patient_id)
+    if before is not None:
+        _end(c, actor, before)
+    written_id = new_id()
+    c.execute(
+        insert(prescription).values(
+            id=written_id,
+            patient_id=patient_id,
+            content=made.to_json(),
+            created_at=now(),
+            created_by=actor.user_id if actor else None,
+        )
+    )
+    audit.record(c, actor, "prescription.written", "patient", patient_id, _said(written_id, made))
+    return get(c, written_id)
+
+
+def end(c: Connection, actor: audit.Actor | None, prescription_id: str) -> PatientPrescription:
+    """End a prescription; raises NotFound, Conflict prescription_ended."""
+    this = get(c, prescription_id)
+    if this.ended_at is not None:
+        raise Conflict("prescription_ended", "This prescription has ended already; write a new one instead.")
+    _end(c, actor, this)
+    return get(c, prescription_id)
+
+
+def get(c: Connection, prescription_id: str) -> PatientPrescription:
+    """One prescription; raises NotFound."""
+    row = c.execute(_QUERY.where(prescription.c.id == prescription_id)).first()
+    if row is None:
+        raise NotFound("prescription", prescription_id)
+    return _written(row)
+
+
+def of_patient(c: Connection, patient_id: str) -> list[PatientPrescription]:
+    """All prescriptions of a patient, the newest first."""
+    query = _QUERY.where(prescription.c.patient_id == patient_id)
+    rows = c.execute(query.order_by(prescription.c.created_at.desc(), prescription.c.id))
+    return [_written(row) for row in rows]
+
+
+def in_force(c: Connection, patient_id: str) -> PatientPrescription | None:
+    """The prescription that holds now, None without one."""
+    return next((w for w in of_patient(c, patient_id) if w.ended_at is None), None)
+
+
+def for_take(
+    c: Connection, reviewed: ReviewedAnalyses, session_id: str
+) -> tuple[Prescription, Baseline] | None:
+    """What a live take of this session trains, its target in numbers; None where nothing is prescribed.
+
+    A norm follows the person's speed: it is looked up for the last walk before this session. Where that gives
+    none, and for every other source, the numbers of the day of writing hold.
+    """
+    this = sessions.get(c, session_id)
+    written = in_force(c, this.patient_id)
+    if written is None:
+        return None
+    patient = patients.get(c, this.patient_id)
+    content = written.content
+    by_norm = content.target.source == "norm"
+    walk = targets.last_walk(c, reviewed, patient, before=this, with_controls=by_norm)
+    if by_norm:
+        fresh = targets.offer(walk, "norm", content.parameter, content.side).target
+        content = content if fresh is None else replace(content, target=fresh)
+    return content, _baseline(c, written, patient, walk, session_id)
+
+
+def cues(c: Connection, take_ids: Sequence[str]) -> dict[str, list[Cue]]:
+    """The cues of each of these takes in the order they were given."""
+    query = (
+        select(live_event.c.take_id, live_event.c.content)
+        .where(live_event.c.kind == "cue", live_event.c.take_id.in_(take_ids))
+        .order_by(live_event.c.seq)
+    )
+    given: dict[str, list[Cue]] = {take: [] for take in take_ids}
+    for take, content in c.execute(query):
+        given[take].append(Cue.from_json(content))
+    return given
+
+
+@dataclass(frozen=True)
+class TrainedTake:
+    """A live take with feedback.
+
+    Parameters
+    ----------
+    recording_id : what the take became, None while it runs. content, baseline : as the take began with them.
+    """
+
+    take_id: str
+    session_id: str
+    recording_id: str | None
+    performed_on: dt.date
+    prescription_id: str
+    content: Prescription
+    baseline: Baseline
+
+
+def trainings(c: Connection, patient_id: str) -> list[TrainedTake]:
+    """All live takes of a patient that gave cues, the oldest first."""
+    rows = c.execute(_trainings(), {"of_patient": patient_id})
+    return [
+        TrainedTake(
+            take_id,
+            session_id,
+            recording_id,
+            day,
+            prescription_id,
+            Prescription.from_json(begun["prescription"]),
+            Baseline.from_json(begun["baseline"] or {}),
+        )
+        for take_id, session_id, recording_id, day, prescription_id, begun in rows
+    ]
+
+
+@cache
+def _trainings() -> Select[Any]:
+    gave = select(live_event.c.seq).where(live_event.c.take_id == live_take.c.id, live_event.c.kind == "cue")
+    begun = (
+        select(live_event.c.content)
+        .where(live_event.c.take_id == live_take.c.id, live_event.c.kind == "prescription")
+        .order_by(live_event.c.seq)
+        .limit(1)
+        .scalar_subquery()
+    )
+    return (
+        select(
+            live_take.c.id,
+            live_take.c.session_id,
+            live_take.c.recording_id,
+            session.c.performed_on,
+            live_take.c.prescription_id,
+            begun,
+        )
+        .join(session, session.c.id == live_take.c.session_id)
+        .where(
+            session.c.patient_id == bindparam("of_patient"),
+            live_take.c.prescription_id.is_not(None),
+            gave.exists(),
+        )
+        .order_by(session.c.performed_on, live_take.c.created_at, live_take.c.id)
+    )
+
+
+def same_training(a: Prescription, b: Prescription) -> bool:
+    """Whether what was trained is the same: a new schedule ends a record, not the training."""
+    return (a.parameter, a.side) == (b.parameter, b.side)
+
+
+def _with_target(
+    c: Connection, reviewed: ReviewedAnalyses, patient: Patient, asked: Prescription
+) -> Prescription:
+    source = asked.target.source
+    if source == "manual":
+        _refuse_impossible(asked)
+        return replace(asked, target=replace(asked.target, words="entered", session_id=None))
+    chosen = None if source == "norm" else asked.target.session_id
+    walk = targets.last_walk(c, reviewed, patient, session_id=chosen)
+    found = targets.offer(walk, source, asked.parameter, asked.side)
+    if found.target is None:
+        raise ServiceError("no_target", found.reason or "")
+    return replace(asked, target=replace(found.target, source=source))
+
+
+def _refuse_impossible(asked: Prescription) -> None:
+    """Raise ServiceError bad_prescription for an entered target that nobody walks with: 60 typed for 0.60."""
+    entry, mean, sd = CATALOGUE[asked.parameter], asked.target.mean, asked.target.sd
+    low, high = entry.target_range
+    unit = f" {entry.printed_unit}" if entry.printed_unit else ""
+    if mean is not None and not low <= mean <= high:
+        raise ServiceError(
+            "bad_prescription",
+            f"target.mean is {mean:g}{unit}. Expected {low:g} to {high:g}{unit} for {entry.label.lower()}.",
+        )
+    if sd is not None and sd > high - low:
+        raise ServiceError(
+            "bad_prescription", f"target.sd is {sd:g}{unit}. Expected at most {high - low:g}{unit}."
+        )
+
+
+def _baseline(
+    c: Connection, written: PatientPrescription, patient: Patient, walk: AnalysedWalk | None, session_id: str
+) -> Baseline:
+    content = written.content
+    given = trainings(c, patient.id)
+    alike = [t for t in given if same_training(t.content, content)]
+    today = any(t.session_id == session_id for t in alike)
+    baseline = Baseline(
+        last_level=_last_level(c, [t for t in given if t.prescription_id == written.id]),
+        # the block opens the visit, not its later takes
+        after_training=bool(alike) and not today,
+    )
+    usual = None if walk is None else targets.find_usual_value(walk, content.parameter, content.side)
+    if walk is not None and usual is not None:
+        baseline = replace(baseline, mean=usual.mean, sd=usual.sd, n=usual.n, session_id=walk.session.id)
+    mdc = None if content.side is None else _mdc(patient, content, walk, targets.opposite_side(content.side))
+    if mdc is None:
+        return baseline
+    return replace(baseline, other_mdc=mdc.value, other_mdc_source=f"MDC, {mdc.source}")
+
+
+def _mdc(
+    patient: Patient, content: Prescription, walk: AnalysedWalk | None, side: Side
+) -> ChangeLimit | None:
+    """Limit of change of the untrained side, from what it usually does, else from the target."""
+    there = None if walk is None else targets.find_usual_value(walk, content.parameter, side)
+    value = content.target.mean if there is None else there.mean
+    limb: Limb | None = None
+    if patient.affected_side is not None:
+        limb = "affected" if side == patient.affected_side else "unaffected"
+    return None if value is None else find_detectable_change(content.parameter, value, limb)
+
+
+def _last_level(c: Connection, own: Sequence[TrainedTake]) -> int | None:
+    """Level of the last cue of the training proper; a block a visit opens with may have none yet."""
+    for training in reversed(own):
+        given = cues(c, [training.take_id])[training.take_id]
+        levels = [q.level for q in given if q.why_not not in {"baseline", "retention"}]
+        if levels:
+            return levels[-1]
+    return None
+
+
+def _end(c: Connection, actor: audit.Actor | None, this: PatientPrescription) -> None:
+    c.execute(update(prescription).where(prescription.c.id == this.id).values(ended_at=now()))
+    audit.record(c, actor, "prescription.ended", "patient", this.patient_id, _said(this.id, this.content))
+
+
+def _said(written_id: str, content: Prescription) -> dict[str, object]:
+    return {"prescription_id": written_id, "parameter": content.parameter, "side": content.side}
+
+
+_QUERY = select(prescription, user.c.display_name.label("by")).join(
+    user, user.c.id == prescription.c.created_by, isouter=True
+)
+
+
+def _written(row: Any) -> PatientPrescription:
+    return PatientPrescription(
+        row.id, row.patient_id, Prescription.from_json(row.content), row.created_at, row.by, row.ended_at
+    )

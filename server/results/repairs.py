@@ -1,0 +1,94 @@
+"""Repairs of a set-up: what an analysis proposes, and set-ups of earlier ones, to be asked for again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from sqlalchemy import Connection
+
+from sagittal.core.formats.manifest import manifest_of
+from sagittal.server.results.analyses import AnalysisRecord, file_bytes
+from sagittal.server.results.analysing import REPAIRED
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.uploads import recordings
+
+SETUP_KEYS: Final = ("sensors", "corrections", "mounting")
+"""What of a manifest says how sensors are worn and read."""
+
+
+@dataclass(frozen=True)
+class ProposedRepair:
+    """What is wrong, in sentences, and the manifest that would put it right.
+
+    Parameters
+    ----------
+    changes : what each sensor would be taken for, in sentences.
+    """
+
+    evidence: tuple[str, ...]
+    manifest: Mapping[str, Any]
+    changes: tuple[str, ...]
+
+
+def read_proposal(c: Connection, blobs: BlobStore, found: AnalysisRecord) -> ProposedRepair | None:
+    """What an analysis proposes; None where it proposes nothing, or its files are no longer the session's."""
+    if REPAIRED not in found.files:
+        return None
+    this = recordings.current(c, found.session_id)
+    if this is None or this.id != found.recording_id:
+        return None
+    said = json.loads(file_bytes(blobs, found, "analysis.json"))["setup"]
+    repaired = json.loads(file_bytes(blobs, found, REPAIRED))
+    changes = _list_changes(repaired, found.manifest)
+    return ProposedRepair(tuple(said["evidence"]), take_setup(this.manifest, repaired), changes)
+
+
+def _list_changes(repaired: Mapping[str, Any], before: Mapping[str, Any] | None) -> tuple[str, ...]:
+    """Sensors that would be taken as worn elsewhere or read otherwise.
+
+    Parameters
+    ----------
+    repaired : the manifest that is proposed. before : that of the analysis that proposes it.
+    """
+    said = manifest_of(before or {})
+    wanted = manifest_of({key: repaired.get(key) for key in SETUP_KEYS})
+    worn = {d.lower(): s for d, s in said.sensors.items()}
+    known = {d.lower(): x for d, x in said.corrections.items()}
+    changes = []
+    for device, segment in sorted(wanted.sensors.items()):
+        was = worn.get(device.lower())
+        if segment is not None and was != segment:
+            changes.append(f"Sensor {device} goes {'' if was is None else f'from {was} '}to {segment}.")
+    for device, correction in sorted(wanted.corrections.items()):
+        if correction != known.get(device.lower()):
+            changes.append(f"Of sensor {device} {correction.say()}.")
+    for place, words in sorted(wanted.mounting.items()):
+        declared = said.mounting.get(place)
+        if words != declared:
+            instead = "" if declared is None else f", not “{declared}”"
+            changes.append(f"The sensor of {place} is worn “{words}”{instead}.")
+    return tuple(changes)
+
+
+def read_without_limits(c: Connection, found: AnalysisRecord) -> dict[str, Any] | None:
+    """The manifest of an analysis without what a person said of a test's start and end.
+
+    None where its files are no longer the session's.
+    """
+    this = recordings.current(c, found.session_id)
+    if this is None or this.id != found.recording_id:
+        return None
+    return {key: value for key, value in (this.manifest or {}).items() if key != "test_limits"}
+
+
+def take_setup(manifest: Mapping[str, Any] | None, other: Mapping[str, Any] | None) -> dict[str, Any]:
+    """A manifest with the set-up of another one; height, protocol and columns stay.
+
+    >>> take_setup({"protocol": "walk", "corrections": {}}, {"sensors": {"A": "pelvis"}, "protocol": "tug"})
+    {'protocol': 'walk', 'sensors': {'A': 'pelvis'}}
+    """
+    said = {key: value for key, value in (manifest or {}).items() if key not in SETUP_KEYS}
+    return said | {key: (other or {})[key] for key in SETUP_KEYS if key in (other or {})}

@@ -1,0 +1,265 @@
+"""Finished analyses as they count: what is stored, with what its live edits give.
+
+A stored analysis never changes. The events, strides and parameters that count are measured from its tracks
+and the live edits, by the function that the pipeline ends with.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Collection, Hashable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Generic, TypeVar, cast
+
+from sagittal.core.errors import FormatError
+from sagittal.core.events.edits import Edit
+from sagittal.core.norms.controls import ControlSession
+from sagittal.core.parameters.measure import MeasuredGait, Tracks, measure_gait
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.rows import Column
+from sagittal.server.errors import Conflict
+from sagittal.server.export.kinds import EXPORTED
+from sagittal.server.report.files import signals, tracks
+from sagittal.server.report.files.bundle import Bundle, apply_review, load_bundle, read_columns
+from sagittal.server.report.history.numbers import (
+    Numbers,
+    WalkMeans,
+    means_of,
+    numbers_of,
+    read_means,
+    read_numbers,
+)
+from sagittal.server.report.words.wording import speak_places
+from sagittal.server.results import analyses
+from sagittal.server.results.edit_log import EditHistory
+from sagittal.server.storage.blobs import BlobStore, IntegrityError, StoreAway
+
+_Value = TypeVar("_Value")
+
+UNREADABLE: Final = (IntegrityError, StoreAway, FormatError)
+"""Why one visit of a list cannot be read: its own page says what is wrong, the others stay in reach."""
+
+NOT_READ: Final = ("poses.parquet", signals.NAME)
+"""Files that only the replay and the drawing of signals need."""
+
+ANALYSES_KEPT, RESULTS_KEPT, PARTS_KEPT, PAGES_KEPT = 3, 12, 24, 24
+NUMBERS_KEPT, CONTROLS_KEPT, VERDICTS_KEPT = 240, 500, 5000
+"""Finished analyses, results of edits, signals of one sensor and numbers kept in memory: those at work. Ten
+minutes are some 20 MB, 1 MB, 2 MB and 50 kB; a page that was put into words and drawn is 1 MB, a verdict two
+words, a speed one row."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredAnalysis:
+    """A finished analysis in memory; one without `tracks`, of an earlier version, cannot be edited."""
+
+    bundle: Bundle
+    tracks: Tracks | None
+
+    @property
+    def fixed_because(self) -> str | None:
+        """Why nothing of it can be edited, None where it can."""
+        if self.tracks is not None:
+            return None
+        stopped = next((n.message for n in self.bundle.warnings if n.severity == "error"), None)
+        if stopped is not None:
+            return f"The analysis stopped before events were looked for. {speak_places(stopped)}"
+        if self.bundle.repetitions is not None:
+            return "Squats have no contacts and no strides. The overview lists every squat."
+        return (
+            "This analysis was made by an earlier version, which did not keep what an edit is measured on. "
+            "Run the analysis again."
+        )
+
+
+class ReviewedAnalyses:
+    """The analyses of an installation as they count; those at work are kept in memory. Any thread may use it.
+
+    Parameters
+    ----------
+    blobs : the store of the result files.
+    """
+
+    def __init__(self, blobs: BlobStore) -> None:
+        self.blobs = blobs
+        self._analyses: RecentValues[StoredAnalysis] = RecentValues(ANALYSES_KEPT)
+        self._results: RecentValues[MeasuredGait] = RecentValues(RESULTS_KEPT)
+        self._numbers: RecentValues[Numbers] = RecentValues(NUMBERS_KEPT)
+        self._controls: RecentValues[ControlSession] = RecentValues(CONTROLS_KEPT)
+        self._verdicts: RecentValues[tuple[str, str]] = RecentValues(VERDICTS_KEPT)
+        self._speeds: RecentValues[Parameter | None] = RecentValues(VERDICTS_KEPT)
+        self._parts: RecentValues[Any] = RecentValues(PARTS_KEPT)
+        self._pages: RecentValues[Any] = RecentValues(PAGES_KEPT)
+
+    def open(self, found: analyses.AnalysisRecord) -> StoredAnalysis:
+        """Return an analysis as it is stored, read once while it is at work; raises IntegrityError."""
+
+        def read() -> StoredAnalysis:
+            files = self._read_files(found, NOT_READ)
+            stored = load_bundle(files)
+            if tracks.NAME not in files:
+                return StoredAnalysis(stored, None)
+            return StoredAnalysis(
+                stored, tracks.read_tracks(files[tracks.NAME], stored.events, stored.angles)
+            )
+
+        return self._analyses.get(found.id, read)
+
+    def measure(self, found: analyses.AnalysisRecord, edits: EditHistory) -> MeasuredGait | None:
+        """Return what the live edits give; None without an edit: then the stored analysis counts."""
+        if not edits.made:
+            return None
+        return self._results.get((found.id, edits.key), lambda: self.measure_anew(found, edits.edits))
+
+    def measure_anew(self, found: analyses.AnalysisRecord, edits: tuple[Edit, ...]) -> MeasuredGait:
+        """Measure with these edits, without looking into the memory or keeping the result.
+
+        Raises
+        ------
+        Conflict no_tracks, IntegrityError, ParameterError of sagittal.core.events.edits.
+        """
+        known = self.open(found)
+        if known.tracks is None:
+            raise Conflict("no_tracks", known.fixed_because or "")
+        return measure_gait(known.tracks, edits)
+
+    def keep_result(self, found: analyses.AnalysisRecord, edits: EditHistory, result: MeasuredGait) -> None:
+        """Keep what `measure_anew` gave for these edits."""
+        self._results.put((found.id, edits.key), result)
+
+    def read_columns(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Mapping[str, Column]:
+        """Return figures of every stride of the list as they count, by parameter; raises IntegrityError."""
+        result = self.measure(found, edits)
+        if result is not None:
+            return result.columns
+        if "strides.csv" not in found.files:
+            return {}
+        return read_columns(analyses.file_bytes(self.blobs, found, "strides.csv"))
+
+    def read_bundle(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
+        """Return the analysis with what its live edits give; raises IntegrityError."""
+        stored, result = self.open(found).bundle, self.measure(found, edits)
+        return stored if result is None else apply_review(stored, result, edits.edits)
+
+    def read_without_tracks(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
+        """Return the same of one that nobody works on: without an edit its tracks are not read, nor kept.
+
+        Raises
+        ------
+        IntegrityError, FormatError as `read_bundle`.
+        """
+        if edits.made:
+            return self.read_bundle(found, edits)
+        return load_bundle(self._read_files(found, {*NOT_READ, tracks.NAME}))
+
+    def _read_files(self, found: analyses.AnalysisRecord, left_out: Collection[str]) -> dict[str, bytes]:
+        names = [n for n in found.files if n not in left_out and not n.startswith(EXPORTED)]
+        return {name: analyses.file_bytes(self.blobs, found, name) for name in names}
+
+    def read_numbers(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Numbers:
+        """Return parameters and scores as they count; without an edit no signal is read.
+
+        Raises
+        ------
+        IntegrityError
+            a result file is not what it was.
+        """
+
+        def read() -> Numbers:
+            if not edits.made:
+                stored = read_numbers(analyses.file_bytes(self.blobs, found, "analysis.json"))
+                if stored is not None:
+                    return stored
+            return numbers_of(self.read_bundle(found, edits))
+
+        return self._numbers.get((found.id, edits.key), read)
+
+    def read_means(self, found: analyses.AnalysisRecord, edits: EditHistory) -> WalkMeans:
+        """Return what a control's walk gives to a reference; without an edit no angles are read.
+
+        Raises
+        ------
+        IntegrityError, FormatError as `read_bundle`.
+        """
+        if not edits.made:
+            stored = read_means(analyses.file_bytes(self.blobs, found, "analysis.json"))
+            if stored is not None:
+                return stored
+        return means_of(self.read_without_tracks(found, edits))
+
+    def read_verdict(self, found: analyses.AnalysisRecord, edits: EditHistory) -> tuple[str, str]:
+        """Return shape and word for the data of an analysis, as lists show it; raises IntegrityError."""
+        return self._verdicts.get((found.id, edits.key), lambda: self.read_numbers(found, edits).verdict)
+
+    def read_speed(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Parameter | None:
+        """Return the walking speed of an analysis, as lists show it; raises IntegrityError."""
+
+        def read() -> Parameter | None:
+            numbers = self.read_numbers(found, edits)
+            return next((p for p in numbers.parameters if p.name == "gait_speed_mps"), None)
+
+        return self._speeds.get((found.id, edits.key), read)
+
+    def keep_part(self, key: tuple[str, ...], make_value: Callable[[], _Value]) -> _Value:
+        """Return a part that is looked at again and again, by a key that begins with the analysis's id."""
+        return cast("_Value", self._parts.get(key, make_value))
+
+    def keep_control(
+        self, found: analyses.AnalysisRecord, edits: EditHistory, make_value: Callable[[], ControlSession]
+    ) -> ControlSession:
+        """Return what serves as reference of a finished analysis of a control."""
+        return self._controls.get((found.id, edits.key), make_value)
+
+    def keep_page(self, key: Hashable, make_value: Callable[[], _Value]) -> _Value:
+        """Return what a page shows of analyses, drawn once for the same records; `key` names all of them."""
+        return cast("_Value", self._pages.get(key, make_value))
+
+    def forget(self) -> None:
+        """Keep nothing in memory: what is erased on disk must not stay here."""
+        for memory in (
+            self._analyses,
+            self._results,
+            self._numbers,
+            self._controls,
+            self._parts,
+            self._verdicts,
+            self._speeds,
+            self._pages,
+        ):
+            memory.clear()
+
+
+class RecentValues(Generic[_Value]):
+    """The values used last, at most `size` of them; any thread may use it."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self._values: OrderedDict[Hashable, _Value] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def clear(self) -> None:
+        """Forget all that is kept in memory."""
+        with self._lock:
+            self._values.clear()
+
+    def get(self, key: Hashable, make_value: Callable[[], _Value]) -> _Value:
+        """Return the value of a key, made and kept when it is not there."""
+        with self._lock:
+            if key in self._values:
+                self._values.move_to_end(key)
+                return self._values[key]
+        value = make_value()
+        self.put(key, value)
+        return value
+
+    def put(self, key: Hashable, value: _Value) -> None:
+        """Keep a value; the one that was used longest ago may have to go."""
+        with self._lock:
+            self._values[key] = value
+            self._values.move_to_end(key)
+            while len(self._values) > self._size:
+                self._values.popitem(last=False)

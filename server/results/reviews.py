@@ -1,0 +1,148 @@
+"""What people change in a finished analysis: edits kept in order, undone by a row too, measured at once.
+
+Two people may review one session: who edits says which state was seen (`version`), and any but the newest is
+refused.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from sqlalchemy import Connection, insert
+
+from sagittal.core.events.edits import Edit
+from sagittal.server import audit
+from sagittal.server.errors import Conflict
+from sagittal.server.results import analyses
+from sagittal.server.results.edit_log import UNDO, EditHistory, edits_of
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import edit as rows
+from sagittal.server.storage.tables import now
+
+ACTIONS: Final = {
+    "move_event": "event.moved",
+    "add_event": "event.added",
+    "delete_event": "event.deleted",
+    "exclude_stride": "stride.left_out",
+    "include_stride": "stride.counted",
+    UNDO: "edit.undone",
+}
+"""Kind of a row → its action in the audit trail."""
+REDONE: Final = "edit.redone"
+"""Action of an undone edit that is made again."""
+
+
+def make(
+    db: Database,
+    reviewed: ReviewedAnalyses,
+    actor: audit.Actor | None,
+    session_id: str,
+    edit: Edit,
+    *,
+    seen: int | None = None,
+) -> tuple[analyses.AnalysisRecord, EditHistory]:
+    """Change the analysis that a session shows.
+
+    Parameters
+    ----------
+    seen : version on which the person decided; None = whatever there is.
+
+    Raises
+    ------
+    NotFound: no analysis. Conflict: edited_meanwhile, no_tracks.
+    ParameterError of sagittal.core.events.edits.
+    """
+    found, before = _state(db, session_id, seen)
+    return found, _make(db, reviewed, actor, session_id, found, before, edit, ACTIONS[edit.kind])
+
+
+def undo(
+    db: Database, actor: audit.Actor | None, session_id: str, *, seen: int | None = None
+) -> tuple[analyses.AnalysisRecord, EditHistory]:
+    """Take the last live edit back; raises NotFound, Conflict nothing_to_undo, edited_meanwhile."""
+    found, before = _state(db, session_id, seen)
+    if not before.made:
+        raise Conflict("nothing_to_undo", "Nothing has been changed in this analysis.")
+    with db.write() as c:
+        _refuse_older(c, found, before)
+        _append(c, actor, session_id, found, UNDO, {}, ACTIONS[UNDO])
+        return found, edits_of(c, found.id)
+
+
+def redo(
+    db: Database,
+    reviewed: ReviewedAnalyses,
+    actor: audit.Actor | None,
+    session_id: str,
+    *,
+    seen: int | None = None,
+) -> tuple[analyses.AnalysisRecord, EditHistory]:
+    """Make the last undone edit again; raises NotFound, Conflict nothing_to_redo, edited_meanwhile."""
+    found, before = _state(db, session_id, seen)
+    if not before.undone:
+        raise Conflict("nothing_to_redo", "There is no undone change in this analysis.")
+    return found, _make(db, reviewed, actor, session_id, found, before, before.undone[-1], REDONE)
+
+
+def _make(
+    db: Database,
+    reviewed: ReviewedAnalyses,
+    actor: audit.Actor | None,
+    session_id: str,
+    found: analyses.AnalysisRecord,
+    before: EditHistory,
+    edit: Edit,
+    action: str,
+) -> EditHistory:
+    # measured before the lock is taken: what cannot be is refused, and nobody waits for it
+    result = reviewed.measure_anew(found, (*before.edits, edit))
+    with db.write() as c:
+        _refuse_older(c, found, before)
+        _append(c, actor, session_id, found, edit.kind, edit.to_json(), action)
+        after = edits_of(c, found.id)
+    reviewed.keep_result(found, after, result)
+    return after
+
+
+def _state(db: Database, session_id: str, seen: int | None) -> tuple[analyses.AnalysisRecord, EditHistory]:
+    with db.read() as c:
+        found = analyses.get_shown(c, session_id)
+        edits = edits_of(c, found.id)
+    if seen is not None and seen != edits.version:
+        raise _meanwhile()
+    return found, edits
+
+
+def _refuse_older(c: Connection, found: analyses.AnalysisRecord, before: EditHistory) -> None:
+    if edits_of(c, found.id).version != before.version:
+        raise _meanwhile()
+
+
+def _meanwhile() -> Conflict:
+    return Conflict(
+        "edited_meanwhile",
+        "Somebody else has changed this review since it was loaded; nothing was changed. Load it again.",
+    )
+
+
+def _append(
+    c: Connection,
+    actor: audit.Actor | None,
+    session_id: str,
+    found: analyses.AnalysisRecord,
+    kind: str,
+    content: dict[str, Any],
+    action: str,
+) -> None:
+    values = {
+        "analysis_id": found.id,
+        "kind": kind,
+        "content": content,
+        "user_id": actor.user_id if actor else None,
+        "at": now(),
+    }
+    c.execute(insert(rows).values(values))
+    # the reason is free text and stays out of a trail that outlives an erasure
+    said = {k: v for k, v in content.items() if k != "reason"}
+    audit.record(c, actor, action, "session", session_id, {"analysis_id": found.id, **said})

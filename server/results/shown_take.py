@@ -1,0 +1,72 @@
+"""Jobs on the analysis that a session shows: on its recording as it was analysed, or on its result files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from sqlalchemy import Connection
+
+from sagittal.server import audit
+from sagittal.server.jobs.queue import JobQueue, JobView
+from sagittal.server.provenance import CODE_VERSION
+from sagittal.server.results import analyses
+from sagittal.server.uploads import recordings
+
+
+def submit_on_shown(
+    c: Connection,
+    queue: JobQueue,
+    actor: audit.Actor | None,
+    found: analyses.AnalysisRecord,
+    kind: str,
+    action: str,
+    *,
+    against: recordings.RecordedFile | None,
+    **own: Any,
+) -> JobView:
+    """Ask for a job; the same one is done once.
+
+    Parameters
+    ----------
+    found : the analysis that is shown. action : in the audit log. against : a reference, last of the job's
+        files. own : parameters of this kind of job.
+    """
+    inputs = recordings.job_inputs(recordings.get(c, found.recording_id))
+    if against is not None:
+        inputs["files"].append({"name": against.name, "size": against.size, "sha256": against.sha256})
+    params = {
+        **inputs,
+        "manifest": found.manifest or {},
+        "config": dict(found.config),
+        "analysis_id": found.id,
+        **own,
+    }
+    return submit_for(c, queue, actor, found, kind, action, params)
+
+
+def submit_for(
+    c: Connection,
+    queue: JobQueue,
+    actor: audit.Actor | None,
+    found: analyses.AnalysisRecord,
+    kind: str,
+    action: str,
+    params: Mapping[str, Any],
+) -> JobView:
+    """Ask for a job on an analysis; the same one is done once."""
+    view = queue.submit(
+        c,
+        key=make_key(found, kind, params),
+        kind=kind,
+        params=params,
+        recording_id=found.recording_id,
+        requested_by=actor.user_id if actor else None,
+    )
+    audit.record(c, actor, action, "session", found.session_id, {"job_id": view.id})
+    return view
+
+
+def make_key(found: analyses.AnalysisRecord, kind: str, params: Mapping[str, Any]) -> str:
+    """What names a job on an analysis: equal keys give equal results."""
+    return f"{found.id}:{kind}:{analyses.digest_json(params)}:{CODE_VERSION}"

@@ -1,0 +1,246 @@
+"""Signals of a finished analysis for the eye: named lanes, each thinned to what a screen can show.
+
+Derived: pitch and rate of the feet, how high they are, every joint angle. Raw: what each sensor measured, in
+its own axes. A window of a lane is answered as the least and the greatest value of equal parts of it, so that
+no peak is lost, however far one zooms out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import pyarrow.parquet as pq
+from pyarrow import BufferReader
+
+from sagittal.core.events.foot_pitch import pitch_signal
+from sagittal.core.frames import FOOT, SEGMENTS, SIDES, SUFFIX, Floats, Segment
+from sagittal.server.errors import NotFound
+from sagittal.server.report.files import signals as file
+from sagittal.server.report.files.columns import floats_of
+from sagittal.server.report.words.wording import VARIABLES, place_words
+from sagittal.server.results import analyses
+from sagittal.server.results.reviewed import ReviewedAnalyses, StoredAnalysis
+
+MOST_POINTS: Final = 4000
+"""Parts of a window at most: as many pixels as the widest screens have across."""
+
+AXES: Final = ("x", "y", "z")
+DIGITS: Final = 3
+
+
+@dataclass(frozen=True)
+class SignalLane:
+    """A signal over time, drawn in one diagram.
+
+    Parameters
+    ----------
+    lines : what is drawn in it: "left", "right" or "x", "y", "z". up : which way is up, in words.
+    raw : of one sensor, as measured.
+    """
+
+    name: str
+    label: str
+    unit: str
+    up: str
+    lines: tuple[str, ...]
+    raw: bool
+
+
+@dataclass(frozen=True, eq=False)
+class SignalWindow:
+    """A window of a lane.
+
+    Parameters
+    ----------
+    start_s, step_s : time of the first part and from part to part.
+    low, high : line → least and greatest value of every part, None where the sensor was lost.
+    """
+
+    lane: SignalLane
+    start_s: float
+    step_s: float
+    low: Mapping[str, list[float | None]]
+    high: Mapping[str, list[float | None]]
+
+
+def list_lanes(reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord) -> tuple[SignalLane, ...]:
+    """What can be drawn of an analysis, feet first, then joints from the top, then sensors."""
+    known = reviewed.open(found)
+    return tuple(lane for lane, _ in _lanes(reviewed, found, known))
+
+
+def read_window(
+    reviewed: ReviewedAnalyses,
+    found: analyses.AnalysisRecord,
+    name: str,
+    start_s: float,
+    end_s: float,
+    points: int,
+) -> SignalWindow:
+    """A window of a lane in at most `points` parts; raises NotFound for a lane that is not there."""
+    known = reviewed.open(found)
+    drawn = next(((lane, read) for lane, read in _lanes(reviewed, found, known) if lane.name == name), None)
+    if drawn is None:
+        raise NotFound("signal", name)
+    lane, read = drawn
+    t_s, lines = read()
+    n = len(t_s)
+    rate = (n - 1) / (t_s[-1] - t_s[0]) if n > 1 else 1.0
+    first = min(max(math.floor((start_s - t_s[0]) * rate), 0), n - 1)
+    past = min(max(math.ceil((end_s - t_s[0]) * rate) + 1, first + 1), n)
+    size = max(1, math.ceil((past - first) / min(points, MOST_POINTS)))
+    low, high = {}, {}
+    for line, values in lines.items():
+        low[line], high[line] = _extremes(values[first:past], size)
+    return SignalWindow(lane, float(t_s[first]), size / rate, low, high)
+
+
+Read = Callable[[], tuple[Floats, Mapping[str, Floats]]]
+
+
+def _lanes(
+    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, known: StoredAnalysis
+) -> Iterator[tuple[SignalLane, Read]]:
+    yield from _foot_lanes(reviewed, found, known)
+    yield from _angle_lanes(known)
+    yield from _raw_lanes(reviewed, found)
+
+
+def _foot_lanes(
+    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, known: StoredAnalysis
+) -> Iterator[tuple[SignalLane, Read]]:
+    tracks = known.tracks
+    if tracks is None:
+        return
+    worn = tuple(side for side in SIDES if FOOT[side] in tracks.q)
+    if worn:
+
+        def pitch() -> tuple[Floats, Mapping[str, Floats]]:
+            lines: dict[str, Floats] = {}
+            for side in worn:
+                angle = np.degrees(np.arcsin(np.clip(pitch_signal(tracks.q[FOOT[side]]), -1.0, 1.0)))
+                lines[side] = np.where(tracks.valid[FOOT[side]], angle, np.nan)
+            return tracks.t_s, lines
+
+        yield SignalLane("foot_pitch", "Foot pitch", "°", "toes up", worn, raw=False), pitch
+    turned = (known.bundle.calibration or {}).get("segments") or {}
+    if worn and file.NAME in found.files and all(FOOT[side] in turned for side in worn):
+
+        def rate() -> tuple[Floats, Mapping[str, Floats]]:
+            lines: dict[str, Floats] = {}
+            t_s = tracks.t_s
+            for side in worn:
+                mounted = turned[FOOT[side]]
+                t_s, axes = _raw(reviewed, found, FOOT[side], "gyr")
+                bias = np.array([b or 0.0 for b in mounted["gyro_bias_dps"]])
+                # the segment's z axis points to the right: turning about it lifts the toes
+                across = np.array(mounted["R_segment_sensor"])[2]
+                lines[side] = (np.stack([axes[c] for c in AXES], axis=1) - bias) @ across
+            return t_s, lines
+
+        def strength() -> tuple[Floats, Mapping[str, Floats]]:
+            lines: dict[str, Floats] = {}
+            t_s = tracks.t_s
+            for side in worn:
+                t_s, axes = _raw(reviewed, found, FOOT[side], "acc")
+                lines[side] = np.sqrt(sum(axes[c] ** 2 for c in AXES))
+            return t_s, lines
+
+        yield SignalLane("foot_rate", "Foot turning rate", "°/s", "toes rise", worn, raw=False), rate
+        yield SignalLane("foot_acceleration", "Foot acceleration", "m/s²", "more", worn, raw=False), strength
+    feet = tracks.feet
+    if feet is not None and feet.p:
+        placed = tuple(side for side in SIDES if side in feet.p)
+
+        def height() -> tuple[Floats, Mapping[str, Floats]]:
+            return feet.t_s, {str(s): np.where(feet.valid[s], feet.p[s][:, 2], np.nan) for s in placed}
+
+        yield SignalLane("foot_height", "Ankle height", "m", "higher", placed, raw=False), height
+
+
+def _angle_lanes(known: StoredAnalysis) -> Iterator[tuple[SignalLane, Read]]:
+    angles = known.bundle.angles
+    if angles is None:
+        return
+    for variable in VARIABLES:
+        names: dict[str, str] = {side: f"{variable.name}_{SUFFIX[side]}" for side in SIDES}
+        if variable.name in angles.angles:
+            names = {"both": variable.name}
+        lines = {line: angles.angles[name] for line, name in names.items() if name in angles.angles}
+        if lines:
+
+            def read(lines: Mapping[str, Floats] = lines) -> tuple[Floats, Mapping[str, Floats]]:
+                return angles.t_s, {line: np.degrees(values) for line, values in lines.items()}
+
+            yield (
+                SignalLane(variable.name, variable.label, "°", variable.up.lower(), tuple(lines), raw=False),
+                read,
+            )
+
+
+def _raw_lanes(
+    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord
+) -> Iterator[tuple[SignalLane, Read]]:
+    if file.NAME not in found.files:
+        return
+    names = set(_columns(reviewed, found))
+    for segment in SEGMENTS:
+        for kind, label, unit in (("gyr", "angular rate", "°/s"), ("acc", "acceleration", "m/s²")):
+            if f"{segment}_{kind}_x{_ENDING[kind]}" not in names:
+                continue
+
+            def read(segment: Segment = segment, kind: str = kind) -> tuple[Floats, Mapping[str, Floats]]:
+                return _raw(reviewed, found, segment, kind)
+
+            words = place_words(segment).capitalize()
+            yield SignalLane(f"{segment}_{kind}", f"{words}, {label}", unit, "more", AXES, raw=True), read
+
+
+_ENDING: Final = {"gyr": "_dps", "acc": ""}
+
+
+def _columns(reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord) -> tuple[str, ...]:
+    def read() -> tuple[str, ...]:
+        content = analyses.file_bytes(reviewed.blobs, found, file.NAME)
+        return tuple(pq.read_schema(BufferReader(content)).names)
+
+    return reviewed.keep_part((found.id, "columns"), read)
+
+
+def _raw(
+    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, segment: Segment, kind: str
+) -> tuple[Floats, Mapping[str, Floats]]:
+    """The three axes of a sensor; kept, for whoever looks at a signal looks again."""
+
+    def read() -> tuple[Floats, Mapping[str, Floats]]:
+        names = {c: f"{segment}_{kind}_{c}{_ENDING[kind]}" for c in AXES}
+        content = analyses.file_bytes(reviewed.blobs, found, file.NAME)
+        table = pq.ParquetFile(BufferReader(content)).read(columns=["t_s", *names.values()])
+        return floats_of(table, "t_s"), {c: floats_of(table, name) for c, name in names.items()}
+
+    return reviewed.keep_part((found.id, segment, kind), read)
+
+
+def _extremes(values: Floats, size: int) -> tuple[list[float | None], list[float | None]]:
+    """Least and greatest value of successive parts of `size` samples, the last one shorter."""
+    if size == 1:
+        same = _plain(values)
+        return same, same
+    full = np.full(math.ceil(len(values) / size) * size, np.nan)
+    full[: len(values)] = values
+    parts = full.reshape(-1, size)
+    low = np.fmin.reduce(parts, axis=1)
+    high = np.fmax.reduce(parts, axis=1)
+    return _plain(low), _plain(high)
+
+
+def _plain(values: Floats) -> list[float | None]:
+    rounded = np.round(values, DIGITS)
+    found: list[float | None] = rounded.tolist()
+    for i in np.flatnonzero(~np.isfinite(rounded)):
+        found[i] = None
+    return found

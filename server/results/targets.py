@@ -1,0 +1,221 @@
+"""Targets of biofeedback in numbers: the norm at a person's speed, the other side, their own baseline."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import sqrt
+from typing import Final
+
+from sqlalchemy import Connection
+
+from sagittal.core.feedback import Target
+from sagittal.core.feedback.prescription import TargetSource
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.norms import Norms, NormValue
+from sagittal.core.norms.values import is_angle
+from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.plurals import plural
+from sagittal.core.subject.condition import is_alike
+from sagittal.server.clinic.patients import Patient
+from sagittal.server.clinic.sessions import WALKS, Session
+from sagittal.server.report.history.numbers import Numbers
+from sagittal.server.report.words.wording import GROUPS, NO_NORM
+from sagittal.server.results import comparisons, controls, histories
+from sagittal.server.results.histories import AnalysedSession
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.web.words import day
+
+FEWEST: Final = 5
+"""Strides below which a person's own mean and SD are no target (our choice)."""
+
+
+@dataclass(frozen=True, eq=False)
+class AnalysedWalk:
+    """An analysed session of a person with what it is compared with.
+
+    Parameters
+    ----------
+    own_controls : the clinic's own norm, read when it is asked for: there may be many controls.
+    """
+
+    session: Session
+    numbers: Numbers
+    norms: Norms
+    own_controls: Callable[[], Norms | None]
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What a source gives, or a sentence that says why it gives nothing."""
+
+    target: Target | None
+    reason: str | None = None
+
+
+def last_walk(
+    c: Connection,
+    reviewed: ReviewedAnalyses,
+    patient: Patient,
+    before: Session | None = None,
+    session_id: str | None = None,
+    *,
+    with_controls: bool = True,
+) -> AnalysedWalk | None:
+    """The analysed walk that says how a person walks, never one with feedback; None without one.
+
+    Without `before` it is that of `histories.baseline`.
+
+    Parameters
+    ----------
+    before : the newest walked like this session, on its day or earlier, itself not. session_id : only this
+        one. with_controls : look for the clinic's own controls too.
+    """
+    found = [
+        a
+        for a in histories.list_analysed(c, patient.id)
+        if a.session.protocol in WALKS
+        and session_id in {None, a.session.id}
+        and (before is None or _earlier(a, before))
+    ]
+    last = histories.baseline(found)
+    if last is None:
+        return None
+    numbers = reviewed.read_numbers(last.found, last.edits)
+    speed = _mean(numbers, "gait_speed_mps", None)
+    visits = controls.list_visits(c, patient, last.session) if with_controls else ()
+
+    def own_controls() -> Norms | None:
+        group = controls.make_group(reviewed, visits, None if speed is None else speed.mean)
+        return None if group is None or speed is None else group.norms(speed.mean)
+
+    return AnalysedWalk(
+        last.session, numbers, comparisons.find_norms(patient, last.session, numbers), own_controls
+    )
+
+
+def offer(walk: AnalysedWalk | None, source: TargetSource, parameter: str, side: Side | None) -> Offer:
+    """What a source gives as target of a parameter, from a person's last walk.
+
+    Parameters
+    ----------
+    side : that is to be trained, None = both.
+    """
+    if source == "manual":
+        return Offer(None, "Enter mean and SD.")
+    if walk is None:
+        return Offer(
+            None,
+            "No walk of this person without feedback is analysed yet. Analyse one first, or enter a target.",
+        )
+    if source == "norm":
+        return _norm(walk, parameter)
+    if source == "own_baseline":
+        return _own(walk, parameter, side)
+    if side is None:
+        return Offer(None, "Both sides are trained. Choose the one that is, the other is then the target.")
+    return _better(walk, parameter, side)
+
+
+def opposite_side(side: Side) -> Side:
+    """The opposite side."""
+    return "right" if side == "left" else "left"
+
+
+def find_usual_value(walk: AnalysedWalk, parameter: str, side: Side | None) -> Parameter | None:
+    """What a person did in a walk: of a side, or of both together; None where it was not measured."""
+    found = _mean(walk.numbers, parameter, side) or _mean(walk.numbers, parameter, None)
+    if found is not None or side is not None:
+        return found
+    sides = [p for s in SIDES if (p := _mean(walk.numbers, parameter, s)) is not None]
+    return _together(sides) if sides else None
+
+
+def _better(walk: AnalysedWalk, parameter: str, side: Side) -> Offer:
+    """The other side, where the parameter's direction says that it is the better one."""
+    entry = CATALOGUE[parameter]
+    if entry.better is None:
+        return Offer(
+            None,
+            f"{entry.label}: neither higher nor lower is better by itself. Choose another source, or enter a "
+            "target.",
+        )
+    other = _own(walk, parameter, opposite_side(side))
+    own = find_usual_value(walk, parameter, side)
+    if other.target is None or other.target.mean is None or own is None or own.mean is None:
+        return other
+    ahead = other.target.mean - own.mean
+    if (ahead if entry.better == "higher" else -ahead) > 0.0:
+        return other
+    return Offer(
+        None,
+        f"The {side} side is the better one on {day(walk.session.performed_on)}. Train the other side, or "
+        "choose another source.",
+    )
+
+
+def _norm(walk: AnalysedWalk, parameter: str) -> Offer:
+    norms = walk.norms
+    values = [norms.expected.get(parameter), norms.values.get(parameter)]
+    found = next((v for v in values if _serves(v)), None)
+    if found is None and (own := walk.own_controls()) is not None and _serves(own.values.get(parameter)):
+        found = own.values[parameter]
+    if found is not None:
+        return Offer(Target("norm", found.mean, found.sd, _words(found), walk.session.id))
+    reason = norms.reason if is_angle(parameter) else norms.timing_reason
+    if reason is not None:
+        said = NO_NORM.get(reason, reason)
+    else:
+        there = next((v for v in values if v is not None), None)
+        said = "There is no norm of this parameter." if there is None else there.note
+    return Offer(None, f"{said} Choose another source, or enter a target.")
+
+
+def _serves(value: NormValue | None) -> bool:
+    return value is not None and value.comparable and value.sd > 0.0
+
+
+def _own(walk: AnalysedWalk, parameter: str, side: Side | None) -> Offer:
+    found = find_usual_value(walk, parameter, side)
+    where = "both sides" if side is None else f"{side} side"
+    if found is None or found.mean is None or not found.sd or found.n < FEWEST:
+        n = 0 if found is None else found.n
+        return Offer(
+            None,
+            f"The {where} has {n} {plural(n, 'stride', 'strides')} with this parameter on "
+            f"{day(walk.session.performed_on)}; expected at least {FEWEST} that differ. Choose another "
+            "source, or enter a target.",
+        )
+    words = f"{where}, {found.n} {plural(found.n, 'stride', 'strides')} on {day(walk.session.performed_on)}"
+    source: TargetSource = "own_baseline"
+    return Offer(Target(source, found.mean, found.sd, words, walk.session.id))
+
+
+def _words(value: NormValue) -> str:
+    group = GROUPS.get(value.group, value.group)
+    people = "" if value.n is None else f", n = {value.n}"
+    return f"{group}{people} ({value.source})"
+
+
+def _mean(numbers: Numbers, name: str, side: Side | None) -> Parameter | None:
+    return next(
+        (p for p in numbers.parameters if (p.name, p.side) == (name, side) and p.mean is not None), None
+    )
+
+
+def _together(sides: list[Parameter]) -> Parameter:
+    """Strides of all sides as one: mean, and sd about it."""
+    n = sum(p.n for p in sides)
+    mean = sum(p.n * (p.mean or 0.0) for p in sides) / n
+    squares = sum((p.n - 1) * (p.sd or 0.0) ** 2 + p.n * ((p.mean or 0.0) - mean) ** 2 for p in sides)
+    first = sides[0]
+    return Parameter(first.name, None, n, mean, sqrt(squares / (n - 1)) if n > 1 else None, first.unit)
+
+
+def _earlier(a: AnalysedSession, b: Session) -> bool:
+    """Whether a visit came before this session and was walked like it; how fast its belt will run is open."""
+    own = a.session
+    if own.id == b.id or (own.performed_on, own.created_at) >= (b.performed_on, b.created_at):
+        return False
+    return is_alike(own.walked(), b.walked())

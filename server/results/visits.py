@@ -1,0 +1,206 @@
+"""Visits: what was recorded on one day under one condition, as one or several takes, and their mean."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from sqlalchemy import Connection
+
+from sagittal.core.change import Change, parameter_changes
+from sagittal.core.frames import Side
+from sagittal.core.parameters.result import Parameter
+from sagittal.core.parameters.takes import join_takes
+from sagittal.core.subject.condition import WalkingCondition, is_alike, is_comparable
+from sagittal.server.clinic import sessions
+from sagittal.server.report.history.trends import VisitKind
+from sagittal.server.results import analyses, edit_log
+from sagittal.server.results.histories import AnalysedSession, classify_visit
+from sagittal.server.results.reviewed import UNREADABLE, ReviewedAnalyses
+
+SPEED: Final = "gait_speed_mps"
+
+
+@dataclass(frozen=True, eq=False)
+class ClinicVisit:
+    """The analysed takes of one day that were walked alike, in the order they were made; at least one."""
+
+    takes: tuple[AnalysedSession, ...]
+
+    @property
+    def day(self) -> dt.date:
+        """When it was."""
+        return self.takes[0].session.performed_on
+
+    @property
+    def condition(self) -> WalkingCondition:
+        """How all its takes were walked."""
+        return self.takes[0].condition
+
+
+@dataclass(frozen=True)
+class TakesFigure:
+    """A figure of a visit.
+
+    Parameters
+    ----------
+    by_take : session of every take that has the parameter → it. mean : over them.
+    """
+
+    by_take: Mapping[str, Parameter]
+    mean: Parameter
+
+    @property
+    def takes(self) -> tuple[Parameter, ...]:
+        """Of the takes, in the order they were made."""
+        return tuple(self.by_take.values())
+
+
+@dataclass(frozen=True)
+class NewestSpeed:
+    """Walking speed of a patient's newest visit; its change since the visit before, None = none yet."""
+
+    mean: Parameter
+    change: Change | None
+
+
+def group_takes(done: Sequence[AnalysedSession]) -> list[ClinicVisit]:
+    """Join takes of one day that were walked alike; visits and takes oldest first."""
+    groups: list[list[AnalysedSession]] = []
+    for a in sorted(done, key=lambda a: (a.session.performed_on, a.session.created_at)):
+        same = next((g for g in reversed(groups) if is_one_visit(g[0], a)), None)
+        if same is None:
+            groups.append([a])
+        else:
+            same.append(a)
+    return [ClinicVisit(tuple(g)) for g in groups]
+
+
+def is_one_visit(a: AnalysedSession, b: AnalysedSession) -> bool:
+    """Whether two takes belong together: same day, walked alike, both with feedback or both without."""
+    return (
+        a.session.performed_on == b.session.performed_on
+        and a.session.feedback == b.session.feedback
+        and is_alike(a.condition, b.condition)
+    )
+
+
+def find_visit_of(done: Sequence[AnalysedSession], session_id: str) -> ClinicVisit | None:
+    """The visit a session is a take of; None when it is not analysed."""
+    return next(
+        (v for v in group_takes(done) if any(t.session.id == session_id for t in v.takes)),
+        None,
+    )
+
+
+def measure_visit(
+    reviewed: ReviewedAnalyses, visit: ClinicVisit
+) -> Mapping[tuple[str, Side | None], TakesFigure]:
+    """Every parameter of a visit by name and side; raises IntegrityError."""
+    by: dict[tuple[str, Side | None], dict[str, Parameter]] = {}
+    for take in visit.takes:
+        for p in reviewed.read_numbers(take.found, take.edits).parameters:
+            by.setdefault((p.name, p.side), {})[take.session.id] = p
+    return {key: TakesFigure(found, join_takes(list(found.values()))) for key, found in by.items()}
+
+
+def find_before(
+    visits: Sequence[ClinicVisit], visit: ClinicVisit, planned: Mapping[str, VisitKind]
+) -> ClinicVisit | None:
+    """The visit that another one is compared with: the last earlier day in the same condition.
+
+    Of an assessment the last assessment, so that a single training does not stand for the course.
+
+    Parameters
+    ----------
+    visits : oldest first. planned : session → kind of the planned visit it was.
+    """
+    is_assessment = _is_assessment(visit, planned)
+    for v in reversed(visits):
+        if v.day >= visit.day or not is_comparable(v.condition, visit.condition):
+            continue
+        if is_assessment and not _is_assessment(v, planned):
+            continue
+        return v
+    return None
+
+
+def _is_assessment(visit: ClinicVisit, planned: Mapping[str, VisitKind]) -> bool:
+    return any(classify_visit(t.session, planned.get(t.session.id)) == "assessment" for t in visit.takes)
+
+
+def choose_newest_walks(
+    c: Connection, patient_ids: Collection[str], planned: Mapping[str, VisitKind]
+) -> dict[str, list[sessions.WalkedSession]]:
+    """Takes of each patient's newest visit and of the one that it is compared with, in one statement for all.
+
+    Parameters
+    ----------
+    planned : `programmes.list_kinds` of these patients.
+    """
+    rows = sessions.list_walks(c, patient_ids)
+    chosen: dict[str, list[sessions.WalkedSession]] = {}
+    for pid in patient_ids:
+        mine = rows.get(pid, [])
+        newest = next((w for w in mine if w.condition.is_at_own_pace), mine[0] if mine else None)
+        if newest is not None:
+            chosen[pid] = _two_days(mine, newest, planned)
+    return chosen
+
+
+def read_newest_speeds(
+    reviewed: ReviewedAnalyses,
+    chosen: Mapping[str, Sequence[sessions.WalkedSession]],
+    shown: Mapping[str, analyses.AnalysisRecord],
+    edits: Mapping[str, edit_log.EditHistory],
+) -> dict[str, NewestSpeed]:
+    """Walking speed of the newest visit of each patient; what cannot be read is left out.
+
+    Parameters
+    ----------
+    chosen : what `choose_newest_walks` chose.
+    shown : the results that count, by session.
+    edits : by analysis.
+    """
+    speeds = {}
+    for pid, walks in chosen.items():
+        days: dict[dt.date, list[Parameter]] = {}
+        for w in walks:
+            found = shown[w.id]
+            speed = _read_speed(reviewed, found, edits[found.id])
+            if speed is not None:
+                days.setdefault(w.performed_on, []).append(speed)
+        made = [join_takes(days[day]) for day in sorted(days)]
+        if made and max(days) == walks[0].performed_on and made[-1].mean is not None:
+            before = made[0] if len(made) > 1 else None
+            change = None if before is None else parameter_changes([before], [made[-1]])[0]
+            speeds[pid] = NewestSpeed(made[-1], change)
+    return speeds
+
+
+def _read_speed(
+    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, edits: edit_log.EditHistory
+) -> Parameter | None:
+    if "analysis.json" not in found.files:
+        return None
+    try:
+        return reviewed.read_speed(found, edits)
+    except UNREADABLE:
+        return None
+
+
+def _two_days(
+    mine: Sequence[sessions.WalkedSession], newest: sessions.WalkedSession, planned: Mapping[str, VisitKind]
+) -> list[sessions.WalkedSession]:
+    """The takes of a visit and of the one before it, newest first."""
+    alike = [w for w in mine if is_alike(w.condition, newest.condition)]
+    is_training = planned.get(newest.id) == "training"
+    earlier = [
+        w
+        for w in alike
+        if w.performed_on < newest.performed_on and (is_training or planned.get(w.id) != "training")
+    ]
+    days = {newest.performed_on, *(w.performed_on for w in earlier[:1])}
+    return [w for w in (newest, *(w for w in alike if w is not newest)) if w.performed_on in days]

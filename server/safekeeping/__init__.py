@@ -1,0 +1,1 @@
+"""Backup, restore, erasure, and checks that what is stored is still there."""

@@ -1,0 +1,178 @@
+"""Backups by the clock, and the weekly proof that the newest one can be restored.
+
+if is_due(settings, now()): run(settings)      # in a process of its own (worker/backing_up.py)
+read_state(settings)                           # how the last ones went: the page System, health, metrics
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+import logging
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from sagittal.core.formats.json_tree import read_json
+from sagittal.server.safekeeping.backups import BackupError, list_backups, make_backup, prune
+from sagittal.server.safekeeping.restore_room import RestoreError
+from sagittal.server.safekeeping.restoring import try_restore
+from sagittal.server.safekeeping.tombstones import TombstoneError
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.archive import BackupFileError, ClinicKey, read_key
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.migrate import MigrationError, require_current
+from sagittal.server.storage.tables import now
+
+log = logging.getLogger(__name__)
+
+TEST_EVERY: Final = dt.timedelta(days=7)
+"""How old the last restore test may be before the next one."""
+TRY_AGAIN: Final = dt.timedelta(hours=1)
+"""Pause after a backup or a test that failed."""
+LATE: Final = dt.timedelta(hours=26)
+"""Age of the newest backup from which somebody should be told."""
+
+NOT_TESTED: Final = (
+    "It is encrypted for a key that is not on this computer. Try it where the key is: "
+    "sagittal restore FILE --key FILE --test."
+)
+
+LEFT_OUT: Final = (
+    "The key of patients' names is not in it: it is not encrypted, or the key cannot be read. "
+    "Keep a copy on paper."
+)
+CLOSED: Final = "Patients' names in it need their key, which is not in it or is another one."
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one backup or one restore test went.
+
+    Parameters
+    ----------
+    at : when it ended. ok : None = it could not be tried. name : the backup's file.
+    said : what went wrong, or what was found, as a sentence. size : bytes of the backup, 0 = none.
+    """
+
+    at: dt.datetime
+    ok: bool | None
+    name: str
+    said: str
+    size: int = 0
+
+
+@dataclass(frozen=True)
+class BackupState:
+    """How the last backup and the last restore test went; None = there was none.
+
+    Parameters
+    ----------
+    good : the last backup that was made without a complaint.
+    """
+
+    backup: Outcome | None = None
+    good: Outcome | None = None
+    test: Outcome | None = None
+
+
+def read_state(settings: Settings) -> BackupState:
+    """What the file says; empty when there is none or it cannot be read."""
+    try:
+        tree: Any = read_json(settings.backup_state.read_bytes())
+        return BackupState(*(_parse(tree[name]) for name in ("backup", "good", "test")))
+    except FileNotFoundError:
+        return BackupState()
+    except (OSError, ValueError, KeyError, TypeError):
+        log.exception("%s cannot be read", settings.backup_state.name)
+        return BackupState()
+
+
+def next_time(settings: Settings, at: dt.datetime) -> dt.datetime:
+    """When the clock next shows `backup_at`, in the zone of `at`."""
+    hour, minute = map(int, settings.backup_at.split(":"))
+    day = at.replace(hour=hour, minute=minute, second=0, microsecond=0)
+    return day if day > at else day + dt.timedelta(days=1)
+
+
+def is_due(settings: Settings, at: dt.datetime) -> bool:
+    """Whether a backup is to be made: none since the last `backup_at`, no failure within the hour.
+
+    Parameters
+    ----------
+    at : the time in the machine's zone.
+    """
+    if not settings.backup_dir:
+        return False
+    state = read_state(settings)
+    if state.backup is not None and not state.backup.ok and at - state.backup.at < TRY_AGAIN:
+        return False
+    last = next_time(settings, at) - dt.timedelta(days=1)
+    return state.good is None or state.good.at < last
+
+
+def run(settings: Settings) -> BackupState:
+    """Make a backup, remove old ones, test the newest when the last test is a week old; write how it went."""
+    folder = Path(settings.backup_dir)
+    state = read_state(settings)
+    key: ClinicKey | None = None
+    try:
+        require_current(settings.database_source)
+        key = read_key(Path(settings.backup_key)) if settings.backup_key else None
+        with closing(Database(settings.database_source)) as db:
+            made = make_backup(db, settings, folder, key)
+        prune(folder)
+        said = ""
+        if made.left_out is not None:
+            said = LEFT_OUT
+        if made.missing:
+            said = f"{len(made.missing)} stored files are gone or damaged; see sagittal check."
+        backup = Outcome(now(), not made.missing, made.path.name, said, made.size)
+    except (BackupFileError, BackupError, MigrationError, TombstoneError, OSError) as error:
+        log.error("no backup was made: %s", error)
+        backup = Outcome(now(), False, "", str(error))
+    good = backup if backup.size else state.good
+    state = _write(settings, BackupState(backup, good, state.test))
+    if backup.size and _is_test_due(state):
+        state = _write(settings, replace(state, test=_test(settings, folder, key)))
+    return state
+
+
+def _is_test_due(state: BackupState) -> bool:
+    if state.test is None or state.test.ok is None:
+        return True
+    return now() - state.test.at >= (TEST_EVERY - TRY_AGAIN if state.test.ok else TRY_AGAIN)
+
+
+def _test(settings: Settings, folder: Path, key: ClinicKey | None) -> Outcome:
+    newest = list_backups(folder)[0].path
+    if key is not None and not key.opens:
+        return Outcome(now(), None, newest.name, NOT_TESTED)
+    try:
+        found = try_restore(newest, settings, key)
+    except (BackupFileError, RestoreError, TombstoneError) as error:
+        log.error("the newest backup could not be restored: %s", error)
+        return Outcome(now(), False, newest.name, str(error))
+    said = f"{found.patients} patients, {found.sessions} visits, {found.files} files."
+    if found.names_open:
+        return Outcome(now(), True, newest.name, said)
+    # what is not encrypted never holds the key; what is should
+    return Outcome(now(), key is None, newest.name, f"{said} {CLOSED}")
+
+
+def _parse(tree: Any) -> Outcome | None:
+    if tree is None:
+        return None
+    at = dt.datetime.fromisoformat(tree["at"])
+    return Outcome(at, tree["ok"], tree["name"], tree["said"], tree["size"])
+
+
+def _write(settings: Settings, state: BackupState) -> BackupState:
+    def tree(one: Outcome | None) -> object:
+        return None if one is None else {**one.__dict__, "at": one.at.isoformat()}
+
+    content = {"backup": tree(state.backup), "good": tree(state.good), "test": tree(state.test)}
+    fs.write_file(settings.backup_state, json.dumps(content).encode())
+    return state

@@ -1,0 +1,324 @@
+"""A backup while the service runs: one file with the database, stored files, live logs and a manifest.
+
+    made = make_backup(db, settings, Path("/mnt/backup"), key)     # an existing folder: the name says when
+    prune(Path("/mnt/backup"))                                     # keep days, weeks and months
+
+Live logs go first, then a snapshot of the database, then the files it refers to. So a take that ends
+meanwhile is there as a log or as a recording; stored files never change, one that is swept meanwhile is in
+the trash. The file appears under its name when it is whole and on the disk, or not at all.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime as dt
+import io
+import json
+import logging
+import re
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from sqlalchemy import Connection, func, select, update
+
+from sagittal.server import audit
+from sagittal.server.provenance import CODE_VERSION
+from sagittal.server.safekeeping.tombstones import find_tombstones, keep_tombstones
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.archive import ArchiveWriter, ClinicKey, write_archive
+from sagittal.server.storage.blob_opening import open_blobs
+from sagittal.server.storage.blobs import BlobStore, StoreAway
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import HighWater, read_newest
+from sagittal.server.storage.migrate import copy_database, read_revision
+from sagittal.server.storage.references import list_referenced
+from sagittal.server.storage.tables import job, new_id, now, patient, session
+
+log = logging.getLogger(__name__)
+
+FORMAT: Final = 1
+"""Version of the manifest; a later one may add keys, never change these."""
+MANIFEST: Final = "manifest.json"
+DATABASE: Final = "sagittal.db"
+IDENTITY_KEY: Final = "identity.key"
+"""The key of patients' names, wherever it is kept; in encrypted backups only."""
+ENDS: Final = (".tar", ".tar.age")
+"""How the name of a backup ends; any other name is a folder that is not there."""
+DAYS, WEEKS, MONTHS = 7, 4, 12
+"""Of each of so many days, weeks and months that have backups, `prune` keeps the newest one."""
+_STAMP: Final = "%Y%m%dT%H%M%SZ"
+_NAME: Final = re.compile(r"sagittal-(\d{8}T\d{6}Z)\.tar(?:\.age)?")
+_LEFT_BEHIND: Final = re.compile(r"[0-9a-f]{32}\.tmp")
+_OLD_S: Final = 86_400.0
+"""Age from which a half-written file in a folder of backups belongs to nobody."""
+
+
+class BackupError(Exception):
+    """No backup was made; the message says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Backup:
+    """A backup in a folder: its file, when it was begun, its length in bytes."""
+
+    path: Path
+    at: dt.datetime
+    size: int
+
+
+@dataclass(frozen=True)
+class MadeBackup:
+    """A backup that was made.
+
+    Parameters
+    ----------
+    path, size : the file, bytes. files : how many stored files and live logs are in it.
+    head : newest audit row.
+    missing : (space, sha256) of files that the database refers to and that are gone or damaged, so not in it.
+    left_out : the key of patients' names, where it is not in it: not encrypted, or the key cannot be read.
+    """
+
+    path: Path
+    size: int
+    files: int
+    head: HighWater | None
+    missing: list[tuple[str, str]]
+    left_out: Path | None
+
+
+@dataclass
+class _Content:
+    """What has been put into an archive: name, size and sha256 of each file, and what should have been."""
+
+    files: list[tuple[str, int, str]] = field(default_factory=list)
+    missing: list[tuple[str, str]] = field(default_factory=list)
+
+
+def make_backup(
+    db: Database, settings: Settings, target: Path, key: ClinicKey | None, actor: audit.Actor | None = None
+) -> MadeBackup:
+    """Make one backup; a target that does not end as a file of ours is a folder: the name says when.
+
+    Raises
+    ------
+    BackupError
+        another one is being made, or the target cannot be written.
+    """
+    at = now()
+    is_file = target.name.endswith(ENDS)
+    folder = target.parent if is_file else target
+    path = target if is_file else target / _name(at, key)
+    if not folder.is_dir():
+        raise BackupError(f"There is no folder {folder}. Make it, or connect the disk, and try again.")
+    if path.is_relative_to(settings.data_dir):
+        raise BackupError(f"{path} lies in the data folder and would be lost with it. Give another disk.")
+    if path.exists():
+        raise BackupError(f"{path} exists; a backup is never written over another file.")
+    try:
+        fs.make_folder(settings.backups)
+        lock = fs.Lock(settings.backups / "lock", "another backup")
+        try:
+            _clear(settings.backups, 0.0)
+            _clear(folder, _OLD_S)
+            made = _write(db, settings, path, key, at)
+            with db.read() as c:
+                keep_tombstones(find_tombstones(c), folder)
+        finally:
+            lock.release()
+    except fs.LockedError as error:
+        raise BackupError("Another backup is being made; wait for it.") from error
+    except OSError as error:
+        raise BackupError(f"{path} could not be written ({error.strerror or error}).") from error
+    except StoreAway as error:
+        raise BackupError(f"The stored files cannot be read ({error.detail}); no backup was made.") from error
+    with db.write() as c:
+        detail = {"files": made.files, "size": made.size, "missing": len(made.missing)}
+        audit.record(c, actor, "backup.made", "database", None, detail)
+    return made
+
+
+def list_backups(folder: Path) -> list[Backup]:
+    """The backups in a folder, the newest first; other files are passed over."""
+    found = []
+    for path in folder.iterdir() if folder.is_dir() else ():
+        named = _NAME.fullmatch(path.name)
+        with contextlib.suppress(ValueError, FileNotFoundError):
+            if named is not None:
+                at = dt.datetime.strptime(named[1], _STAMP).replace(tzinfo=dt.UTC)
+                found.append(Backup(path, at, path.stat().st_size))
+    return sorted(found, key=lambda one: one.at, reverse=True)
+
+
+def choose_kept(times: Iterable[dt.datetime]) -> set[dt.datetime]:
+    """Which backups are kept: of the last days, weeks and months that have any, the newest of each."""
+    newest_first = sorted(times, reverse=True)
+    kept: set[dt.datetime] = set()
+    for most, period in (
+        (DAYS, lambda t: t.date()),
+        (WEEKS, lambda t: t.isocalendar()[:2]),
+        (MONTHS, lambda t: (t.year, t.month)),
+    ):
+        first: dict[object, dt.datetime] = {}
+        for at in newest_first:
+            first.setdefault(period(at), at)
+        kept |= set(list(first.values())[:most])
+    return kept
+
+
+def prune(folder: Path) -> list[Path]:
+    """Remove the backups of a folder that `choose_kept` does not name; return which."""
+    found = list_backups(folder)
+    kept = choose_kept(one.at for one in found)
+    gone = [one.path for one in found if one.at not in kept]
+    for path in gone:
+        fs.remove_file(path)
+    if gone:
+        fs.sync_folder(folder)
+    return gone
+
+
+def count_patients_and_sessions(c: Connection) -> tuple[int, int]:
+    """How many patients and sessions there are."""
+    people = c.execute(select(func.count()).select_from(patient)).scalar_one()
+    return people, c.execute(select(func.count()).select_from(session)).scalar_one()
+
+
+def _write(
+    db: Database, settings: Settings, path: Path, key: ClinicKey | None, at: dt.datetime
+) -> MadeBackup:
+    content = _Content()
+    with fs.IncomingFile(path.parent) as file:
+        with write_archive(file, key) as archive:
+            _add_live(archive, settings, content)
+            with _snapshot(db, settings) as copy, closing(Database(copy)) as snapshot:
+                # what a job goes on from is computed again; it may be replaced at any moment
+                with snapshot.write() as c:
+                    c.execute(update(job).values(checkpoint=None))
+                with snapshot.read() as c:
+                    used, head = sorted(list_referenced(c)), read_newest(c)
+                    people, visits = count_patients_and_sessions(c)
+                snapshot.close()  # folds its write-ahead log into the file
+                revision = read_revision(copy)
+                _add(archive, DATABASE, copy, content)
+            _add_blobs(archive, settings, used, content)
+            with db.read() as c:
+                erased = find_tombstones(c)
+            content.missing = [one for one in content.missing if one[0] not in erased.patients]
+            if settings.second_factor_key.exists():
+                _add(archive, settings.second_factor_key.name, settings.second_factor_key, content)
+            left_out = _add_names_key(archive, settings, content, encrypted=key is not None)
+            manifest = {
+                "format": FORMAT,
+                "created_at": at.isoformat(),
+                "code_version": CODE_VERSION,
+                "revision": revision,
+                "audit_head": None if head is None else {"seq": head.seq, "hash": head.hash},
+                "patients": people,
+                "sessions": visits,
+                "files": content.files,
+                "missing": content.missing,
+                "erased": erased.tree(),
+            }
+            text = json.dumps(manifest).encode()
+            archive.add(MANIFEST, io.BytesIO(text), len(text))
+        file.keep(path)
+        return MadeBackup(path, file.size, len(content.files) - 1, head, content.missing, left_out)
+
+
+@contextlib.contextmanager
+def _snapshot(db: Database, settings: Settings) -> Iterator[Path]:
+    """A consistent copy of the database for as long as the block lasts."""
+    copy = settings.backups / f"{new_id()}.tmp"
+    try:
+        fs.keep_private(copy)
+        copy_database(db.source, copy)
+        yield copy
+    finally:
+        for path in (copy, *(copy.with_name(copy.name + end) for end in ("-wal", "-shm"))):
+            fs.remove_file(path)
+
+
+def _add(archive: ArchiveWriter, name: str, path: Path, content: _Content) -> None:
+    with path.open("rb") as source:
+        _add_open(archive, name, source, content)
+
+
+def _add_open(archive: ArchiveWriter, name: str, source: BinaryIO, content: _Content) -> None:
+    # a live log grows meanwhile: what is there now is a whole beginning of it
+    size = source.seek(0, io.SEEK_END)
+    source.seek(0)
+    content.files.append((name, size, archive.add(name, source, size)))
+
+
+def _add_names_key(
+    archive: ArchiveWriter, settings: Settings, content: _Content, *, encrypted: bool
+) -> Path | None:
+    """Add the key of patients' names where it is safe; returns its file where it was left out."""
+    file = settings.identity_key_file
+    try:
+        with file.open("rb") as source:
+            data = source.read()
+    except FileNotFoundError:
+        return None
+    except OSError:
+        log.exception("the key of patients' names cannot be read, and is not in the backup")
+        return file
+    if not encrypted:
+        return file
+    content.files.append((IDENTITY_KEY, len(data), archive.add(IDENTITY_KEY, io.BytesIO(data), len(data))))
+    return None
+
+
+def _add_live(archive: ArchiveWriter, settings: Settings, content: _Content) -> None:
+    for pattern in ("*.log", "*.damaged"):
+        for path in sorted(one for folder in settings.live_folders for one in folder.glob(pattern)):
+            with contextlib.suppress(FileNotFoundError):  # its take has just ended: a recording by now
+                _add(archive, f"live/{path.name}", path, content)
+
+
+def _add_blobs(
+    archive: ArchiveWriter, settings: Settings, used: Iterable[tuple[str, str]], content: _Content
+) -> None:
+    blobs = open_blobs(settings)
+    for space, sha256 in used:
+        source = _open(blobs, space, sha256)
+        if source is None:
+            content.missing.append((space, sha256))
+            continue
+        with source:
+            _add_open(archive, f"blobs/{space}/{sha256}", source, content)
+        name, _, found = content.files[-1]
+        if found != sha256:
+            # its bytes stay in the archive for whoever can mend them; a restore takes it for what it is
+            log.error("%s has changed on the disk; see `sagittal check`", name)
+            content.missing.append((space, sha256))
+
+
+def _open(blobs: BlobStore, space: str, sha256: str) -> BinaryIO | None:
+    """A file in its place, or in the trash since the snapshot; None = it is in neither."""
+    found = blobs.open_unverified(space, sha256)
+    if found is not None:
+        return found
+    for one in blobs.trash.files():
+        if (one.space, one.name) == (space, sha256):
+            with contextlib.suppress(FileNotFoundError):
+                return blobs.trash.open(one)
+    return None
+
+
+def _clear(folder: Path, least_age_s: float) -> None:
+    """Remove what backups that were killed have left."""
+    for path in folder.iterdir():
+        stem = path.name.removesuffix("-wal").removesuffix("-shm")
+        with contextlib.suppress(FileNotFoundError):
+            if _LEFT_BEHIND.fullmatch(stem) and time.time() - path.stat().st_mtime >= least_age_s:
+                fs.remove_file(path)
+
+
+def _name(at: dt.datetime, key: ClinicKey | None) -> str:
+    return f"sagittal-{at:{_STAMP}}.tar{'' if key is None else '.age'}"

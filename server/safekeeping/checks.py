@@ -1,0 +1,124 @@
+"""`sagittal check`: is everything that is stored still what was stored?"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+from sqlalchemy.exc import DatabaseError
+
+from sagittal.core.errors import SagittalError
+from sagittal.server import audit
+from sagittal.server.auth import second_factor
+from sagittal.server.clinic import identities
+from sagittal.server.live_takes import live_logs
+from sagittal.server.safekeeping import custody
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blobs import BlobStore, StoreAway, digest_open
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import explain_lost_rows
+from sagittal.server.storage.references import list_referenced
+from sagittal.server.storage.trash import Trash, TrashedFile
+
+
+@dataclass(frozen=True)
+class StorageDefect:
+    """One thing that is wrong.
+
+    Parameters
+    ----------
+    area : database, files, live, trash, audit, or keys: what cannot be read by its key.
+    message : what, and where.
+    """
+
+    area: str
+    message: str
+
+
+def check(
+    db: Database,
+    blobs: BlobStore,
+    settings: Settings,
+    *,
+    known_missing: Collection[tuple[str, str]] = (),
+    kept_head: Path | None = None,
+) -> list[StorageDefect]:
+    """Check database, stored files by their hash, live logs, trash, audit chain and what is encrypted.
+
+    Parameters
+    ----------
+    known_missing : files (space, sha256) of which it is known already that they are not there.
+    kept_head : a file like `audit.mark` that was kept elsewhere: the log must still hold that row.
+
+    Raises
+    ------
+    StoreAway
+        the stored files cannot be looked at now.
+    """
+    try:
+        found = [StorageDefect("database", text) for text in db.problems()]
+        with db.read() as c:
+            used = sorted(list_referenced(c))
+            found += [StorageDefect("audit", text) for text in audit.find_problems(c)]
+            cut = None if kept_head is None else explain_lost_rows(c, kept_head)
+            doubted = custody.find_doubt(c, settings)
+            unread = [
+                *identities.find_problems(c, settings.identity_key_file),
+                *second_factor.find_problems(c, settings.second_factor_key),
+            ]
+            found += [StorageDefect("keys", text) for text in unread]
+    except DatabaseError as error:
+        return [StorageDefect("database", f"cannot be read ({error.orig}); restore it from a backup")]
+    if doubted is not None:
+        text = f"{doubted} No stored file is taken away until the right one is back or `sagittal accept`."
+        found.append(StorageDefect("audit", text))
+    if kept_head is not None and not kept_head.is_file():
+        cut = f"There is no file {kept_head}, so nobody knows whether the audit log is whole."
+    if cut is not None:
+        found.append(StorageDefect("audit", cut))
+    trash = list(blobs.trash.files())
+    waiting = {(one.space, one.name) for one in trash}
+    for space, sha256 in used:
+        if (space, sha256) in known_missing:
+            continue
+        try:
+            blobs.open(space, sha256).close()
+        except StoreAway:
+            raise
+        except SagittalError as error:
+            text = f"patient {space}: {error.message}"
+            if (space, sha256) in waiting:
+                text = f"patient {space}: {sha256[:12]}… lies in the trash; run `sagittal trash --restore`."
+            found.append(StorageDefect("files", text))
+        except OSError as error:
+            found.append(StorageDefect("files", f"patient {space}, file {sha256[:12]}…: {error.strerror}"))
+    return [
+        *found,
+        *_check_live(db, settings),
+        *(f for one in trash for f in _check_discarded(blobs.trash, one)),
+    ]
+
+
+def _check_live(db: Database, settings: Settings) -> list[StorageDefect]:
+    found = []
+    with db.read() as c:
+        for log in live_logs.list_logs(c, settings):
+            if not log.known:
+                text = f"the database knows nothing of {log.path.name} ({log.words}); see `sagittal adopt`."
+                found.append(StorageDefect("live", text))
+            if log.damage is not None:
+                found.append(StorageDefect("live", f"{log.path.name}: {log.damage.sentence}"))
+    for path in live_logs.list_originals(settings):
+        text = f"{path.name} is the original of a damaged log; remove it when nobody needs it any more."
+        found.append(StorageDefect("live", text))
+    return found
+
+
+def _check_discarded(trash: Trash, one: TrashedFile) -> list[StorageDefect]:
+    try:
+        with trash.open(one) as file:
+            whole = digest_open(file) == one.name
+    except OSError as error:
+        return [StorageDefect("trash", f"{trash.place}/{one.way}: {error.strerror}")]
+    return [] if whole else [StorageDefect("trash", f"{trash.place}/{one.way} has changed on the disk.")]

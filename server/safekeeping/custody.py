@@ -1,0 +1,170 @@
+"""Whether this database may say which stored files are needed; not after it was emptied or put back.
+
+refuse_strangers(settings)      # before the start: files are here and the database knows no patient
+doubt(c, settings)              # before any file is taken away: None, or why it is not
+accept(db, settings)            # somebody answers: this database is the right one (`sagittal accept`)
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from contextlib import closing
+
+from sqlalchemy import Connection, func, select
+from sqlalchemy.exc import DatabaseError
+
+from sagittal.server import audit
+from sagittal.server.safekeeping import erasure
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blob_opening import open_blobs
+from sagittal.server.storage.blobs import INCOMING, StoreAway
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import explain_lost_rows, read_newest, set_mark
+from sagittal.server.storage.migrate import exists
+from sagittal.server.storage.tables import audit as audit_table
+from sagittal.server.storage.tables import patient
+
+log = logging.getLogger(__name__)
+
+ACCEPTED = "database.accepted"
+
+
+class StrangersError(RuntimeError):
+    """Stored files are here that the database knows nothing of; the message says what to do."""
+
+
+def refuse_strangers(settings: Settings) -> None:
+    """Raise StrangersError when files are here and the database is missing or knows no patient.
+
+    Creates no database; a file that cannot be read is left to `storage.migrate`, which says so.
+    """
+    if not exists(settings.database_source):
+        refuse_half_restored(settings)
+        text = _strangers_if_known(settings, erased=set())
+    else:
+        with closing(Database(settings.database_source)) as db:
+            try:
+                with db.read() as c:
+                    text = _strangers_of(c, settings, _strangers_if_known)
+            except DatabaseError as error:
+                if "no such table" not in str(error.orig):
+                    return
+                text = _strangers_if_known(settings, erased=set())
+    if text is not None:
+        raise StrangersError(text)
+
+
+def refuse_half_restored(settings: Settings) -> None:
+    """Raise StrangersError where a restore was cut off before it put the database in place; makes nothing."""
+    if settings.restoring.exists() and not exists(settings.database_source):
+        raise StrangersError(
+            f"A restore into {settings.data_dir} was interrupted. Run `sagittal restore` again; to begin "
+            f"an empty clinic instead, remove {settings.restoring} first."
+        )
+
+
+def refuse_wrong_clock(db: Database, settings: Settings) -> bool:
+    """Raise StrangersError where this host's clock is not the database's; False = the database is here."""
+    theirs = db.read_clock()
+    if theirs is None:
+        return False
+    apart = abs(time.time() - theirs)
+    if apart > settings.lease_s / 3:
+        raise StrangersError(
+            f"This computer's clock and PostgreSQL's are {apart:.1f} s apart, allowed are "
+            f"{settings.lease_s / 3:.1f}. Set both by NTP."
+        )
+    return True
+
+
+def refuse_foreign_folder(
+    db: Database, settings: Settings, stop: threading.Event, patience_s: float = 10.0
+) -> None:
+    """Raise StrangersError where this host's data folder or clock is not that of the PostgreSQL database.
+
+    A worker elsewhere needs the server's own folder of stored files (shared by the network), and leases need
+    clocks that agree. The server writes the mark some seconds after the first row of the audit log; until
+    there is one nobody has work, and this waits (`stop` ends it).
+    """
+    if not refuse_wrong_clock(db, settings):
+        return
+    until = time.monotonic() + patience_s
+    while not settings.mark.exists() and not stop.wait(0.2):
+        with db.read() as c:
+            nobody_works = read_newest(c) is None
+        if nobody_works:
+            until = time.monotonic() + patience_s
+        elif time.monotonic() > until:
+            break
+    if stop.is_set():
+        return
+    with db.read() as c:
+        lost = explain_lost_rows(c, settings.mark)
+    if lost is not None or not settings.mark.exists():
+        raise StrangersError(
+            f"{settings.data_dir} is not the data folder of this database's server"
+            f"{f' ({lost})' if lost else ''}. Share that folder with this computer and name it by --data."
+        )
+
+
+def find_doubt(c: Connection, settings: Settings) -> str | None:
+    """Why no stored file may be taken away on the word of this database, as a sentence; None = it may."""
+    try:
+        return _doubt(c, settings)
+    except StoreAway:
+        return (
+            f"The database in {settings.data_dir} knows no patient, and {settings.bucket} does not say now "
+            "whether stored files are there."
+        )
+
+
+def accept(db: Database, settings: Settings) -> str | None:
+    """Trust this database from now on; returns what was doubted, None = nothing was. Raises StoreAway."""
+    with db.write() as c:
+        doubted = _doubt(c, settings)
+        if doubted is not None:
+            audit.record(c, None, ACCEPTED, "database", None, {"by": "console", "doubt": doubted})
+    set_mark(db, settings.mark)
+    return doubted
+
+
+def _doubt(c: Connection, settings: Settings) -> str | None:
+    return explain_lost_rows(c, settings.mark) or _strangers_of(c, settings, _strangers)
+
+
+def _strangers_of(
+    c: Connection, settings: Settings, look: Callable[[Settings, set[str]], str | None]
+) -> str | None:
+    if c.execute(select(func.count()).select_from(patient)).scalar_one():
+        return None
+    if c.execute(select(audit_table.c.seq).where(audit_table.c.action == ACCEPTED).limit(1)).first():
+        return None
+    return look(settings, erasure.list_erased_spaces(c))
+
+
+def _strangers_if_known(settings: Settings, erased: set[str]) -> str | None:
+    """As `_strangers`; None also when the files are in a bucket that is away: then nobody knows."""
+    try:
+        return _strangers(settings, erased)
+    except StoreAway:
+        log.warning("%s cannot be asked whether it holds another clinic's files", settings.bucket)
+        return None
+
+
+def _strangers(settings: Settings, erased: set[str]) -> str | None:
+    spaces, takes = erasure.list_unfinished(settings)
+    leaving = erased | spaces | {INCOMING}
+    # a folder that was never a clinic's is left as it is: opening would make one
+    stored = open_blobs(settings).files() if settings.bucket or settings.blobs.exists() else ()
+    files = sum(1 for f in stored if f.space not in leaving)
+    found = (path for folder in settings.live_folders for path in folder.glob("*.log"))
+    logs = sum(1 for path in found if path.stem not in takes)
+    if not files and not logs:
+        return None
+    return (
+        f"The database in {settings.data_dir} knows no patient, but {files} stored files and {logs} live "
+        "logs are there. Put back its backup, or run `sagittal accept` to go on without them."
+    )

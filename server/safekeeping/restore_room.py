@@ -1,0 +1,147 @@
+"""Where a restore may go: an empty data folder, with an empty database and bucket.
+
+What a killed restore, or a server that did not start, left there is removed.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from contextlib import closing
+from pathlib import Path
+from typing import Final
+
+from sagittal.server.safekeeping.backups import IDENTITY_KEY, count_patients_and_sessions
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs
+from sagittal.server.storage.blob_bucket import BucketBlobs
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.high_water import read_newest
+from sagittal.server.storage.migrate import MigrationError, exists, require_current
+
+_MAY_BE_THERE: Final = {"lost+found", "cache", "server.lock", "workers.lock", "part-locks"}
+"""What an empty data folder may hold."""
+_OF_A_START: Final = re.compile(
+    r"(backups|blobs(/incoming)?|nodes|nodes/[^/]+)/|nodes/(key(\.lock)?|[^/]+/server\.lock)"
+)
+"""Folders (with a slash) and files that a trial of a backup, or a server that did not start, may leave."""
+_MARGIN: Final = 1.1
+"""Room that a restore needs, as a part of the archive."""
+
+
+class RestoreError(Exception):
+    """Nothing was put in place; the message says why and what to do."""
+
+
+def make_empty(settings: Settings) -> None:
+    """Remove what a killed restore left; raise RestoreError when anything else is here.
+
+    Which bucket it had begun to fill stays noted until a restore is in its place.
+    """
+    stage = settings.restoring
+    placing = ""
+    if stage.exists() and not _has_database(settings):
+        if name_placing(stage).exists():
+            placing = _read_placing(stage)
+            # the folder was empty when this was written, so these are the restore's own
+            for folder in (settings.blobs, settings.live):
+                fs.remove_tree(folder)
+            for path in (settings.mark, settings.second_factor_key, settings.data_dir / IDENTITY_KEY):
+                fs.remove_file(path)
+            fs.sync_folder(settings.data_dir)
+        clear_stage(stage)
+    found = _find_others(settings)
+    if _has_database(settings) and settings.database_url:
+        raise RestoreError(
+            "The PostgreSQL database holds a clinic already; nothing was changed. Make an empty one and set "
+            "SAGITTAL_DATABASE_URL to it."
+        )
+    if found:
+        raise RestoreError(
+            f"{settings.data_dir} is not empty ({', '.join(found[:5])}). Restore into an empty folder; move "
+            "the old one aside first, and keep it."
+        )
+    fs.remove_tree(settings.blobs)  # no file is in it
+    # one that a killed restore has begun to fill was empty then: the same files are put again
+    if settings.bucket and placing != settings.bucket:
+        _require_empty_bucket(settings)
+
+
+def _find_others(settings: Settings) -> list[str]:
+    """Names of what an empty data folder does not hold."""
+
+    def is_of_a_start(path: Path) -> bool:
+        way = path.relative_to(settings.data_dir).as_posix() + ("/" if path.is_dir() else "")
+        return not path.is_symlink() and _OF_A_START.fullmatch(way) is not None
+
+    return sorted(
+        path.name
+        for path in settings.data_dir.iterdir()
+        if path.name not in _MAY_BE_THERE
+        and not (path == settings.restoring and _read_placing(path))
+        and not (is_of_a_start(path) and all(map(is_of_a_start, path.rglob("*"))))
+    )
+
+
+def _require_empty_bucket(settings: Settings) -> None:
+    try:
+        is_empty = open_empty_bucket(settings).is_empty()
+    finally:
+        clear_stage(settings.restoring)
+    if not is_empty:
+        raise RestoreError(
+            f"{settings.bucket} is not empty. Restore into a prefix in which nothing is; one prefix is for "
+            "one clinic."
+        )
+
+
+def _has_database(settings: Settings) -> bool:
+    """Whether a clinic is in it already: a file, or rows on the server; tables of another version are one."""
+    if not settings.database_url:
+        return settings.database.exists()
+    if not exists(settings.database_source):
+        return False
+    try:
+        require_current(settings.database_source)
+    except MigrationError:
+        return True
+    with closing(Database(settings.database_source)) as db, db.read() as c:
+        return read_newest(c) is not None or count_patients_and_sessions(c) != (0, 0)
+
+
+def require_room(archive: Path, folder: Path) -> None:
+    """Raise RestoreError where the disk has no room for what is in the archive."""
+    needed, free = int(archive.stat().st_size * _MARGIN), shutil.disk_usage(folder).free
+    if free < needed:
+        raise RestoreError(f"A restore needs {needed} bytes in {folder}; {free} are free. Make room first.")
+
+
+def name_placing(stage: Path) -> Path:
+    """The file that says that the renames have begun."""
+    return stage / "placing"
+
+
+def _read_placing(stage: Path) -> str:
+    """The bucket that a killed restore has begun to fill, "" = none."""
+    try:
+        return name_placing(stage).read_text("utf-8")
+    except FileNotFoundError:
+        return ""
+
+
+def clear_stage(stage: Path) -> None:
+    """Remove the stage, but for the note which bucket is half filled: the next restore must know it."""
+    if not _read_placing(stage):
+        fs.remove_tree(stage)
+        return
+    for path in stage.iterdir():
+        if path.is_dir() and not path.is_symlink():
+            fs.remove_tree(path)
+        elif path != name_placing(stage):
+            fs.remove_file(path)
+    fs.sync_folder(stage)
+
+
+def open_empty_bucket(settings: Settings) -> BucketBlobs:
+    """The bucket that a restore fills; what passes is in the stage."""
+    return BucketBlobs(settings.bucket, settings.restoring / "incoming")

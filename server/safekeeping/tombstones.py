@@ -1,0 +1,81 @@
+"""Who has been erased: a list beside the backups, so that an older backup brings nobody back.
+
+Every backup holds the list of its moment; `erased.json` in the folder of backups follows within a minute of
+an erasure, and only grows. It holds random ids, nothing of a person.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from sqlalchemy import Connection, select
+
+from sagittal.core.formats.json_tree import read_json
+from sagittal.server.safekeeping.erasure import ERASED, SESSION_ERASED
+from sagittal.server.storage import fs
+from sagittal.server.storage.tables import audit
+
+NAME: Final = "erased.json"
+
+
+class TombstoneError(Exception):
+    """The list is there but cannot be read; the message names it."""
+
+
+@dataclass(frozen=True)
+class Tombstones:
+    """Ids of patients and sessions that were erased."""
+
+    patients: frozenset[str] = frozenset()
+    sessions: frozenset[str] = frozenset()
+
+    def __or__(self, other: Tombstones) -> Tombstones:
+        return Tombstones(self.patients | other.patients, self.sessions | other.sessions)
+
+    def tree(self) -> dict[str, list[str]]:
+        """For JSON."""
+        return {"patients": sorted(self.patients), "sessions": sorted(self.sessions)}
+
+
+def find_tombstones(c: Connection) -> Tombstones:
+    """Everybody and everything that the audit log says was erased."""
+    rows = c.execute(
+        select(audit.c.action, audit.c.resource_id).where(audit.c.action.in_((ERASED, SESSION_ERASED)))
+    ).all()
+    return Tombstones(
+        frozenset(row.resource_id for row in rows if row.action == ERASED),
+        frozenset(row.resource_id for row in rows if row.action == SESSION_ERASED),
+    )
+
+
+def parse_tombstones(tree: Any) -> Tombstones:
+    """Read what `tree` gave; raises ValueError."""
+    try:
+        return Tombstones(
+            frozenset(str(one) for one in tree["patients"]), frozenset(str(one) for one in tree["sessions"])
+        )
+    except (KeyError, TypeError) as error:
+        raise ValueError("no list of erased patients and sessions") from error
+
+
+def read_tombstones(path: Path) -> Tombstones:
+    """The list of a file, empty when there is none; raises TombstoneError."""
+    try:
+        return parse_tombstones(read_json(path.read_bytes()))
+    except FileNotFoundError:
+        return Tombstones()
+    except (ValueError, OSError) as error:
+        raise TombstoneError(
+            f"{path} cannot be read ({error}). It says who must not come back; put back a copy of it."
+        ) from error
+
+
+def keep_tombstones(found: Tombstones, folder: Path) -> None:
+    """Add to the list in a folder of backups; nothing is written when all are in it."""
+    path = folder / NAME
+    known = read_tombstones(path)
+    if not path.exists() or known | found != known:
+        fs.write_file(path, json.dumps((known | found).tree()).encode())

@@ -1,1 +1,0 @@
-"""Use cases shared by API, pages, CLI and jobs."""

@@ -1,0 +1,295 @@
+"""Care teams: who is in the team of which patient, and who opened somebody in an emergency.
+
+Off until an administrator switches them on; what they decide is server/auth/sight.py.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any, Final
+from unicodedata import normalize
+
+from sqlalchemy import Connection, Row, Select, case, delete, exists, insert, select, union, update
+
+from sagittal.core.plurals import plural
+from sagittal.server import audit
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Role
+from sagittal.server.auth.sight import CARE_TEAMS, TEAMS_ARE_ON, is_emergency_open, may_open
+from sagittal.server.clinic import patients
+from sagittal.server.errors import Conflict, NotAllowed, NotFound, ServiceError
+from sagittal.server.sharing import report_links
+from sagittal.server.storage.care_tables import care_team_member, clinic_option, emergency_access
+from sagittal.server.storage.tables import audit as audit_table
+from sagittal.server.storage.tables import new_id, now, patient, session, user
+
+EMERGENCY: Final = dt.timedelta(hours=4)
+"""How long a patient stays open to who opened him or her in an emergency (our choice)."""
+SHOWN: Final = dt.timedelta(days=90)
+"""How long the patient's page shows that; the audit log keeps it."""
+REASON: Final = (10, 500)
+"""Characters of a reason, at least and at most."""
+_NOT_OF_A_TEAM: Final = (
+    "emergency.opened",
+    "emergency.ended",
+    "patient.code_refused",
+    "patient.hidden",
+    "study.exported",
+)
+"""Rows of the audit log that put nobody into a team: from outside it, or of a study over many visits."""
+
+
+@dataclass(frozen=True)
+class TeamMember:
+    """Somebody who may be or is in a team."""
+
+    user_id: str
+    name: str
+    role: Role
+
+
+@dataclass(frozen=True)
+class EmergencyAccess:
+    """Somebody outside the team opened the patient: by whom (name, account), why, from when to when.
+
+    Parameters
+    ----------
+    ended_at : somebody ended it then, before its time. is_open : it went on when it was read.
+    """
+
+    id: str
+    patient_id: str
+    by: str
+    by_id: str
+    reason: str
+    opened_at: dt.datetime
+    ends_at: dt.datetime
+    ended_at: dt.datetime | None
+    is_open: bool
+
+
+def are_on(c: Connection) -> bool:
+    """Whether the clinic has care teams."""
+    return bool(c.execute(select(TEAMS_ARE_ON)).scalar_one())
+
+
+def switch_on(c: Connection, actor: audit.Actor, *, begin_with_past: bool) -> None:
+    """From now on a patient is seen by the team only; without effect where they are on.
+
+    Links to reports end where their maker is not in the team.
+
+    Parameters
+    ----------
+    begin_with_past : whoever has opened or changed something of a patient so far is in the team; a team that
+    was set before stays as it is.
+    """
+    if are_on(c):
+        return
+    at = now()
+    rows = _list_past(c) if begin_with_past else []
+    if rows:
+        c.execute(insert(care_team_member), [{"patient_id": p, "user_id": u, "since": at} for p, u in rows])
+    c.execute(insert(clinic_option).values(name=CARE_TEAMS, since=at))
+    audit.record(c, actor, "care_teams.on", "clinic", None, {"members": len(rows)})
+    report_links.end_orphaned(c, actor)
+
+
+def switch_off(c: Connection, actor: audit.Actor) -> None:
+    """From now on everybody sees every patient; the teams are kept."""
+    if c.execute(delete(clinic_option).where(clinic_option.c.name == CARE_TEAMS)).rowcount:
+        audit.record(c, actor, "care_teams.off", "clinic", None)
+
+
+def list_people(c: Connection, patient_id: str) -> list[tuple[TeamMember, bool]]:
+    """Who is or can be in the team of a patient, by name, and whether in it.
+
+    Open accounts can, but administrators, who see everybody.
+    """
+    mine = (care_team_member.c.user_id == user.c.id) & (care_team_member.c.patient_id == patient_id)
+    can = user.c.active & (user.c.role != Role.ADMIN)
+    query = (
+        select(user, care_team_member.c.since)
+        .outerjoin(care_team_member, mine)
+        .where(can | care_team_member.c.since.is_not(None))
+        .order_by(user.c.name)
+    )
+    return [
+        (TeamMember(row.id, row.display_name or row.name, Role(row.role)), row.since is not None)
+        for row in c.execute(query)
+    ]
+
+
+def list_team(c: Connection, patient_id: str) -> list[TeamMember]:
+    """The team of a patient, by name."""
+    return [one for one, is_in in list_people(c, patient_id) if is_in]
+
+
+def set_team(
+    c: Connection, actor: audit.Actor, patient_id: str, user_ids: Collection[str]
+) -> list[TeamMember]:
+    """Set the care team of a patient and end the report links of those who leave it.
+
+    Raises
+    ------
+    NotFound
+        the patient, or no open account has one of the ids.
+    """
+    patients.get(c, patient_id)
+    wanted = set(user_ids)
+    known = {one.user_id: is_in for one, is_in in list_people(c, patient_id)}
+    before = {user_id for user_id, is_in in known.items() if is_in}
+    unknown = wanted - known.keys()
+    if unknown:
+        raise NotFound("account for a team", min(unknown))
+    gone = care_team_member.c.user_id.in_(before - wanted)
+    c.execute(delete(care_team_member).where(care_team_member.c.patient_id == patient_id, gone))
+    for user_id in sorted(wanted - before):
+        c.execute(insert(care_team_member).values(patient_id=patient_id, user_id=user_id, since=now()))
+    if wanted != before:
+        detail = {"added": sorted(wanted - before), "removed": sorted(before - wanted)}
+        audit.record(c, actor, "care_team.changed", "patient", patient_id, detail)
+        report_links.end_orphaned(c, actor)
+    return list_team(c, patient_id)
+
+
+def add_maker(c: Connection, who: Identity, patient_id: str) -> None:
+    """Put whoever adds a patient into the team, or nobody but administrators would see the patient."""
+    if who.role is not Role.ADMIN and are_on(c):
+        c.execute(insert(care_team_member).values(patient_id=patient_id, user_id=who.user_id, since=now()))
+        audit.record(
+            c, who, "care_team.changed", "patient", patient_id, {"added": [who.user_id], "removed": []}
+        )
+
+
+def open_in_emergency(c: Connection, who: Identity, code: str, reason: str) -> EmergencyAccess:
+    """Open a patient to somebody outside the team for a time.
+
+    The code must be known: it is no way to look for people.
+
+    Raises
+    ------
+    NotFound : no patient has exactly this code. ServiceError bad_value : no reason to speak of. Conflict
+    care_teams_off, seen_already.
+    """
+    if not are_on(c):
+        raise Conflict("care_teams_off", "This clinic has no care teams: you see every patient in the list.")
+    why = " ".join(reason.split())
+    if not REASON[0] <= len(why) <= REASON[1]:
+        raise ServiceError(
+            "bad_value",
+            f"The reason has {len(why)} {plural(len(why), 'character', 'characters')}. "
+            f"Expected {REASON[0]} to {REASON[1]}.",
+        )
+    wanted = normalize("NFKC", code).strip()
+    found = c.execute(select(patient.c.id).where(patient.c.code == wanted)).scalar()
+    if found is None:
+        raise NotFound("patient", wanted)
+    if may_open(c, who, {"patient_id": found}):
+        raise Conflict("seen_already", "You may open this patient already; look in the list of patients.")
+    at = now()
+    row = {"id": new_id(), "patient_id": found, "reason": why, "opened_at": at, "ends_at": at + EMERGENCY}
+    c.execute(insert(emergency_access).values(**row, user_id=who.user_id))
+    # the reason stays with the patient, and goes when the patient is erased; the row of the log does not
+    detail = {"access": row["id"], "hours": EMERGENCY / dt.timedelta(hours=1)}
+    audit.record(c, who, "emergency.opened", "patient", found, detail)
+    return _get_access(c, row["id"])
+
+
+def may_end(access: EmergencyAccess, who: Identity) -> bool:
+    """Whether somebody may end an access: whose it is, and administrators."""
+    return who.is_admin or access.by_id == who.user_id
+
+
+def end_emergency(c: Connection, who: Identity, access_id: str) -> EmergencyAccess:
+    """End an access in an emergency now, and the links that hang on it; one that is over stays as it is.
+
+    Raises
+    ------
+    NotFound; NotAllowed `not_yours`, of somebody else's.
+    """
+    found = _get_access(c, access_id)
+    if not may_end(found, who):
+        raise NotAllowed(
+            "not_yours", f"{found.by} opened this patient. Ask that person or an administrator to end it."
+        )
+    if found.is_open:
+        mine = emergency_access.c.id == access_id
+        c.execute(update(emergency_access).where(mine).values(ended_at=now()))
+        report_links.end_of_emergency(c, who, access_id)
+        report_links.end_orphaned(c, who)
+        audit.record(c, who, "emergency.ended", "patient", found.patient_id, {"access": access_id})
+    return _get_access(c, access_id)
+
+
+def end_all_emergencies(c: Connection) -> None:
+    """End every access in an emergency: of a database put back, who ended one since is not known."""
+    # those that are over too: the clock of this computer may be ahead
+    unended = update(emergency_access).where(emergency_access.c.ended_at.is_(None))
+    over = case((is_emergency_open(), now()), else_=emergency_access.c.ends_at)
+    c.execute(unended.values(ended_at=over))
+
+
+def list_accesses(c: Connection, patient_id: str) -> list[EmergencyAccess]:
+    """Who opened a patient in an emergency of late, the newest first."""
+    of_late = (emergency_access.c.patient_id == patient_id) & (emergency_access.c.opened_at > now() - SHOWN)
+    query = _select_accesses().where(of_late).order_by(emergency_access.c.opened_at.desc())
+    return [_make_access(row) for row in c.execute(query)]
+
+
+def _select_accesses() -> Select[Any]:
+    columns = (emergency_access, is_emergency_open().label("is_open"), user.c.name, user.c.display_name)
+    return select(*columns).join(user, user.c.id == emergency_access.c.user_id)
+
+
+def _get_access(c: Connection, access_id: str) -> EmergencyAccess:
+    row = c.execute(_select_accesses().where(emergency_access.c.id == access_id)).first()
+    if row is None:
+        raise NotFound("access in an emergency", access_id)
+    return _make_access(row)
+
+
+def _make_access(row: Row[Any]) -> EmergencyAccess:
+    return EmergencyAccess(
+        row.id,
+        row.patient_id,
+        row.display_name or row.name,
+        row.user_id,
+        row.reason,
+        row.opened_at,
+        row.ends_at,
+        row.ended_at,
+        row.is_open,
+    )
+
+
+def _list_past(c: Connection) -> list[tuple[str, str]]:
+    """Patient and person, of who has opened or changed something of a patient and still has an account.
+
+    Left out: patients whose team was set before, and of a patient whoever came in an emergency.
+    """
+    is_work = audit_table.c.action.not_in(_NOT_OF_A_TEAM)
+    of_patient = select(patient.c.id.label("patient_id"), audit_table.c.user_id).join(
+        audit_table, (audit_table.c.resource == "patient") & (audit_table.c.resource_id == patient.c.id)
+    )
+    of_session = (
+        select(session.c.patient_id, audit_table.c.user_id)
+        .select_from(session)
+        .join(
+            audit_table, (audit_table.c.resource == "session") & (audit_table.c.resource_id == session.c.id)
+        )
+    )
+    done = union(of_patient.where(is_work), of_session.where(is_work)).subquery()
+    colleagues = (user.c.id == done.c.user_id) & user.c.active & (user.c.role != Role.ADMIN)
+    with_team = union(
+        select(care_team_member.c.patient_id),
+        select(audit_table.c.resource_id).where(audit_table.c.action == "care_team.changed"),
+    )
+    came = (emergency_access.c.patient_id == done.c.patient_id) & (
+        emergency_access.c.user_id == done.c.user_id
+    )
+    query = (
+        select(done).join(user, colleagues).where(done.c.patient_id.not_in(with_team), ~exists().where(came))
+    )
+    return [(row[0], row[1]) for row in c.execute(query)]

@@ -1,0 +1,40 @@
+"""The process that makes one PDF and ends: its libraries and its memory never meet the web process.
+
+Started by server/sharing/pdfs.py as `python -m sagittal.server.sharing.paper_child <socket> <parent pid>`.
+"""
+
+from __future__ import annotations
+
+import logging
+
+import msgspec
+
+from sagittal.core.errors import SagittalError
+from sagittal.server.processes.child import enter_child
+from sagittal.server.report.pdf import render_pdf
+from sagittal.web.user_text import encode_user_text
+
+
+class PaperReply(msgspec.Struct, frozen=True):
+    """What became of a document: its PDF, or why there is none."""
+
+    content: bytes = b""
+    code: str = ""
+    message: str = ""
+
+
+def main() -> None:
+    """Render the one document that comes over the line."""
+    line, _ = enter_child()
+    try:
+        reply = PaperReply(render_pdf(line.receive().decode()))
+    except SagittalError as error:
+        reply = PaperReply(code=error.code, message=error.message)
+    except Exception:
+        logging.getLogger(__name__).exception("a PDF could not be made")
+        reply = PaperReply(code="internal_error", message="The PDF could not be made; the log says why.")
+    line.send(msgspec.msgpack.encode(reply, enc_hook=encode_user_text))
+
+
+if __name__ == "__main__":
+    main()

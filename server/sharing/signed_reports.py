@@ -1,0 +1,269 @@
+"""Reports that somebody stands for: the therapist's text, signing, reopening, and what was signed.
+
+A signed report is a document of its own: its bytes are stored with their hash and stay, whatever is analysed
+again. While one is in force the text cannot be changed and no other is signed; who reopens it says why.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from sqlalchemy import Connection, delete, func, insert, select, update
+
+from sagittal.server import audit
+from sagittal.server.clinic import sessions
+from sagittal.server.errors import Conflict, NotFound, ServiceError
+from sagittal.server.results.analyses import AnalysisRecord
+from sagittal.server.results.edit_log import EditHistory
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.report_tables import assessment, report_file, signed_report
+from sagittal.server.storage.tables import now, session
+
+MOST_CHARACTERS: Final = 10_000
+"""Of the reason to reopen a report."""
+ASSESSMENT_CHARACTERS: Final = 420
+"""Of the therapist's text, as many as fit on the first sheet beside the profile."""
+
+DOCUMENT: Final = "report.html"
+PSEUDONYMISED: Final = "shared.html"
+PDF: Final = "report.pdf"
+
+
+@dataclass(frozen=True)
+class SignedReport:
+    """One version of a session's report.
+
+    Parameters
+    ----------
+    number : from 1. analysis_id : what it was made from. signed_by, reopened_by : names as they were then.
+    reopened_at, reopened_because : when and why it ceased to be in force, None of the one that is.
+    sha256 : of the document.
+    """
+
+    id: str
+    session_id: str
+    number: int
+    analysis_id: str
+    language: str
+    signed_by: str | None
+    signed_at: dt.datetime
+    reopened_by: str | None
+    reopened_at: dt.datetime | None
+    reopened_because: str | None
+    sha256: str
+
+    @property
+    def in_force(self) -> bool:
+        """Nobody has reopened it."""
+        return self.reopened_at is None
+
+
+@dataclass(frozen=True)
+class SignedDocuments:
+    """A signed report with what it is handed on in.
+
+    Parameters
+    ----------
+    files : its document, and its PDF where one was made, by name.
+    """
+
+    report: SignedReport
+    files: Mapping[str, Blob]
+
+    def describe(self, found: AnalysisRecord, edits: EditHistory) -> dict[str, Any]:
+        """What an archive or export of this analysis with these edits says of it, as JSON.
+
+        `of_these_numbers` is False where another analysis was signed, or something was changed afterwards.
+        """
+        signed = self.report
+        return {
+            "version": signed.number,
+            "language": signed.language,
+            "signed_by": signed.signed_by,
+            "signed_at": signed.signed_at.isoformat(timespec="seconds"),
+            "sha256": signed.sha256,
+            "of_these_numbers": signed.analysis_id == found.id and not edits.changed_after(signed.signed_at),
+        }
+
+
+@dataclass(frozen=True)
+class Signature:
+    """What a document says of who signed it."""
+
+    report_id: str
+    number: int
+    name: str
+    at: dt.datetime
+
+
+def read_assessment(c: Connection, session_id: str) -> str:
+    """The therapist's text, empty where there is none."""
+    query = select(assessment.c.content).where(assessment.c.session_id == session_id)
+    return c.execute(query).scalar_one_or_none() or ""
+
+
+def write_assessment(c: Connection, actor: audit.Actor | None, session_id: str, content: str) -> None:
+    """Write the therapist's text; raises NotFound, Conflict report_signed, ServiceError text_too_long."""
+    sessions.get(c, session_id)
+    require_open(c, session_id)
+    text = content.strip()
+    if len(text) > ASSESSMENT_CHARACTERS:
+        raise ServiceError(
+            "text_too_long",
+            f"The assessment has {len(text)} characters; at most {ASSESSMENT_CHARACTERS} fit. "
+            "Nothing was changed.",
+        )
+    c.execute(delete(assessment).where(assessment.c.session_id == session_id))
+    if text:
+        c.execute(insert(assessment).values(session_id=session_id, content=text, changed_at=now()))
+    audit.record(c, actor, "assessment.written", "session", session_id, {"characters": len(text)})
+
+
+def require_open(c: Connection, session_id: str) -> None:
+    """Raise Conflict report_signed while a signed report of the session is in force."""
+    found = find_in_force(c, session_id)
+    if found is not None:
+        raise Conflict(
+            "report_signed",
+            f"Version {found.number} of this report is signed and locked. Reopen it first, with a reason.",
+        )
+
+
+def prepare_signature(c: Connection, session_id: str, report_id: str, name: str) -> Signature:
+    """What the next document is to say of its signature; raises NotFound, Conflict report_signed."""
+    sessions.get(c, session_id)
+    require_open(c, session_id)
+    known = select(func.max(signed_report.c.number)).where(signed_report.c.session_id == session_id)
+    return Signature(report_id, (c.execute(known).scalar_one() or 0) + 1, name, now())
+
+
+def keep_signed(
+    c: Connection,
+    actor: audit.Actor | None,
+    signature: Signature,
+    session_id: str,
+    analysis_id: str,
+    language: str,
+    stored: Mapping[str, Blob],
+) -> SignedReport:
+    """Keep a signed report with its documents.
+
+    Raises
+    ------
+    NotFound
+        the session. Conflict: somebody else signed meanwhile, report_signed or report_changed.
+    """
+    after = prepare_signature(c, session_id, signature.report_id, signature.name)
+    if after.number != signature.number:
+        raise Conflict(
+            "report_changed", "Somebody else has signed this report meanwhile. Load the page again."
+        )
+    c.execute(
+        insert(signed_report).values(
+            id=signature.report_id,
+            session_id=session_id,
+            number=signature.number,
+            analysis_id=analysis_id,
+            language=language,
+            signed_by=signature.name,
+            signed_at=signature.at,
+        )
+    )
+    for name, blob in stored.items():
+        _add_file(c, signature.report_id, name, blob)
+    found = get(c, signature.report_id)
+    detail = {"report_id": found.id, "version": found.number, "sha256": found.sha256}
+    audit.record(c, actor, "signed_report.signed", "session", session_id, detail)
+    return found
+
+
+def reopen(c: Connection, actor: audit.Actor | None, report_id: str, reason: str, name: str) -> SignedReport:
+    """Take a signed report out of force; it stays and can be read. Raises NotFound, Conflict, bad_value."""
+    found = get(c, report_id)
+    if not found.in_force:
+        raise Conflict("not_in_force", f"Version {found.number} has been reopened already.")
+    text = reason.strip()
+    if not 1 <= len(text) <= MOST_CHARACTERS:
+        raise ServiceError("bad_value", f"A reason has 1 to {MOST_CHARACTERS:,} characters.")
+    c.execute(
+        update(signed_report)
+        .where(signed_report.c.id == report_id)
+        .values(reopened_by=name, reopened_at=now(), reopened_because=text)
+    )
+    detail = {"report_id": report_id, "version": found.number}
+    audit.record(c, actor, "signed_report.reopened", "session", found.session_id, detail)
+    return get(c, report_id)
+
+
+def get(c: Connection, report_id: str) -> SignedReport:
+    """One signed report; raises NotFound."""
+    row = c.execute(_QUERY.where(signed_report.c.id == report_id)).first()
+    if row is None:
+        raise NotFound("signed report", report_id)
+    return SignedReport(**row._asdict())
+
+
+def of_session(c: Connection, session_id: str) -> list[SignedReport]:
+    """All versions, the newest first."""
+    query = _QUERY.where(signed_report.c.session_id == session_id)
+    return [SignedReport(**row._asdict()) for row in c.execute(query.order_by(signed_report.c.number.desc()))]
+
+
+def find_in_force(c: Connection, session_id: str) -> SignedReport | None:
+    """The version that counts, None where nothing is signed or the last one was reopened."""
+    return next((r for r in of_session(c, session_id) if r.in_force), None)
+
+
+def find_documents(c: Connection, session_id: str) -> SignedDocuments | None:
+    """The version in force with its document and PDF; None where nothing is signed."""
+    query = (
+        select(*_NAMES, report_file.c.name, report_file.c.sha256, report_file.c.size)
+        .join(report_file, report_file.c.report_id == signed_report.c.id)
+        .where(signed_report.c.session_id == session_id, signed_report.c.reopened_at.is_(None))
+        .where(report_file.c.name.in_((DOCUMENT, PDF)))
+        .order_by(report_file.c.name)
+    )
+    rows = list(c.execute(query))
+    files = {row.name: Blob(row.sha256, row.size) for row in rows}
+    if DOCUMENT not in files:
+        return None
+    values = {name: getattr(rows[0], name) for name in SignedReport.__dataclass_fields__ if name != "sha256"}
+    return SignedDocuments(SignedReport(**values, sha256=files[DOCUMENT].sha256), files)
+
+
+def find_file(c: Connection, report_id: str, name: str) -> tuple[str, str | None]:
+    """Space and sha256 of a document of a signed report, None where it was not made; raises NotFound."""
+    space = select(session.c.patient_id).where(session.c.id == get(c, report_id).session_id)
+    query = select(report_file.c.sha256).where(
+        report_file.c.report_id == report_id, report_file.c.name == name
+    )
+    return c.execute(space).scalar_one(), c.execute(query).scalar_one_or_none()
+
+
+def read_document(c: Connection, blobs: BlobStore, report_id: str, name: str = DOCUMENT) -> bytes:
+    """A document that was stored at signing, verified; raises NotFound, IntegrityError."""
+    space, sha256 = find_file(c, report_id, name)
+    if sha256 is None:
+        raise NotFound("document of signed report", report_id)
+    return blobs.read(space, sha256)
+
+
+def keep_pdf(c: Connection, report_id: str, blob: Blob) -> None:
+    """Keep the PDF of a signed report; the first that was made stays. Raises NotFound."""
+    if find_file(c, report_id, PDF)[1] is None:
+        _add_file(c, report_id, PDF, blob)
+
+
+def _add_file(c: Connection, report_id: str, name: str, blob: Blob) -> None:
+    c.execute(insert(report_file).values(report_id=report_id, name=name, size=blob.size, sha256=blob.sha256))
+
+
+_NAMES: Final[tuple[Any, ...]] = tuple(
+    signed_report.c[name] for name in SignedReport.__dataclass_fields__ if name != "sha256"
+)
+_QUERY: Final = select(*_NAMES, report_file.c.sha256).join(
+    report_file, (report_file.c.report_id == signed_report.c.id) & (report_file.c.name == DOCUMENT)
+)

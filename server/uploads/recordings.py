@@ -1,0 +1,403 @@
+"""Upload sets: the files of a take as they came, what was found in them, and which sensor is worn where.
+
+A session's current recording is its newest. Its files may change until an analysis or a tuning was asked for;
+after that it never changes, and the next added or removed file starts a new one with the same other files.
+
+    with recordings.receive(db, blobs, settings, actor, sid, "left.csv") as upload:
+        upload.write(chunk)          # as often as there are chunks; constant memory
+        stored = upload.keep()       # file on disk first, then the row
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import unicodedata
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal, Self
+
+from sqlalchemy import Connection, delete, func, insert, literal, select, update
+
+from sagittal.core.errors import InputError
+from sagittal.server import audit
+from sagittal.server.errors import Conflict, NotFound, ServiceError, TooLarge
+from sagittal.server.jobs.queue import TUNE, VIEW_COLUMNS, JobQueue, JobView, Priority, job_view
+from sagittal.server.provenance import CODE_VERSION
+from sagittal.server.settings import Settings
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.fs import SizeLimitError
+from sagittal.server.storage.refusal import Refusal
+from sagittal.server.storage.tables import job, new_id, now, patient, recording, recording_file, session
+
+INSPECT = "inspect"
+ANALYSE = "analyse"
+
+
+@dataclass(frozen=True)
+class RecordedFile:
+    """A file exactly as it was uploaded, or as an analysis wrote it: its name, bytes, and sha256."""
+
+    name: str
+    size: int
+    sha256: str
+
+
+RecordingState = Literal["draft", "ready", "failed"]
+
+
+@dataclass(frozen=True)
+class StoredRecording:
+    """An upload set.
+
+    Parameters
+    ----------
+    state : draft (not inspected since the last change), ready (inspected), failed (could not be read).
+    manifest : the mapping as last set, None = nobody said anything.
+    inspection : what was found (sagittal.core.quality.describe as JSON), None until inspected.
+    job : the newest inspection, for its progress or its error.
+    """
+
+    id: str
+    session_id: str
+    patient_id: str
+    state: RecordingState
+    files: tuple[RecordedFile, ...]
+    manifest: Mapping[str, Any] | None
+    inspection: Mapping[str, Any] | None
+    job: JobView | None
+
+    @property
+    def input_sha256(self) -> str:
+        """Digest of all names and contents."""
+        return input_digest((f.name, f.sha256) for f in self.files)
+
+
+def input_digest(files: Iterable[tuple[str, str]]) -> str:
+    """sha256 over sorted (name, sha256) pairs."""
+    text = "".join(f"{sha256} {name}\n" for name, sha256 in sorted(files))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def current(c: Connection, session_id: str) -> StoredRecording | None:
+    """The session's newest recording, None before the first file; raises NotFound for the session."""
+    row = c.execute(_QUERY.where(session.c.id == session_id).order_by(*_NEWEST).limit(1)).first()
+    if row is None:
+        patient_of(c, session_id)
+        return None
+    return _recording(c, row)
+
+
+def get(c: Connection, recording_id: str) -> StoredRecording:
+    """One recording; raises NotFound."""
+    row = c.execute(_QUERY.where(recording.c.id == recording_id)).first()
+    if row is None:
+        raise NotFound("recording", recording_id)
+    return _recording(c, row)
+
+
+def set_manifest(
+    c: Connection, actor: audit.Actor | None, session_id: str, manifest: Mapping[str, Any] | None
+) -> StoredRecording:
+    """Keep a mapping for the current recording; raises ManifestError, Conflict no_files."""
+    from sagittal.core.formats.manifest import manifest_of  # slow import
+
+    if manifest is not None:
+        manifest_of(manifest)
+    this = require_current(c, session_id)
+    if this.manifest != manifest:
+        values: dict[str, Any] = {"manifest": manifest}
+        if _sources(this.manifest) != _sources(manifest):
+            values["inspection"] = None  # the files will be read in another way
+        c.execute(update(recording).where(recording.c.id == this.id).values(values))
+        audit.record(c, actor, "recording.mapped", "recording", this.id, {"session_id": session_id})
+    return get(c, this.id)
+
+
+def remove_file(c: Connection, actor: audit.Actor | None, session_id: str, name: str) -> StoredRecording:
+    """Take a file out of the current set (of its successor, if it is already analysed); raises NotFound."""
+    this = current(c, session_id)
+    if this is None or name not in {f.name for f in this.files}:
+        raise NotFound("file", name)
+    editable = _editable(c, session_id)
+    c.execute(
+        delete(recording_file).where(recording_file.c.recording_id == editable, recording_file.c.name == name)
+    )
+    audit.record(c, actor, "recording.file_removed", "recording", editable, {"session_id": session_id})
+    return get(c, editable)
+
+
+def inspect(c: Connection, queue: JobQueue, actor: audit.Actor | None, session_id: str) -> JobView:
+    """Ask for "what we found"; unchanged files are looked at once; raises Conflict no_files."""
+    this = require_current(c, session_id)
+    if this.inspection is not None and this.job is not None and this.job.state == "done":
+        return this.job
+    # a set that was changed and changed back has been looked at, but what was found has been dropped
+    earlier = select(func.count()).select_from(job).where(job.c.recording_id == this.id)
+    times = c.execute(earlier.where(job.c.kind == INSPECT, job.c.state == "done")).scalar_one()
+    declared = hashlib.sha256(repr(_sources(this.manifest)).encode()).hexdigest()[:16]
+    view = queue.submit(
+        c,
+        key=f"{this.id}:{INSPECT}:{this.input_sha256}:{declared}:{times}:{CODE_VERSION}",
+        kind=INSPECT,
+        params={**job_inputs(this), "manifest": this.manifest},
+        recording_id=this.id,
+        requested_by=actor.user_id if actor else None,
+        priority=Priority.IN_FRONT,
+    )
+    audit.record(c, actor, "recording.inspected", "recording", this.id, {"job_id": view.id})
+    return view
+
+
+def publish_inspection(c: Connection, recording_id: str, input_sha256: str, found: Mapping[str, Any]) -> None:
+    """Keep what was found; raises Conflict files_changed when the set is no longer the one that was read."""
+    if get(c, recording_id).input_sha256 != input_sha256:
+        raise Conflict("files_changed", "Files were added or removed meanwhile; the new set is looked at.")
+    c.execute(update(recording).where(recording.c.id == recording_id).values(inspection=dict(found)))
+
+
+def require_current(c: Connection, session_id: str) -> StoredRecording:
+    """The current recording with at least one file; raises Conflict no_files."""
+    this = current(c, session_id)
+    if this is None or not this.files:
+        raise Conflict("no_files", "This session has no files yet; upload the recording first.")
+    return this
+
+
+def job_inputs(this: StoredRecording) -> dict[str, Any]:
+    """What a job needs to know of the files, fixed at submission."""
+    files = [{"name": f.name, "size": f.size, "sha256": f.sha256} for f in this.files]
+    return {"space": this.patient_id, "files": files, "input_sha256": this.input_sha256}
+
+
+def file_bytes(c: Connection, blobs: BlobStore, recording_id: str, name: str) -> bytes:
+    """An original file, verified; raises NotFound, IntegrityError."""
+    this = get(c, recording_id)
+    for f in this.files:
+        if f.name == name:
+            return blobs.read(this.patient_id, f.sha256)
+    raise NotFound("file", name)
+
+
+class receive:  # noqa: N801 - a verb: with receive(...) as upload
+    """One file on its way into the current set; leaving without `keep` leaves nothing behind.
+
+    Parameters
+    ----------
+    size : bytes that are announced, 0 = not known; room for them is asked for before the first comes.
+
+    Raises
+    ------
+    NotFound
+        no such session.
+    ServiceError
+        bad_file_name, disk_full. TooLarge: file_too_large, set_too_large, too_many_files.
+    """
+
+    def __init__(
+        self,
+        db: Database,
+        blobs: BlobStore,
+        settings: Settings,
+        actor: audit.Actor | None,
+        session_id: str,
+        name: str,
+        size: int = 0,
+    ) -> None:
+        self._db, self._blobs, self._settings, self._actor = db, blobs, settings, actor
+        self._session_id = session_id
+        self._name = check_name(name)
+        with db.read() as c:
+            self._space = patient_of(c, session_id)
+            self._check_set(c, 0)
+        require_room(blobs, settings, size)
+        self._receiver = blobs.receive(self._space, settings.max_file_bytes)
+
+    def write(self, data: bytes) -> None:
+        """Append bytes; raises TooLarge file_too_large, DiskFull."""
+        require_room(self._blobs, self._settings, len(data))
+        try:
+            self._receiver.write(data)
+        except SizeLimitError as error:
+            raise make_too_large(self._name, error.limit) from None
+
+    def keep(self) -> RecordedFile:
+        """Store the file and its row; a file of the same name in the set is replaced."""
+        blob = self._receiver.keep()
+        with self._db.write() as c:
+            self._blobs.require(patient_of(c, self._session_id), blob.sha256)
+            self._check_set(c, blob.size)
+            return self._add(c, blob)
+
+    def _check_set(self, c: Connection, size: int) -> None:
+        check_set(c, self._settings, self._session_id, self._name, size)
+
+    def _add(self, c: Connection, blob: Blob) -> RecordedFile:
+        return add_file(c, self._actor, self._session_id, self._name, blob)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._receiver.__exit__(*error)
+
+
+def check_set(c: Connection, settings: Settings, session_id: str, name: str, size: int) -> None:
+    """Raise TooLarge set_too_large, too_many_files unless a file of this size has room beside the others."""
+    this = current(c, session_id)
+    others = [f for f in this.files if f.name != name] if this else []
+    if len(others) + 1 > settings.max_files:
+        raise TooLarge("too_many_files", f"A recording has at most {settings.max_files} files.")
+    total = sum(f.size for f in others) + size
+    if total > settings.max_set_bytes:
+        raise TooLarge(
+            "set_too_large",
+            f"With '{name}' the recording has {total / 1e6:.0f} MB, "
+            f"at most {settings.max_set_bytes / 1e6:g} MB are allowed. Remove files first.",
+        )
+
+
+def add_file(
+    c: Connection, actor: audit.Actor | None, session_id: str, name: str, blob: Blob
+) -> RecordedFile:
+    """Refer to a stored file from the current set, in place of one of its name."""
+    this = current(c, session_id)
+    for f in this.files if this else ():
+        if (f.name, f.sha256) == (name, blob.sha256):
+            return f
+    target = _editable(c, session_id)
+    key = {"recording_id": target, "name": name}
+    c.execute(delete(recording_file).filter_by(**key))
+    row = {"size": blob.size, "sha256": blob.sha256, "added_at": now()}
+    c.execute(insert(recording_file).values(**key, **row))
+    detail = {"session_id": session_id, "sha256": blob.sha256, "size": blob.size}
+    audit.record(c, actor, "recording.file_added", "recording", target, detail)
+    return RecordedFile(name, blob.size, blob.sha256)
+
+
+def make_too_large(name: str, limit: int) -> TooLarge:
+    """What is answered to a file beyond the limit of one file, in bytes."""
+    return TooLarge(
+        "file_too_large",
+        f"'{name}' is larger than {limit / 1e6:g} MB, the limit of this installation. "
+        "Split the recording or ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
+    )
+
+
+class DiskFull(ServiceError):  # noqa: N818 - the name of the HTTP status
+    """There is too little free space to take a file, and to go on working."""
+
+    status = 507
+
+    def __init__(self) -> None:
+        super().__init__(Refusal.FULL.value, Refusal.FULL.sentence)
+
+
+def require_room(blobs: BlobStore, settings: Settings, size: int) -> None:
+    """Raise DiskFull when the disk cannot take so many bytes and keep the free space of the settings."""
+    if shutil.disk_usage(blobs.incoming).free - size < settings.min_free_bytes:
+        raise DiskFull
+
+
+def check_name(name: str) -> str:
+    """A file's name as we keep it: forward slashes, composed Unicode; raises InputError bad_file_name."""
+    plain = unicodedata.normalize("NFC", name).replace("\\", "/").strip("/")
+    parts = plain.split("/")
+    if (
+        not plain
+        or len(plain) > 500
+        or any(p.strip() in {"", ".", ".."} for p in parts)
+        or _unprintable(plain)
+    ):
+        raise InputError(
+            "bad_file_name", "A file's name has 1 to 500 printable characters and no '..' among its folders."
+        )
+    return plain
+
+
+def _unprintable(name: str) -> bool:
+    # control characters, lone surrogates, marks that turn the direction of writing and so show another
+    # ending, and what stands for bytes that were no text; joiners stay, emoji are made of them
+    return any(
+        unicodedata.category(c) in {"Cc", "Cs"}
+        or unicodedata.bidirectional(c) in _TURNING
+        or c in "\u200e\u200f\u061c\ufffd"
+        for c in name
+    )
+
+
+_TURNING: Final = frozenset(("LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"))
+
+
+_NEWEST = (recording.c.created_at.desc(), recording.c.id)
+_QUERY = select(recording, session.c.patient_id).join(session, session.c.id == recording.c.session_id)
+
+
+def _recording(c: Connection, row: Any) -> StoredRecording:
+    files = c.execute(
+        select(recording_file).where(recording_file.c.recording_id == row.id).order_by(recording_file.c.name)
+    )
+    newest = c.execute(
+        select(*VIEW_COLUMNS)
+        .where(job.c.recording_id == row.id, job.c.kind == INSPECT)
+        .order_by(job.c.seq.desc())
+        .limit(1)
+    ).first()
+    look = job_view(newest) if newest else None
+    failed = look is not None and look.state == "failed"
+    return StoredRecording(
+        id=row.id,
+        session_id=row.session_id,
+        patient_id=row.patient_id,
+        state="ready" if row.inspection is not None else "failed" if failed else "draft",
+        files=tuple(RecordedFile(f.name, f.size, f.sha256) for f in files),
+        manifest=row.manifest,
+        inspection=row.inspection,
+        job=look,
+    )
+
+
+def patient_of(c: Connection, session_id: str) -> str:
+    """Id of the patient of a session; raises NotFound for the session."""
+    found = c.execute(
+        select(patient.c.id)
+        .join(session, session.c.patient_id == patient.c.id)
+        .where(session.c.id == session_id)
+    ).scalar()
+    if found is None:
+        raise NotFound("session", session_id)
+    return str(found)
+
+
+def _editable(c: Connection, session_id: str) -> str:
+    """Id of the recording whose files may change now; what was found in it no longer holds."""
+    this = current(c, session_id)
+    fixed = (
+        this is not None
+        and c.execute(
+            select(func.count())
+            .select_from(job)
+            .where(
+                job.c.recording_id == this.id,
+                job.c.kind.in_((ANALYSE, TUNE)),
+                job.c.state.in_(("queued", "running", "done")),
+            )
+        ).scalar_one()
+    )
+    if this is not None and not fixed:
+        c.execute(update(recording).where(recording.c.id == this.id).values(inspection=None))
+        return this.id
+    fresh = new_id()
+    manifest = this.manifest if this else None
+    c.execute(insert(recording).values(id=fresh, session_id=session_id, manifest=manifest, created_at=now()))
+    if this is not None:
+        kept = [recording_file.c[name] for name in ("name", "size", "sha256", "added_at")]
+        files = select(literal(fresh), *kept).where(recording_file.c.recording_id == this.id)
+        c.execute(insert(recording_file).from_select(["recording_id", *kept], files))
+    return fresh
+
+
+def _sources(manifest: Mapping[str, Any] | None) -> object:
+    """The part of a manifest that changes how files are read."""
+    return (manifest or {}).get("sources")

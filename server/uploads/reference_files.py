@@ -1,0 +1,66 @@
+"""References of a session: orientations of another system to compare with, beside the recording, never in it.
+
+A file of the same name replaces the one before; a comparison that used that keeps it.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from sqlalchemy import Connection, delete, func, insert, select
+
+from sagittal.server import audit
+from sagittal.server.clinic import sessions
+from sagittal.server.errors import NotFound, TooLarge
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.tables import now, reference_file
+from sagittal.server.uploads.recordings import RecordedFile, receive
+
+MOST_FILES: Final = 20
+"""References of a session (our choice)."""
+
+
+def list_files(c: Connection, session_id: str) -> list[RecordedFile]:
+    """References of a session by name; raises NotFound for the session."""
+    sessions.get(c, session_id)
+    query = select(reference_file).where(reference_file.c.session_id == session_id)
+    return [RecordedFile(f.name, f.size, f.sha256) for f in c.execute(query.order_by(reference_file.c.name))]
+
+
+def get(c: Connection, session_id: str, name: str) -> RecordedFile:
+    """One reference; raises NotFound."""
+    found = next((f for f in list_files(c, session_id) if f.name == name), None)
+    if found is None:
+        raise NotFound("reference", name)
+    return found
+
+
+def file_bytes(c: Connection, blobs: BlobStore, session_id: str, name: str) -> bytes:
+    """A reference as uploaded, verified; raises NotFound, IntegrityError."""
+    found = get(c, session_id, name)
+    return blobs.read(sessions.get(c, session_id).patient_id, found.sha256)
+
+
+def remove(c: Connection, actor: audit.Actor | None, session_id: str, name: str) -> None:
+    """Take a reference away; comparisons that used it stay as they are. Raises NotFound."""
+    get(c, session_id, name)
+    c.execute(delete(reference_file).filter_by(session_id=session_id, name=name))
+    audit.record(c, actor, "reference.removed", "session", session_id)
+
+
+class receive_reference(receive):  # noqa: N801 - as `receive`
+    """A reference on its way in; as `receive`."""
+
+    def _check_set(self, c: Connection, size: int) -> None:
+        """The recording's set is not touched."""
+
+    def _add(self, c: Connection, blob: Blob) -> RecordedFile:
+        key = {"session_id": self._session_id, "name": self._name}
+        c.execute(delete(reference_file).filter_by(**key))
+        mine = reference_file.c.session_id == self._session_id
+        if c.execute(select(func.count()).select_from(reference_file).where(mine)).scalar_one() >= MOST_FILES:
+            raise TooLarge("too_many_files", f"A session has at most {MOST_FILES} references; remove one.")
+        c.execute(insert(reference_file).values(**key, size=blob.size, sha256=blob.sha256, added_at=now()))
+        detail = {"session_id": self._session_id, "sha256": blob.sha256, "size": blob.size}
+        audit.record(c, self._actor, "reference.added", "session", self._session_id, detail)
+        return RecordedFile(self._name, blob.size, blob.sha256)

@@ -1,0 +1,238 @@
+"""Tables of an upload that nobody has described: what they probably are, and what a person says of them.
+
+    list_tables(c, blobs, sid)                  # by shape: columns, first rows, a guess or what was said
+    check_table(c, blobs, sid, name, source)    # do gravity and rates of turn come out right, so read?
+    map_tables(c, actor, sid, names, source)    # the entry for each file, into the manifest
+    find_known(c, blobs, sid)                   # those of a shape that was described before and fits again
+
+A shape is known by an earlier recording of the clinic whose manifest describes a file with the same columns:
+what was said there is the template. Only two megabytes of each file are read, and not verified; the
+analysis verifies it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final, cast
+
+from sqlalchemy import Connection, select
+
+from sagittal.core.errors import InputError
+from sagittal.server import audit
+from sagittal.server.errors import NotFound
+from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.tables import recording
+from sagittal.server.uploads import recordings
+from sagittal.server.uploads.recordings import StoredRecording
+
+if TYPE_CHECKING:
+    from sagittal.core.formats.source import SourceFile
+    from sagittal.core.formats.table_guess import TableLook
+
+MOST_EARLIER: Final = 200
+"""Earlier recordings that are looked through for a table of the same shape, the newest first."""
+
+
+@dataclass(frozen=True)
+class TableShape:
+    """Tables with the same columns.
+
+    Parameters
+    ----------
+    files : their names. names : their columns. rows : the first rows of the first of them.
+    source : entry of the manifest's `sources` without `file`; what nobody knows is left out.
+    basis : "said" (in this recording), "known" (in an earlier one), "guessed".
+    """
+
+    files: tuple[str, ...]
+    names: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    source: Mapping[str, Any]
+    basis: str
+
+
+@dataclass(frozen=True)
+class TableReading:
+    """What a sensor gives when its table is read as was said.
+
+    Parameters
+    ----------
+    rate_hz : samples per second. at_rest_mps2 : acceleration in its quietest second, None = never still.
+    fastest_radps : rate of turn that it hardly exceeds. problems : what speaks against it, as sentences.
+    """
+
+    sensor: str
+    rate_hz: float
+    at_rest_mps2: float | None
+    fastest_radps: float | None
+    problems: tuple[str, ...]
+
+
+def list_tables(c: Connection, blobs: BlobStore, session_id: str) -> tuple[TableShape, ...]:
+    """Tables of the current recording by their shape; raises NotFound, Conflict no_files."""
+    this = recordings.require_current(c, session_id)
+    shapes: list[TableShape] = []
+    for name, look, entry in _tables(this, blobs):
+        said = None if entry is None else _as_template(entry, look)
+        for i, shape in enumerate(shapes):
+            if shape.names == look.names and (shape.basis == "said") == (said is not None):
+                shapes[i] = replace(shape, files=(*shape.files, name))
+                break
+        else:
+            known = None if said else _recall(c, blobs, this, look)
+            source = said or known or dict(look.source)
+            basis = "said" if said else "known" if known else "guessed"
+            shapes.append(TableShape((name,), look.names, look.rows, source, basis))
+    return tuple(shapes)
+
+
+def check_table(
+    c: Connection, blobs: BlobStore, session_id: str, name: str, source: Mapping[str, Any]
+) -> tuple[TableReading, ...]:
+    """Read the beginning of a file as `source` says; raises NotFound, FormatError, ManifestError."""
+    this = recordings.require_current(c, session_id)
+    file = next((f for f in _files(this, blobs) if f.name == name), None)
+    if file is None:
+        raise NotFound("file", name)
+    return _check(file, source)
+
+
+def map_tables(
+    c: Connection,
+    actor: audit.Actor | None,
+    session_id: str,
+    names: Sequence[str],
+    source: Mapping[str, Any],
+) -> StoredRecording:
+    """Describe tables of one shape in the manifest; raises NotFound, ManifestError, Conflict no_files."""
+    from sagittal.core.formats.table_guess import make_entry  # slow import
+
+    this = recordings.require_current(c, session_id)
+    missing = set(names) - {f.name for f in this.files}
+    if missing:
+        raise NotFound("file", min(missing))
+    manifest = dict(this.manifest or {})
+    others = [s for s in manifest.get("sources") or () if s["file"] not in names]
+    manifest["sources"] = [*(make_entry(source, name) for name in names), *others]
+    return recordings.set_manifest(c, actor, session_id, manifest)
+
+
+def find_known(c: Connection, blobs: BlobStore, session_id: str) -> tuple[TableShape, ...]:
+    """Tables of a known shape where gravity and rates of turn come out right; raises as `list_tables`."""
+    return tuple(
+        shape
+        for shape in list_tables(c, blobs, session_id)
+        if shape.basis == "known"
+        and all(_fits(c, blobs, session_id, name, shape.source) for name in shape.files)
+    )
+
+
+def _fits(c: Connection, blobs: BlobStore, session_id: str, name: str, source: Mapping[str, Any]) -> bool:
+    try:
+        return not any(check.problems for check in check_table(c, blobs, session_id, name, source))
+    except InputError:
+        return False
+
+
+def _check(file: SourceFile, source: Mapping[str, Any]) -> tuple[TableReading, ...]:
+    from sagittal.core.formats.draft import finish  # slow imports
+    from sagittal.core.formats.manifest import manifest_of
+    from sagittal.core.formats.table_guess import make_entry, read_sample
+    from sagittal.core.quality.signals import measure_signal
+    from sagittal.core.quality.suspicion import list_suspicions
+
+    (spec,) = manifest_of({"sources": [make_entry(source, file.name)]}).sources
+    checks = []
+    for device, stream in finish(read_sample(file, spec)).items():
+        facts = measure_signal(stream.acc, stream.gyr, stream.rate_hz)
+        notices = [*stream.notices, *list_suspicions(device, facts, stream.acc, stream.quat)]
+        checks.append(
+            TableReading(
+                device,
+                round(stream.rate_hz, 3),
+                round(facts.still_norm, 3) if facts.still else None,
+                None if facts.gyro_top is None else round(facts.gyro_top, 3),
+                tuple(n.message for n in notices if n.severity != "info"),
+            )
+        )
+    return tuple(checks)
+
+
+def _files(this: StoredRecording, blobs: BlobStore) -> Iterator[SourceFile]:
+    from sagittal.server.storage.blob_source import open_source  # slow import
+
+    for f in this.files:
+        yield open_source(blobs, this.patient_id, f.name, f.size, f.sha256)
+
+
+def _tables(
+    this: StoredRecording, blobs: BlobStore
+) -> Iterator[tuple[str, TableLook, Mapping[str, Any] | None]]:
+    """Name of every table, its look, and the entry of the manifest that describes it."""
+    from sagittal.core.formats import bids  # slow imports
+    from sagittal.core.formats.manifest import manifest_of
+    from sagittal.core.formats.table_guess import look_into_table
+
+    said = [s for m in (this.manifest or {}, *_uploaded(this, blobs)) for s in m.get("sources") or ()]
+    said = [s for s in said if s.get("columns")]
+    specs = manifest_of({"sources": said}).sources
+    there = {f.name for f in this.files}
+    for file in _files(this, blobs):
+        if bids.is_table(file.name) and bids.find_parts(file.name)[0] in there:
+            continue
+        look = look_into_table(file)
+        if look is None or not look.source["columns"]:
+            continue
+        entry = next((e for e, s in zip(said, specs, strict=True) if s.covers(file.name)), None)
+        yield file.name, look, entry
+
+
+def _uploaded(this: StoredRecording, blobs: BlobStore) -> Iterator[dict[str, Any]]:
+    """Manifests among the files that can be read."""
+    from sagittal.core.formats.json_tree import read_json  # slow imports
+    from sagittal.core.formats.manifest import MAX_BYTES, is_manifest, manifest_of
+
+    for file in _files(this, blobs):
+        if file.name.lower().endswith(".json") and file.size < MAX_BYTES:
+            with suppress(InputError, ValueError):
+                found = read_json(file.read())
+                if is_manifest(found):
+                    manifest_of(found)
+                    yield cast("dict[str, Any]", found)
+
+
+def _recall(c: Connection, blobs: BlobStore, this: StoredRecording, look: TableLook) -> dict[str, Any] | None:
+    """What was last said in this clinic of a table with these columns, at the rate that this one names."""
+    rows = c.execute(
+        select(recording.c.id, recording.c.manifest)
+        .where(recording.c.manifest.is_not(None), recording.c.id != this.id)
+        .order_by(recording.c.created_at.desc(), recording.c.id)
+        .limit(MOST_EARLIER)
+    )
+    for row in rows:
+        for entry in (row.manifest or {}).get("sources") or ():
+            columns = entry.get("columns") or {}
+            used = {name for group in columns.values() for kind in group.values() for name in kind or ()}
+            if not used or not used <= set(look.names):
+                continue
+            earlier = recordings.get(c, row.id)
+            if not any(
+                name == entry["file"] and found.names == look.names
+                for name, found, _ in _tables(earlier, blobs)
+            ):
+                continue
+            said = _as_template(entry, look)
+            return said | ({"rate_hz": look.source["rate_hz"]} if "rate_hz" in look.source else {})
+    return None
+
+
+def _as_template(entry: Mapping[str, Any], look: TableLook) -> dict[str, Any]:
+    """What an entry says of any table of this shape; a sensor that no column names is called as its file."""
+    from sagittal.core.formats.table_guess import THE_FILE  # slow import
+
+    said = {k: v for k, v in entry.items() if k != "file"}
+    if set(look.source["columns"]) == {THE_FILE} and len(entry["columns"]) == 1:
+        said["columns"] = {THE_FILE: next(iter(entry["columns"].values()))}
+    return said

@@ -1,0 +1,262 @@
+"""Files that come in parts: a broken upload goes on where it stopped, also after the server was killed.
+
+What has come waits as `<id>.part` among the files that are being received and only grows; a part is answered
+when it is on the disk. Once the file is whole and its SHA-256 is the sender's, it gets its name in the store
+by a rename and its row in the session, as a file that came at once.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from sqlalchemy import Connection, delete, insert, select, update
+
+from sagittal.server import audit
+from sagittal.server.errors import Conflict, NotFound, ServiceError, TooLarge
+from sagittal.server.settings import Settings
+from sagittal.server.storage import fs, references
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.tables import file_upload, new_id, now
+from sagittal.server.uploads import recordings
+from sagittal.server.uploads.recordings import RecordedFile
+
+ABANDONED: Final = dt.timedelta(days=1)
+"""An upload to which nothing was added for so long goes."""
+
+
+@dataclass(frozen=True)
+class FileUpload:
+    """A file on its way in.
+
+    Parameters
+    ----------
+    name, size : of the whole file. offset : bytes that are on the server's disk; the next part begins there.
+    """
+
+    id: str
+    name: str
+    size: int
+    offset: int
+
+
+def begin(
+    db: Database,
+    blobs: BlobStore,
+    settings: Settings,
+    actor: audit.Actor | None,
+    session_id: str,
+    name: str,
+    size: int,
+) -> FileUpload:
+    """Announce a file of so many bytes, or find the unfinished upload of one with this name and size.
+
+    Raises
+    ------
+    NotFound; InputError bad_file_name; TooLarge; DiskFull.
+    """
+    name = recordings.check_name(name)
+    if size < 1:
+        raise ServiceError("bad_value", f"The file has {size} bytes; an upload in parts has at least 1.")
+    if size > settings.max_file_bytes:
+        raise recordings.make_too_large(name, settings.max_file_bytes)
+    with db.write() as c:
+        recordings.patient_of(c, session_id)
+        others = 0
+        coming = list_coming(c, blobs, session_id)
+        for one in coming:
+            if (one.name, one.size) == (name, size):
+                return one
+            others += one.size
+        if len(coming) >= settings.max_files:
+            raise TooLarge("too_many_files", f"At most {settings.max_files} files come at a time.")
+        recordings.check_set(c, settings, session_id, name, size + others)
+        recordings.require_room(blobs, settings, size)
+        fresh = new_id()
+        row = {"id": fresh, "session_id": session_id, "name": name, "size": size, "created_at": now()}
+        c.execute(insert(file_upload).values(row))
+        audit.record(c, actor, "upload.begun", "session", session_id, {"upload_id": fresh, "size": size})
+    return FileUpload(fresh, name, size, 0)
+
+
+def list_coming(c: Connection, blobs: BlobStore, session_id: str) -> list[FileUpload]:
+    """The unfinished uploads of a session, the oldest first."""
+    query = _QUERY.where(file_upload.c.session_id == session_id, file_upload.c.finished_sha256.is_(None))
+    return [_describe(blobs, row) for row in c.execute(query)]
+
+
+def get(c: Connection, blobs: BlobStore, session_id: str, upload_id: str) -> FileUpload:
+    """One upload; a finished one has all its bytes. Raises NotFound."""
+    return _describe(blobs, _find(c, session_id, upload_id))
+
+
+def add_part(
+    db: Database,
+    blobs: BlobStore,
+    settings: Settings,
+    session_id: str,
+    upload_id: str,
+    offset: int,
+    data: bytes,
+) -> FileUpload:
+    """Add bytes behind those that are there; when this returns they survive a power cut.
+
+    Raises
+    ------
+    NotFound; Conflict upload_gap: they belong elsewhere; TooLarge beyond what was announced; DiskFull.
+    """
+    with blobs.hold_part(upload_id):
+        with db.read() as c:
+            this = get(c, blobs, session_id, upload_id)
+        if offset != this.offset:
+            raise Conflict(
+                "upload_gap", f"Bytes from {offset} came, expected those from {this.offset}. Send these."
+            )
+        if offset + len(data) > this.size:
+            raise TooLarge(
+                "file_too_large",
+                f"'{this.name}' was announced with {this.size} bytes, more came. Begin anew.",
+            )
+        if not data:
+            return this
+        recordings.require_room(blobs, settings, len(data))
+        path = blobs.part(upload_id)
+        if not path.exists():
+            fs.keep_private(path)
+            fs.sync_folder(path.parent)
+        part = fs.AppendOnlyFile(path, offset)
+        try:
+            part.append(data)
+            part.sync()
+        finally:
+            part.close()
+        return FileUpload(this.id, this.name, this.size, part.size)
+
+
+def finish(
+    db: Database,
+    blobs: BlobStore,
+    settings: Settings,
+    actor: audit.Actor | None,
+    session_id: str,
+    upload_id: str,
+    sha256: str,
+) -> RecordedFile:
+    """Make the file one of the session's; asked again it answers the same.
+
+    Raises
+    ------
+    NotFound; TooLarge. Conflict upload_incomplete: bytes are missing; upload_damaged: they are not the
+    sender's, and the upload begins again at 0.
+    """
+    with blobs.hold_part(upload_id):
+        with db.read() as c:
+            row = _find(c, session_id, upload_id)
+        if row.finished_sha256 == sha256:
+            return RecordedFile(row.name, row.size, sha256)
+        this, path = _describe(blobs, row), blobs.part(upload_id)
+        if row.finished_sha256 is not None:
+            raise Conflict(
+                "upload_damaged", "This upload was finished with another SHA-256. Begin a new one."
+            )
+        if this.offset < this.size:
+            raise Conflict(
+                "upload_incomplete", f"{this.offset} of {this.size} bytes are here. Send the rest first."
+            )
+        if _hash(path) != sha256:
+            fs.remove_file(path)
+            raise Conflict(
+                "upload_damaged",
+                f"What came of '{this.name}' has another SHA-256 than what was sent. Send it again from 0.",
+            )
+        with db.read() as c:
+            space = recordings.patient_of(c, session_id)
+            recordings.check_set(c, settings, session_id, this.name, this.size)
+        # before the transaction: into a bucket it takes a while
+        blobs.adopt(space, path, sha256)
+        try:
+            stored = _publish(db, blobs, settings, actor, session_id, this, sha256)
+        except NotFound:
+            # erased meanwhile: nothing of it may wait, in the trash neither
+            fs.remove_file(path)
+            references.discard(db, blobs, space, [sha256])
+            raise
+        fs.remove_file(path)
+        return stored
+
+
+def _publish(
+    db: Database,
+    blobs: BlobStore,
+    settings: Settings,
+    actor: audit.Actor | None,
+    session_id: str,
+    this: FileUpload,
+    sha256: str,
+) -> RecordedFile:
+    with db.write() as c:
+        _find(c, session_id, this.id)
+        blobs.require(recordings.patient_of(c, session_id), sha256)
+        recordings.check_set(c, settings, session_id, this.name, this.size)
+        stored = recordings.add_file(c, actor, session_id, this.name, Blob(sha256, this.size))
+        mine = file_upload.c.id == this.id
+        c.execute(update(file_upload).where(mine).values(finished_sha256=sha256))
+    return stored
+
+
+def cancel(
+    db: Database, blobs: BlobStore, actor: audit.Actor | None, session_id: str, upload_id: str
+) -> None:
+    """Forget an upload with what came of it; raises NotFound. A finished file stays."""
+    with blobs.hold_part(upload_id):
+        with db.write() as c:
+            _find(c, session_id, upload_id)
+            c.execute(delete(file_upload).where(file_upload.c.id == upload_id))
+            audit.record(c, actor, "upload.cancelled", "session", session_id, {"upload_id": upload_id})
+        fs.remove_file(blobs.part(upload_id))
+
+
+def list_parts(c: Connection) -> set[str]:
+    """Names of the files of all uploads that are still coming."""
+    return {BlobStore.name_part(one) for one in c.execute(select(file_upload.c.id)).scalars()}
+
+
+def drop_abandoned(db: Database, blobs: BlobStore) -> None:
+    """Forget uploads to which nothing was added for a day, and those that were finished before."""
+    limit = now() - ABANDONED
+    with db.read() as c:
+        old = list(c.execute(_QUERY.where(file_upload.c.created_at < limit)))
+    for row in old:
+        with blobs.hold_part(row.id):
+            path = blobs.part(row.id)
+            if path.exists() and path.stat().st_mtime >= limit.timestamp():
+                continue
+            with db.write() as c:
+                c.execute(delete(file_upload).where(file_upload.c.id == row.id))
+            fs.remove_file(path)
+
+
+_QUERY = select(file_upload).order_by(file_upload.c.created_at, file_upload.c.id)
+
+
+def _find(c: Connection, session_id: str, upload_id: str) -> Any:
+    mine = (file_upload.c.id == upload_id, file_upload.c.session_id == session_id)
+    row = c.execute(_QUERY.where(*mine)).first()
+    if row is None:
+        raise NotFound("upload", upload_id)
+    return row
+
+
+def _describe(blobs: BlobStore, row: Any) -> FileUpload:
+    path = blobs.part(row.id)
+    there = path.stat().st_size if path.exists() else 0
+    return FileUpload(row.id, row.name, row.size, row.size if row.finished_sha256 else min(there, row.size))
+
+
+def _hash(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,148 @@
+"""The video of a take: shown beside the figure, never measured, never in a report.
+
+Nobody is filmed by default: a video is taken only with the word of who adds it that the person agreed, and
+that word is kept with it. It goes with its session and its patient. A session has one; another replaces it.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from math import isfinite
+from typing import Final
+
+from sqlalchemy import Connection, delete, insert, select, update
+
+from sagittal.server import audit
+from sagittal.server.clinic import sessions
+from sagittal.server.errors import NotFound, ServiceError
+from sagittal.server.storage.blobs import Blob, BlobStore
+from sagittal.server.storage.tables import now, session_video
+from sagittal.server.uploads.recordings import RecordedFile, receive
+
+BEGINS: Final = 12
+"""Bytes that tell what a file is."""
+
+MOST_OFFSET_S: Final = 24 * 3600.0
+
+
+@dataclass(frozen=True)
+class SessionVideo:
+    """The video of a session.
+
+    Parameters
+    ----------
+    offset_s : time in the video at the take's time 0; None until somebody has aligned it.
+    consent_by, consent_at : who said that the person agreed to be filmed, and when.
+    """
+
+    session_id: str
+    name: str
+    media_type: str
+    size: int
+    sha256: str
+    offset_s: float | None
+    consent_by: str | None
+    consent_at: dt.datetime
+
+
+def find(c: Connection, session_id: str) -> SessionVideo | None:
+    """The video of a session, None without one."""
+    row = c.execute(select(session_video).where(session_video.c.session_id == session_id)).first()
+    return None if row is None else SessionVideo(**row._asdict())
+
+
+def get(c: Connection, session_id: str) -> SessionVideo:
+    """The same; raises NotFound for the session and for its video."""
+    sessions.get(c, session_id)
+    found = find(c, session_id)
+    if found is None:
+        raise NotFound("video of session", session_id)
+    return found
+
+
+def find_stored(c: Connection, blobs: BlobStore, session_id: str) -> tuple[SessionVideo, str]:
+    """A video and the space of its blob; raises NotFound, IntegrityError when it is gone."""
+    found = get(c, session_id)
+    space = sessions.get(c, session_id).patient_id
+    blobs.require(space, found.sha256)
+    return found, space
+
+
+def align(c: Connection, actor: audit.Actor | None, session_id: str, offset_s: float | None) -> SessionVideo:
+    """Say which moment of the video is the take's time 0, None = not known; raises NotFound, bad_value."""
+    get(c, session_id)
+    if offset_s is not None and not (isfinite(offset_s) and abs(offset_s) <= MOST_OFFSET_S):
+        raise ServiceError("bad_value", f"The offset is {offset_s} s, expected at most a day either way.")
+    c.execute(update(session_video).where(session_video.c.session_id == session_id).values(offset_s=offset_s))
+    audit.record(c, actor, "video.aligned", "session", session_id, {"offset_s": offset_s})
+    return get(c, session_id)
+
+
+def remove(c: Connection, actor: audit.Actor | None, session_id: str) -> None:
+    """Take the video away; raises NotFound."""
+    get(c, session_id)
+    c.execute(delete(session_video).where(session_video.c.session_id == session_id))
+    audit.record(c, actor, "video.removed", "session", session_id)
+
+
+def require_consent(consent: bool) -> None:
+    """Raise ServiceError no_consent unless the person agreed to be filmed."""
+    if not consent:
+        raise ServiceError(
+            "no_consent",
+            "A video is kept only of who agreed to be filmed. Ask, and say so with the upload.",
+        )
+
+
+def find_media_type(begins: bytes) -> str | None:
+    """What a film is, by its first bytes: MP4 and QuickTime say "ftyp", WebM is EBML; None of any other."""
+    if begins[4:8] == b"ftyp":
+        return "video/quicktime" if begins[8:12] == b"qt  " else "video/mp4"
+    return "video/webm" if begins[:4] == b"\x1a\x45\xdf\xa3" else None
+
+
+class receive_video(receive):  # noqa: N801 - as `receive`
+    """A video on its way in; as `receive`, once `require_consent` has been asked.
+
+    `offset_s` and `consent_at` are those of SessionVideo, to be set before `keep`; else not known, and now.
+    """
+
+    offset_s: float | None = None
+    consent_at: dt.datetime | None = None
+    _begins = b""
+
+    def write(self, data: bytes) -> None:
+        """Append bytes; raises as `receive.write`."""
+        self._begins += data[: max(BEGINS - len(self._begins), 0)]
+        super().write(data)
+
+    def keep(self) -> RecordedFile:
+        """Store the video; raises ServiceError no_video when it is none that a browser plays."""
+        if find_media_type(self._begins) is None:
+            raise ServiceError(
+                "no_video", f"'{self._name}' is no video that browsers play. Expected MP4, QuickTime or WebM."
+            )
+        return super().keep()
+
+    def _check_set(self, c: Connection, size: int) -> None:
+        """The recording's set is not touched."""
+
+    def _add(self, c: Connection, blob: Blob) -> RecordedFile:
+        key = {"session_id": self._session_id}
+        c.execute(delete(session_video).filter_by(**key))
+        c.execute(
+            insert(session_video).values(
+                **key,
+                name=self._name,
+                media_type=find_media_type(self._begins),
+                size=blob.size,
+                sha256=blob.sha256,
+                offset_s=self.offset_s,
+                consent_by=None if self._actor is None else self._actor.name,
+                consent_at=self.consent_at or now(),
+            )
+        )
+        detail = {"session_id": self._session_id, "sha256": blob.sha256, "size": blob.size, "consent": True}
+        audit.record(c, self._actor, "video.added", "session", self._session_id, detail)
+        return RecordedFile(self._name, blob.size, blob.sha256)
