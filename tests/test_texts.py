@@ -159,6 +159,7 @@ def find_uncounted(messages: Collection[str]) -> list[str]:
     return [m for m in counting if len(wordings[reduce_number(m)]) == 1]
 
 
+@pytest.mark.slow
 def test_a_count_has_a_message_for_one() -> None:
     formats = [
         message

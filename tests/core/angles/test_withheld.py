@@ -150,6 +150,7 @@ def test_what_was_withheld_stays_so_in_files_pages_and_after_an_edit() -> None:
 DISTANCES = ("gait_speed_mps", "total_distance_m", *NAMES[1:])
 
 
+@pytest.mark.slow
 def test_distances_of_a_chain_that_does_not_hang_together_are_withheld_in_files_and_after_an_edit() -> None:
     found = exchanged()
     distances = [p for p in found.parameters if p.name in DISTANCES]

@@ -84,6 +84,7 @@ def test_counted_strides_have_the_true_times(walked: Walked) -> None:
     assert 0.015 <= np.mean(stance) <= 0.045
 
 
+@pytest.mark.slow
 def test_turning_strides_are_those_that_turn(walked: Walked) -> None:
     """Every true stride turning by more than 30° is set aside as turn; no straight one is."""
     true = walked.simulation.truth.strides

@@ -94,6 +94,7 @@ def test_what_the_tests_compare_with_counts() -> None:
     assert sum(s.counted for s in undisturbed("comfortable", "feet")) > 30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("walk", "worn", "segment", "fault", "start_s", "length_s"),
     [

@@ -52,6 +52,7 @@ def end_of(seed: int) -> str:
         raise
 
 
+@pytest.mark.slow
 def test_trials_with_lost_samples_end_in_results_or_a_notice() -> None:
     ends = Counter(end_of(seed) for seed in EVERYDAY)
     assert ends["results"] > 5

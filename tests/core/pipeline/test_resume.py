@@ -91,6 +91,7 @@ def test_a_trunk_sensor_resumed_at_any_stage_is_the_whole(stage: str) -> None:
     assert same(resume(whole("pelvis"), stage), whole("pelvis"))
 
 
+@pytest.mark.slow
 def test_with_other_parameters_it_is_what_the_chain_gives_with_those() -> None:
     worn: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
     again = resume(whole(*worn), "parameters", OTHER)

@@ -100,6 +100,7 @@ def test_sensors_mixed_up_in_any_way_are_sorted(names: dict[Segment, Segment]) -
     assert apply_repair(wrong, repair).segments == take().segments
 
 
+@pytest.mark.slow
 def test_exchanged_feet_are_seen_by_the_pelvis_alone() -> None:
     three = replace(
         take(),

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from sagittal import core
 
 CALL_ALL = """
@@ -64,6 +66,7 @@ print(sum(exp_so3.stats.cache_hits.values()))
 """
 
 
+@pytest.mark.slow
 def test_compiled_callers_use_an_inner_function_also_from_the_cache_on_disk(tmp_path: Path) -> None:
     env = {"NUMBA_CACHE_DIR": str(tmp_path), "PATH": ""}
     hits = [

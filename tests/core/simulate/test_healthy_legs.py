@@ -104,6 +104,7 @@ def _measured(name: str) -> tuple[WalkingSpeed, Mapping[tuple[str, Side | None],
     return walking_speed(found["gait_speed_mps", None], REFERENCE_HEIGHT_M), found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_unaffected_joints_move_as_those_of_healthy_adults(name: str) -> None:
     speed, found = _measured(name)

@@ -80,6 +80,7 @@ def test_nothing_is_five_percent_off_zero() -> None:
     assert rows["Roll-tib"].nominal == pytest.approx(radians(45.0))
 
 
+@pytest.mark.slow
 def test_what_is_above_does_not_move_what_is_below() -> None:
     for row in table().rows:
         if row.name.endswith("-thi") or row.name in ("LThi2Knee", "CThi"):

@@ -249,6 +249,7 @@ async def compare(visit: Visit, client: httpx.AsyncClient, **body: Any) -> dict[
     return events(await client.get(f"{API}/jobs/{asked.json()['id']}/events"))[-1]
 
 
+@pytest.mark.slow
 async def test_filters_run_on_the_take_as_one_job_and_against_a_reference(visit: Visit) -> None:
     chosen = {"filters": ["mahony_2008", "wu_2018"], "magnetometer": False, "reference": "labor/optisch.csv"}
     async with visit.clinic.client("clinician", timeout=300) as client:

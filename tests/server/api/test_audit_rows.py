@@ -329,6 +329,7 @@ async def _fail(clinic: Clinic, **person: str) -> None:
         assert answer.status_code == 401
 
 
+@pytest.mark.slow
 async def test_a_failed_sign_in_is_a_row_without_what_was_typed(tmp_path: Path) -> None:
     async with opened(tmp_path) as v:
         known = v.clinic.user("viewer")

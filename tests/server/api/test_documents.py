@@ -32,6 +32,7 @@ async def test_operations_that_send_files_of_any_type_declare_json_as_json(clini
         assert content.get("application/json") == {"schema": {}}, path
 
 
+@pytest.mark.slow
 async def test_allow_names_every_method_of_a_path(clinic: Clinic) -> None:
     offered: dict[str, set[str]] = {}
     paths = openapi(clinic.app)["paths"]

@@ -89,6 +89,7 @@ async def test_an_expired_code_and_one_that_was_replaced_are_refused(clinic: Cli
         assert (await pairing(http, second)).status_code == 404
 
 
+@pytest.mark.slow
 async def test_guessing_codes_is_throttled(clinic: Clinic) -> None:
     async with clinic.client() as http:
         for _ in range(MAX_PER_PAIR):

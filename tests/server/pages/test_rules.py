@@ -197,6 +197,7 @@ def test_every_figure_of_a_rule_has_a_name_and_a_definition() -> None:
         assert entry.definition
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sweep_after(1, NAMES))
 async def test_every_rule_is_shown_whatever_its_rank(
     clinic: Clinic, pages: dict[str, Shown], name: str

@@ -275,6 +275,7 @@ async def hostile_pages(
     return hostile, shown
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_user_text_is_the_same_in_german(hostile_pages: tuple[Hostile, Pages], page: str) -> None:
     hostile, pages = hostile_pages

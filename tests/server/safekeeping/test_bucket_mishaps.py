@@ -269,6 +269,7 @@ def test_a_restore_passes_over_what_a_start_makes_and_nothing_else(
     assert is_whole(home)
 
 
+@pytest.mark.slow
 def test_an_erasure_asks_the_bucket_while_others_may_write(
     clinic: Clinic,
     bucket: Bucket,  # noqa: F811

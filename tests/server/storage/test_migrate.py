@@ -319,6 +319,7 @@ def test_a_stopped_worker_does_not_wait_and_a_newer_database_is_refused(tmp_path
         migrate.await_current(path, threading.Event())
 
 
+@pytest.mark.slow
 def test_the_command_waits_quietly_and_ends_when_told(tmp_path: Path) -> None:
     migrate.upgrade(tmp_path / "sagittal.db", target="0020")
     worker = subprocess.Popen(

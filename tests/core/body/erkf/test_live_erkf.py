@@ -134,6 +134,7 @@ def strides_of(take: UniformRecording, size: int = 10) -> list[LiveStride]:
     return [s for s in told.values() if s.complete]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("start_s", "length_s"), [(15.5, 0.2), (15.9, 0.3)])
 def test_a_path_that_its_rest_contradicts_begins_anew(start_s: float, length_s: float) -> None:
     """Too short to be called a frozen sensor; all strides after it were half or three times as long."""
