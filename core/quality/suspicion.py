@@ -15,11 +15,14 @@ from sagittal.core.errors import Notice, Severity
 from sagittal.core.frames import GRAVITY, Floats
 from sagittal.core.quality.signals import Facts
 from sagittal.core.signals.held_samples import is_complete
+from sagittal.core.signals.rest import LARGEST_BIAS
 
 TOLERANCE: Final = 0.10
 FAR_OFF: Final = 0.25
 """Beyond this a scale error is no longer a scale error [our choice]; the worst real sensor was 6.6 % off."""
 GYRO_REST: Final = 0.2
+"""rad/s at rest; of a sensor whose acceleration shows that it walks, up to LARGEST_BIAS is an offset: degrees
+read as radians would reach more than GYRO_RANGE there."""
 GYRO_RANGE: Final = 40.0
 """rad/s; 2000 °/s, the widest range of wearable gyroscopes, is 34.9 [our choice]."""
 GYRO_LEAST: Final = np.radians(10.0)
@@ -123,13 +126,14 @@ def _rate(device: str, f: Facts) -> list[Notice]:
                 device,
             )
         ]
-    if f.still and f.still_gyro is not None and f.still_gyro > GYRO_REST:
+    rest = LARGEST_BIAS if f.acc_std > WALKING_STD else GYRO_REST
+    if f.still and f.still_gyro is not None and f.still_gyro > rest:
         return [
             _say(
                 "unit_suspect",
                 f"Sensor {device}: angular rate is {f.still_gyro:.2f} rad/s while the acceleration is "
                 "still, expected "
-                f"less than {GYRO_REST}; it may be in deg/s but read as rad/s ({_FIX_GYR}), or the bias "
+                f"less than {rest:.2g}; it may be in deg/s but read as rad/s ({_FIX_GYR}), or the bias "
                 "is broken.",
                 device,
             )

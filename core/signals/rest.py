@@ -1,9 +1,9 @@
 """Where the sensors are at rest: quiet windows anywhere in a take, for all sensors together or for one.
 
 A sample is quiet when the 1-s window around it has mean |ω − b| below 6 °/s and std |f| below 0.25 m/s²
-(docs/science/calibration.md, "Rest"). b is the sensor's own offset, taken from its quietest window instead of
-the median of the take: in a take that is mostly walking the median is a property of the gait, not of the
-gyroscope.
+(docs/science/calibration.md, "Rest"). b is the sensor's own offset, taken from its steadiest window instead
+of the median of the take: in a take that is mostly walking the median is a property of the gait, not of the
+gyroscope. An offset above that limit, up to 20 °/s, counts where gravity shows that the sensor did not turn.
 """
 
 from __future__ import annotations
@@ -57,6 +57,16 @@ STANDING: Final = QuietParams(window_s=0.5, shortest_s=0.5)
 core/events/bouts.py)."""
 
 
+LARGEST_BIAS: Final = radians(20.0)
+"""Zero-rate offsets of consumer MEMS gyroscopes are specified up to ±20 °/s; beyond it the sensor turns."""
+SAME_BIAS: Final = radians(1.0)
+"""Rates of two stretches that differ by less are the same offset; temperature moves it by less in a take."""
+
+
+JUDGED: Final = radians(1.0)
+"""Sway and noise turn gravity by less (`RestParams.drift`)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Quietness:
     """How quiet one sensor is around each sample.
@@ -86,7 +96,9 @@ def measure_quietness(signals: SensorSignals, rate_hz: float, params: QuietParam
     whole, offset, norm = np.empty(n - width + 1, np.bool_), np.empty(3), np.empty(n)
     rate = _lock(signals.gyr)
     find_steadiest_rate(rate, _lock(signals.valid), width, whole, offset)
-    measure_norms(rate, zero if np.linalg.norm(offset) > params.gyro_limit else offset, norm)
+    if np.linalg.norm(offset) > params.gyro_limit and not is_bias(offset, signals, rate_hz, params):
+        offset = zero
+    measure_norms(rate, offset, norm)
     del rate
     gyro, acc, unused = np.empty(n), np.empty(n), np.empty(n)
     measure_windows(norm, width, gyro, unused)
@@ -95,6 +107,36 @@ def measure_quietness(signals: SensorSignals, rate_hz: float, params: QuietParam
     measure_windows(norm, width, unused, acc)
     quiet = (gyro < params.gyro_limit) & (acc < params.acc_std_limit) & _centred(whole, n, width)
     return Quietness(gyro, acc, quiet)
+
+
+def is_bias(offset: Floats, signals: SensorSignals, rate_hz: float, params: QuietParams) -> bool:
+    """Is a steady rate above `gyro_limit` an offset of the gyroscope and not a turn of the sensor?
+
+    A turn about a horizontal axis turns gravity in the sensor's axes; one about the vertical does not, but is
+    not repeated at the same rate after the sensor has moved.
+
+    Parameters
+    ----------
+    offset : (3,) mean rate of the steadiest window, rad/s.
+    """
+    if np.linalg.norm(offset) > LARGEST_BIAS:
+        return False
+    width = max(2, round(params.window_s * rate_hz))
+    mean = _average_windows(signals.gyr, width)
+    spread = _average_windows((signals.gyr - offset) ** 2, width).sum(axis=1)
+    steady = (np.linalg.norm(mean - offset, axis=1) < SAME_BIAS) & (spread < params.gyro_limit**2)
+    steady &= _average_windows(signals.valid[:, None].astype(np.float64), width)[:, 0] > 1.0 - 0.5 / width
+    stretches = find_runs(steady)
+    if not stretches:
+        return False
+    first, last = max(stretches, key=lambda run: run[1] - run[0])
+    acc = signals.acc[first : last + width - 1]
+    up = acc.mean(axis=0) / np.linalg.norm(acc.mean(axis=0))
+    turned, seconds = measure_turn(acc, rate_hz)
+    expected = float(np.linalg.norm(offset - offset @ up * up)) * seconds
+    if turned > max(expected / 3.0, JUDGED):
+        return False
+    return len(stretches) > 1 or abs(float(offset @ up)) < params.gyro_limit
 
 
 def find_rest_windows(
@@ -180,6 +222,12 @@ def find_runs(mask: Bools) -> list[tuple[int, int]]:
 def index_window(window: Window, rate_hz: float) -> slice:
     """Index range of a time window on the uniform axis."""
     return slice(max(0, round(window[0] * rate_hz)), max(0, round(window[1] * rate_hz)))
+
+
+def _average_windows(x: Floats, width: int) -> Floats:
+    """Means (n − width + 1, k) of every window of x (n, k)."""
+    total = np.concatenate((np.zeros((1, x.shape[1])), np.cumsum(x, axis=0)))
+    return np.asarray((total[width:] - total[:-width]) / width, np.float64)
 
 
 def _lock(x: A) -> A:

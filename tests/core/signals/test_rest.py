@@ -9,6 +9,7 @@ import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 
 from sagittal.core.frames import Floats
+from sagittal.core.pipeline import analyse
 from sagittal.core.signals.recording import SensorSignals, Subject, UniformRecording
 from sagittal.core.signals.rest import (
     RestParams,
@@ -20,6 +21,7 @@ from sagittal.core.signals.rest import (
     measure_quietness,
 )
 from tests.data import data_folder
+from tests.helpers.real_takes import analyse_take, read_take
 from tests.helpers.walks import lost, neura_walk
 
 RATE = 100.0
@@ -67,6 +69,54 @@ def test_rest_is_found_first_later_or_at_the_end(start: float, end: float) -> No
 def test_a_gyro_offset_is_not_movement() -> None:
     offset = np.radians([1.8, -1.2, 2.5])
     assert find_rest_windows(take(foot_l=still(500, offset))) == ((0.0, 5.0),)
+
+
+@pytest.mark.parametrize("deg_s", [7.0, 12.0, 19.0])
+def test_a_large_gyro_offset_is_not_movement_where_gravity_stays(deg_s: float) -> None:
+    offset = np.radians(deg_s) * np.array([0.8, 0.2, -0.566])
+    assert find_rest_windows(take(foot_l=still(500, offset))) == ((0.0, 5.0),)
+    plain, biased = (
+        find_rest_windows(take(foot_l=with_walk(still(2000, b), 5.0, 15.0))) for b in (None, offset)
+    )
+    assert np.abs(np.subtract(plain, biased)).max() < 0.05
+
+
+def test_an_offset_about_the_vertical_must_recur() -> None:
+    offset = np.radians([0.0, 12.0, 0.0])
+    assert len(find_rest_windows(take(foot_l=with_walk(still(2000, offset), 5.0, 15.0)))) == 2
+    turned_once = with_walk(still(2000, offset), 5.0, 20.0)
+    assert find_rest_windows(take(foot_l=turned_once)) == ()
+
+
+@pytest.mark.parametrize("deg_s", [7.0, 12.0, 19.0])
+def test_a_slow_turn_about_a_horizontal_axis_is_no_offset(deg_s: float) -> None:
+    rest = still(500, np.radians([deg_s, 0.0, 0.0]))
+    angle = np.radians(deg_s) * np.arange(500) / RATE
+    turned = np.column_stack([np.zeros(500), 9.81 * np.cos(angle), -9.81 * np.sin(angle)])
+    assert find_rest_windows(take(foot_l=replace(rest, acc=rest.acc + turned - [0.0, 9.81, 0.0]))) == ()
+
+
+def test_beyond_any_data_sheet_a_steady_rate_is_a_turn() -> None:
+    assert find_rest_windows(take(foot_l=still(500, np.radians([16.0, 0.0, -16.0])))) == ()
+
+
+@pytest.mark.recorded
+@pytest.mark.parametrize("deg_s", [6.5, 8.3, 15.0])
+@pytest.mark.parametrize("segment", ["foot_l", "pelvis"])
+def test_a_walk_with_a_biased_gyroscope_is_the_walk(segment: str, deg_s: float) -> None:
+    """A real cheap gyroscope had 8.5 °/s: its foot was never at rest and lost every stride."""
+    recording = read_take("11-1")
+    offset = np.radians(deg_s) * np.array([0.6, -0.5, 0.62])
+    streams = {
+        name: replace(stream, gyr=stream.gyr + offset) if recording.segments[name] == segment else stream
+        for name, stream in recording.streams.items()
+    }
+    plain, biased = analyse_take("11-1"), analyse(replace(recording, streams=streams))
+    assert plain.strides
+    assert biased.strides
+    edges = [[(s.start_s, s.end_s) for s in x.strides] for x in (plain.strides, biased.strides)]
+    assert np.abs(np.subtract(*edges)).max() < 0.005
+    assert {n.code for n in biased.notices} == {n.code for n in plain.notices}
 
 
 def test_a_steady_turn_above_the_limit_is_not_rest() -> None:
