@@ -177,7 +177,7 @@ def advance_foot_contacts(
     speed : (n,) norm of the angular rate, rad/s, without bias. acc : (n, 3) specific force, foot axes, m/s².
         Without them contacts are found and refined by pitch alone.
     """
-    room = 4 * (len(q) // (state.rule.window + 1) + 2)
+    room = 4 * (len(q) // (state.rule.window + 1) + 3)
     found_int, found_float = np.empty((room, 4), np.int64), np.empty((room, 2))
     moves = speed is not None and acc is not None
     rule = state.rule

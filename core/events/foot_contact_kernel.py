@@ -34,18 +34,28 @@ TOP: Final = 11
 PITCHED: Final = 12
 HELD: Final = 13
 LEFT: Final = 14
-COUNTERS: Final = 15
+LOOSE: Final = 15
+UNTOLD: Final = 16
+COUNTERS: Final = 17
 
 # places in `sums`
 FASTEST: Final = 0
 SPEED: Final = 1
 WAY: Final = 3
 OFFSET: Final = 5
-HELD_TC: Final = 6
-HELD_IC: Final = 8
-LEFT_AT: Final = 10
-SUMS: Final = 11
+LEFT_AT: Final = 6
+LOOSE_AT: Final = 7
+SUMS: Final = 19
 
+RHYTHM: Final = 3
+"""So many swings without pitch, one after the other, are a gait. `LOOSE_AT` and the places after it have the
+last of them, the oldest first, each as foot-off, its uncertainty, contact and its uncertainty."""
+EVEN: Final = 1.5
+"""The longer of two strides in a rhythm is at most so many times the shorter (our choice)."""
+LEAST_SWING: Final = 0.2
+"""A swing in a rhythm takes at least this share of the stride. Shorter ones are pieces of a swing that is
+slower than the limit of rest, as in a severe shuffle (our choice; the paretic foot of stroke_treadmill swings
+for 0.43)."""
 STOP_SHARE: Final = 0.2
 """Where there is neither slap nor acceleration, a foot lands where its pitch rate falls under this share of
 its fastest (our choice). No take is without acceleration, so it is no parameter."""
@@ -247,13 +257,42 @@ def _tell(found_int, found_float, total, kind, number, known, last, at, sd):  # 
 
 
 @inner_njit()
-def _tell_held(found_int, found_float, total, counters, sums, k):  # type: ignore[no-untyped-def]
-    """Report the swing without pitch that is held; returns how many reports there are."""
-    for kind, place in ((TC, HELD_TC), (IC, HELD_IC)):
-        at, sd, number = sums[place], sums[place + 1], counters[NUMBER]
-        total = _tell(found_int, found_float, total, kind, number, k, YES, at, sd)
-        counters[NUMBER] = number + 1
-    counters[HELD] = NONE
+def _hold(counters, sums, k, off, off_sd, landing, landing_sd):  # type: ignore[no-untyped-def]
+    """Hold a swing without pitch that ended at sample k, in the place of the oldest where none is free."""
+    if counters[LOOSE] == RHYTHM:
+        counters[LOOSE] -= 1
+        for j in range(LOOSE_AT, LOOSE_AT + 4 * counters[LOOSE]):
+            sums[j] = sums[j + 4]
+    place = LOOSE_AT + 4 * counters[LOOSE]
+    sums[place], sums[place + 1], sums[place + 2], sums[place + 3] = off, off_sd, landing, landing_sd
+    counters[LOOSE] += 1
+    counters[UNTOLD] = min(counters[UNTOLD] + 1, counters[LOOSE])
+    counters[HELD] = k
+
+
+@inner_njit()
+def _walks_on(counters, sums, rule):  # type: ignore[no-untyped-def]
+    """Whether the last swings without pitch follow each other as strides do."""
+    if counters[LOOSE] < RHYTHM:
+        return False
+    first = sums[LOOSE_AT + 6] - sums[LOOSE_AT + 2]
+    second = sums[LOOSE_AT + 10] - sums[LOOSE_AT + 6]
+    shorter = min(first, second)
+    for n in range(RHYTHM):
+        if sums[LOOSE_AT + 4 * n + 2] - sums[LOOSE_AT + 4 * n] < LEAST_SWING * shorter:
+            return False
+    return max(first, second) <= min(float(rule.pause), EVEN * shorter)
+
+
+@inner_njit()
+def _tell_held(found_int, found_float, total, counters, sums, k, wanted):  # type: ignore[no-untyped-def]
+    """Report the untold of the last `wanted` swings without pitch; returns how many reports there are."""
+    for n in range(counters[LOOSE] - min(wanted, counters[UNTOLD]), counters[LOOSE]):
+        for kind, place in ((TC, LOOSE_AT + 4 * n), (IC, LOOSE_AT + 4 * n + 2)):
+            at, sd, number = sums[place], sums[place + 1], counters[NUMBER]
+            total = _tell(found_int, found_float, total, kind, number, k, YES, at, sd)
+            counters[NUMBER] = number + 1
+    counters[HELD], counters[UNTOLD] = NONE, NO
     return total
 
 
@@ -365,7 +404,7 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
         )  # fmt: skip
         if not valid[i]:
             counters[MEASURED], counters[RESTING], counters[MOVING], counters[BOTTOM] = 0, 0, 0, NONE
-            counters[HELD] = NONE
+            counters[HELD], counters[LOOSE], counters[UNTOLD] = NONE, NO, NO
             continue
         if moves and n > 0 and kind[0] == TC and counters[MOVING] == 0:
             # the foot rests with its heel raised: what leaves the floor moves
@@ -374,7 +413,8 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             counters[TOLD], counters[PITCHED] = 1, k
             if counters[HELD] >= k - rule.pause:
                 # the foot walks on: its step before was one
-                total = _tell_held(found_int, found_float, total, counters, sums, k)
+                total = _tell_held(found_int, found_float, total, counters, sums, k, YES)
+            counters[HELD], counters[LOOSE], counters[UNTOLD] = NONE, NO, NO
             number = counters[NUMBER]
             counters[NUMBER] = number + 1
             if kind[e] == TC:
@@ -413,16 +453,14 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             end, top = k, counters[TOP]
         else:
             continue
-        first = start
+        first, off, off_sd = start, 0.0, 0.0
         if swinging:
             first = max(reach, counters[BOTTOM])
         elif not alone or not _leads_far(sums, k - start + 1, end, start, rate_hz, rule):
             continue
         else:
             middle = top if top >= 0 else start + (end - start) // 2
-            first, at, sd = _leaving_loosely(pitch, start, middle, reach, rule)
-            sums[HELD_TC], sums[HELD_TC + 1] = at, sd
-            counters[HELD] = k
+            first, off, off_sd = _leaving_loosely(pitch, start, middle, reach, rule)
         if top < 0:
             top = _highest(pitch, first + (end - first) // 2, end)
         at, sd = _landing(pitch, accs, top, first, k, moves, rate_hz, rule)
@@ -432,9 +470,12 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, YES, at, sd)
             counters[NUMBER] += 1
         else:
-            sums[HELD_IC], sums[HELD_IC + 1] = at, sd
-            if counters[PITCHED] >= k - rule.pause:
-                total = _tell_held(found_int, found_float, total, counters, sums, k)
+            _hold(counters, sums, k, off, off_sd, at, sd)
+            if _walks_on(counters, sums, rule):
+                total = _tell_held(found_int, found_float, total, counters, sums, k, RHYTHM)
+                counters[PITCHED] = k
+            elif counters[PITCHED] >= k - rule.pause:
+                total = _tell_held(found_int, found_float, total, counters, sums, k, YES)
         # the pitch rule need not wait for a maximum any more
         pitch_counters[2], pitch_counters[4], pitch_counters[5] = 0, k, -1
         _begin_movement(counters, sums, k, NO)

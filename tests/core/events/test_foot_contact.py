@@ -143,6 +143,37 @@ def test_a_gait_without_any_pitched_swing_is_not_told_by_halves() -> None:
     assert not len(advance_foot_contacts(FootContactState.start(RATE), q, t >= 0.0, speed, acc).kind)
 
 
+@pytest.mark.parametrize("block", [1, 7, 1200])
+@pytest.mark.parametrize(
+    ("pauses", "expected"), [((0.6, 0.6, 0.7), 4), ((0.6, 1.3, 0.5), 0), ((3.5, 3.5, 3.5), 0)]
+)
+def test_even_steps_without_pitch_are_a_gait(pauses: tuple[float, ...], expected: int, block: int) -> None:
+    """A paretic foot swung without pitch for 48 s, and nothing of it was found."""
+    steps = [
+        moved(np.arange(round(100 * (0.6 + pause))) / RATE, 0.0, 0.6, 0.5, np.radians(60.0))
+        for pause in pauses
+    ]
+    still = moved(np.arange(60) / RATE, 10.0, 0.6, 0.5, np.radians(60.0))
+    last = moved(np.arange(120) / RATE, 0.0, 0.6, 0.5, np.radians(60.0))
+    q, speed, acc = (np.concatenate(parts) for parts in zip(still, *steps, last, strict=True))
+    state, told = FootContactState.start(RATE), []
+    for k in range(0, len(q), block):
+        part = slice(k, k + block)
+        told.append(
+            advance_foot_contacts(state, q[part], np.ones(len(q[part]), np.bool_), speed[part], acc[part])
+        )
+    assert np.concatenate([x.kind for x in told]).tolist() == [0, 1] * expected
+    assert (np.diff(np.concatenate([x.at for x in told])) > 0).all()
+    assert np.concatenate([x.number for x in told]).tolist() == list(range(2 * expected))
+
+
+def test_pieces_of_a_slow_swing_are_no_steps() -> None:
+    """In a severe shuffle the push and the landing alone are faster than the limit of rest."""
+    step = moved(np.arange(160) / RATE, 0.2, 0.28, 0.5, np.radians(60.0))
+    q, speed, acc = (np.concatenate([x] * 6) for x in step)
+    assert not len(advance_foot_contacts(FootContactState.start(RATE), q, speed >= 0.0, speed, acc).kind)
+
+
 @pytest.mark.parametrize(("metres", "turn"), [(0.02, 60.0), (0.3, 10.0)])
 def test_a_shift_on_the_spot_and_a_slow_slide_are_no_steps(metres: float, turn: float) -> None:
     t = np.arange(400) / RATE

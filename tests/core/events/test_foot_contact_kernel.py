@@ -194,7 +194,7 @@ def test_a_movement_begins_with_nothing_added_up() -> None:
     counters, sums = np.zeros(COUNTERS, np.int64), np.ones(SUMS)
     kernel._begin_movement(counters, sums, 42, kernel.YES)
     assert counters[[START, TOP, TOLD]].tolist() == [42, 42, 1]
-    assert sums.tolist() == [0.0] * 5 + [1.0] * 6
+    assert sums.tolist() == [0.0] * 5 + [1.0] * (SUMS - 5)
 
 
 def test_a_foot_off_too_near_to_its_contact_is_told_again() -> None:
