@@ -1,4 +1,4 @@
-"""docs/contributing.md: what a newcomer touches to add something is all there is to touch."""
+"""docs/how-to/contributing.md: what a newcomer touches to add something is all there is to touch."""
 
 from __future__ import annotations
 
@@ -199,13 +199,13 @@ def test_a_protocol_is_a_tuple_of_stages_that_the_loop_runs(monkeypatch: pytest.
 
 
 def test_there_is_an_exercise_for_each() -> None:
-    text = (ROOT / "docs" / "contributing.md").read_text("utf-8")
+    text = (ROOT / "docs" / "how-to" / "contributing.md").read_text("utf-8")
     for heading in ("Add a parameter", "Add a reader", "Add a filter", "Add a protocol"):
         assert f"## {heading}\n" in text
 
 
 def test_the_glossary_names_what_there_is_in_code() -> None:
-    page = (ROOT / "docs" / "glossary.md").read_text("utf-8")
+    page = (ROOT / "docs" / "reference" / "glossary.md").read_text("utf-8")
     named = {name for cell in re.findall(r"`([^`]+)`", page) for name in re.findall(r"\b[A-Z]\w+", cell)}
     sources = "\n".join(
         p.read_text("utf-8") for part in ("core", "server") for p in (ROOT / part).rglob("*.py")
