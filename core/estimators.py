@@ -1,7 +1,7 @@
 """The pose estimators: the one list that pipeline, report, forms, figure and documentation read.
 
-An estimator makes a figure of seven segments from the sensors worn (docs/estimators.md). Its names are
-written here and nowhere else in the source (tests/core/test_estimators.py).
+An estimator makes a figure of seven segments from the sensors worn (docs/reference/estimators.md). Its names
+are written here and nowhere else in the source (tests/core/test_estimators.py).
 """
 
 from __future__ import annotations
@@ -198,7 +198,7 @@ ORIENTATIONS_ONLY: Final = PoseEstimator(
 )
 
 ESTIMATORS: Final = (ERKF, L7S_3I, L7S_2I, ORIENTATIONS_ONLY)
-"""All, as docs/estimators.md lists them."""
+"""All, as docs/reference/estimators.md lists them."""
 
 SQUAT_CHAIN: Final = PoseMethod(
     method="squat_chain",

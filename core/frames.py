@@ -4,7 +4,7 @@ World W: z up, right-handed, x = facing direction at standing, y = left; gravity
 Segment frames (ISB): x anterior, y proximal (up), z to the subject's right, on BOTH sides.
 Quaternions: Hamilton, scalar first, mapping body coordinates to world coordinates.
 Accelerometer: specific force, +G along the up axis at rest. SI units and radians everywhere.
-Described in docs/coordinate-systems.md; ISB axes: Wu et al. 2002.
+Described in docs/reference/coordinate-systems.md; ISB axes: Wu et al. 2002.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Sagittal from Python: read a recording, analyse it, simulate one (docs/python.md).
+"""Sagittal from Python: read a recording, analyse it, simulate one (docs/reference/python.md).
 
 What `__all__` lists is kept from version to version; nothing else of this distribution is promised to stay.
 Importing this package is cheap: what it needs is loaded when it is first used.

@@ -45,7 +45,7 @@ class Analysis:
 
     @property
     def estimator(self) -> str | None:
-        """Method of the pose estimator that ran (docs/estimators.md); None when none did."""
+        """Method of the pose estimator that ran (docs/reference/estimators.md); None when none did."""
         return None if self._found.poses is None else self._found.poses.method
 
     @property
@@ -55,7 +55,7 @@ class Analysis:
 
     @property
     def angles(self) -> pa.Table:
-        """`t_s` and per joint angle `<name>_deg`; NaN where a sensor was lost (docs/parameters.md)."""
+        """`t_s` and each angle, `<name>_deg`; NaN where a sensor was lost; docs/reference/parameters.md."""
         angles = self._found.angles
         if angles is None:
             return pa.table({"t_s": np.zeros(0)})

@@ -30,8 +30,8 @@ def read(*paths: str | Path, manifest: Mapping[str, Any] | str | Path | None = N
 
     Parameters
     ----------
-    manifest : which sensor sits where, units, body height (docs/formats.md): a mapping, or the path of a JSON
-        file; None where the files say it themselves.
+    manifest : which sensor sits where, units, body height (docs/reference/formats.md): a mapping, or the path
+        of a JSON file; None where the files say it themselves.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def simulate(
 
     Parameters
     ----------
-    script : name of a scenario (docs/simulation.md).
+    script : name of a scenario (docs/science/simulation.md).
     segments : that carry a sensor; None = as the scenario says, mostly all seven.
     """
     worn = None if segments is None else tuple(segments)

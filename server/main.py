@@ -69,17 +69,21 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--port", type=int, default=None, help="port on 127.0.0.1 (default: a free one)")
     p = add("analyse", "Analyse recording files and write the results into a folder.")
     p.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of one take")
-    p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")
+    p.add_argument(
+        "--manifest", type=Path, help="JSON: which sensor sits where, units (docs/reference/formats.md)"
+    )
     p.add_argument("--out", type=Path, required=True, help="folder for the results")
     p.add_argument(
         "--estimator",
         default="auto",
-        help="pose estimator; auto = the best for the sensors worn (docs/estimators.md lists them)",
+        help="pose estimator; auto = the best for the sensors worn (docs/reference/estimators.md lists them)",
     )
     p.add_argument("--config", type=Path, help='JSON: parameters by stage, {"poses": {"least_valid": 0.7}}')
-    p = add("export", "Write the results of an analysis for another program (docs/exports.md).")
+    p = add("export", "Write the results of an analysis for another program (docs/reference/exports.md).")
     p.add_argument("folder", type=Path, metavar="DIR", help="results of `sagittal analyse`")
-    p.add_argument("--as", dest="kind", required=True, metavar="FORMAT", help="xlsx, csv … (docs/exports.md)")
+    p.add_argument(
+        "--as", dest="kind", required=True, metavar="FORMAT", help="xlsx, csv … (docs/reference/exports.md)"
+    )
     p.add_argument("--out", type=Path, metavar="FILE", help="default: export-<format>.<ending> there")
     p.add_argument("--code", default="", help="pseudonym of the person, letters and digits")
     p = add("study", "Analyse every recording of a folder: one table of strides and one of takes.")
@@ -89,7 +93,9 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--jobs", type=int, metavar="N", help="takes at a time (default: one per processor)")
     p = add("stairs", "Measure a person's own limits of stairs in daily life (docs/science/activity.md).")
     p.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of one take")
-    p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")
+    p.add_argument(
+        "--manifest", type=Path, help="JSON: which sensor sits where, units (docs/reference/formats.md)"
+    )
     for name, what in (("level", "on the level"), ("up", "upstairs"), ("down", "downstairs")):
         p.add_argument(
             f"--{name}",
@@ -100,11 +106,13 @@ def _parser() -> argparse.ArgumentParser:
             help=f"when they walked {what}, s from the first sample",
         )
     p.add_argument("--out", type=Path, required=True, help="JSON file for `analyse --config`")
-    p = add("replay", "Stream a recording to a server as a tablet would (docs/live-protocol.md).")
+    p = add("replay", "Stream a recording to a server as a tablet would (docs/reference/live-protocol.md).")
     p.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of one take")
     p.add_argument("--to", required=True, metavar="URL", help="address of the server, http://host:port")
     p.add_argument("--code", required=True, help="the code that the session's live page shows")
-    p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")
+    p.add_argument(
+        "--manifest", type=Path, help="JSON: which sensor sits where, units (docs/reference/formats.md)"
+    )
     p.add_argument("--speed", type=float, default=1.0, help="1 = as recorded (default), 0 = at once")
     p.add_argument(
         "--drop", type=float, default=0.0, metavar="P", help="cut the connection, chance per batch"
@@ -116,7 +124,7 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--script",
         default="comfortable",
-        help="comfortable, fast_with_turns, hemiparetic, squats, postures, activity … (docs/simulation.md)",
+        help="comfortable, fast_with_turns, hemiparetic, squats, activity … (docs/science/simulation.md)",
     )
     p.add_argument("--seed", type=_whole, default=1)
     p.add_argument("--hours", type=float, default=24.0, help="of daily life, --script activity (default 24)")
@@ -133,7 +141,9 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--reference", type=Path, help="angles.parquet to hold the angles against (default: themselves)"
     )
-    p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")
+    p.add_argument(
+        "--manifest", type=Path, help="JSON: which sensor sits where, units (docs/reference/formats.md)"
+    )
     p.add_argument("--table-top", type=Path, metavar="PATH", help="take in which sensors left the table")
     p.add_argument("--side", choices=("left", "right"), help="leg that squats (default: all with sensors)")
     p.add_argument("--measures", type=Path, help="JSON: lengths in m (docs/science/squat.md)")

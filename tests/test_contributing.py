@@ -1,4 +1,4 @@
-"""docs/contributing.md: what a newcomer touches to add something is all there is to touch."""
+"""docs/how-to/contributing.md: what a newcomer touches to add something is all there is to touch."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ import io
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 import pytest
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+from jinja2 import ChoiceLoader, DictLoader
+from starlette.responses import Response
 
 from sagittal.core.errors import FormatError, Notice
 from sagittal.core.feedback import Prescription
@@ -18,13 +22,20 @@ from sagittal.core.formats import SourceFile, read_recording, vendors
 from sagittal.core.formats.draft import Draft
 from sagittal.core.formats.source_spec import SourceSpec
 from sagittal.core.formats.vendors import VendorFormat
-from sagittal.core.parameters.catalogue import CATALOGUE, CurveFigure, ParameterEntry
+from sagittal.core.parameters.catalogue import CATALOGUE, CurveFigure, ParameterEntry, errors
 from sagittal.core.parameters.catalogue.entry import ANKLE_AND_FOOT, DORSIFLEXION
 from sagittal.core.parameters.measure import Tracks, measure_gait
 from sagittal.core.pipeline import WALK, PipelineConfig, PipelineStage, TakeAnalysis, analyse, recipes
 from sagittal.core.pipeline.recipes import SIGNALS, run_stages, say_nothing
 from sagittal.core.pipeline.stages import ORIENTATION, orient_segments
 from sagittal.core.simulate import simulate_scenario
+from sagittal.server import app
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Db
+from sagittal.server.http.templates import TEMPLATES
+from sagittal.server.pages import routes, shell
 from sagittal.server.pages.live import list_terms
 from sagittal.server.pages.prescription import group_trainable
 from sagittal.server.report.files.exports import analysis_files
@@ -48,6 +59,7 @@ ADDED: Final = ParameterEntry(
     curve=CurveFigure("ankle_dorsiflexion", "min", 60, 100),
     trainable=True,
     everyday="toes up",
+    errors=errors.ANKLE,
 )
 """A parameter that the product does not have."""
 
@@ -198,14 +210,55 @@ def test_a_protocol_is_a_tuple_of_stages_that_the_loop_runs(monkeypatch: pytest.
     assert found.problem.code == "stood"
 
 
+GREETING: Final = """{% extends "_base.html" %}
+{% block title %}Greeting{% endblock %}
+{% block h1 %}Greeting{% endblock %}
+{% block main %}<p class="greeting">{{ person | verbatim }}</p>{% endblock %}
+"""
+
+made_up_page: Final = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+
+@made_up_page.get("/greeting")
+def _show_greeting(
+    request: Request, db: Db, who: Annotated[Identity, require(Action.MANAGE_USERS)]
+) -> Response:
+    return shell.render_page(request, db, who, "greeting.html", "greeting", person=who.name)
+
+
+@pytest.mark.slow
+@pytest.mark.anyio
+async def test_a_page_in_the_routes_has_its_frame_and_its_guard(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(routes, "ROUTERS", (*routes.ROUTERS, made_up_page))
+    monkeypatch.setattr(app, "wire_routes", app.wire_routes.__wrapped__)
+    entry = ("greeting", "people", "Greeting", "/greeting", Action.MANAGE_USERS)
+    monkeypatch.setattr(shell, "NAVIGATION", (*shell.NAVIGATION, entry))
+    for templates in TEMPLATES.values():
+        loader = templates.env.loader
+        assert loader is not None
+        with_page = ChoiceLoader([loader, DictLoader({"greeting.html": GREETING})])
+        monkeypatch.setattr(templates.env, "loader", with_page)
+    async with open_clinic(tmp_path) as clinic:
+        async with clinic.client("admin") as client:
+            page = await client.get("/greeting")
+        async with clinic.client("viewer") as client:
+            refused = await client.get("/greeting")
+    assert page.status_code == 200
+    assert '<p class="greeting">' in page.text
+    assert 'href="/greeting"' in page.text
+    assert refused.status_code in {403, 404}
+
+
 def test_there_is_an_exercise_for_each() -> None:
-    text = (ROOT / "docs" / "contributing.md").read_text("utf-8")
-    for heading in ("Add a parameter", "Add a reader", "Add a filter", "Add a protocol"):
+    text = (ROOT / "docs" / "how-to" / "contributing.md").read_text("utf-8")
+    for heading in ("Add a parameter", "Add a reader", "Add a filter", "Add a protocol", "Add a page"):
         assert f"## {heading}\n" in text
 
 
 def test_the_glossary_names_what_there_is_in_code() -> None:
-    page = (ROOT / "docs" / "glossary.md").read_text("utf-8")
+    page = (ROOT / "docs" / "reference" / "glossary.md").read_text("utf-8")
     named = {name for cell in re.findall(r"`([^`]+)`", page) for name in re.findall(r"\b[A-Z]\w+", cell)}
     sources = "\n".join(
         p.read_text("utf-8") for part in ("core", "server") for p in (ROOT / part).rglob("*.py")

@@ -14,7 +14,8 @@ import pytest
 import sagittal
 from tests.data import ROOT
 
-PAGE = (ROOT / "docs" / "python.md").read_text("utf-8")
+PAGE = (ROOT / "docs" / "reference" / "python.md").read_text("utf-8")
+TUTORIAL = (ROOT / "docs" / "tutorials" / "python.md").read_text("utf-8")
 
 PROMISED = {
     "Analysis": [
@@ -80,9 +81,9 @@ def test_importing_it_is_cheap() -> None:
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
 
 
-def test_the_example_of_the_page_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_example_of_the_tutorial_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    (example,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    (example,) = re.findall(r"```python\n(.*?)```", TUTORIAL, re.DOTALL)
     names: dict[str, Any] = {}
     exec(example, names)  # noqa: S102
     walk = names["walk"]

@@ -2,7 +2,7 @@
 
 Parts are accuracy, bench, faults, sweep, browser and postgresql; without one, all run. Units that passed on
 the same code are skipped, so an interrupted validation resumes (`--again` repeats them). `--write` puts the
-figures into validation/report.md and docs/accuracy.md, which a release requires.
+figures into validation/report.md and docs/reference/accuracy.md, which a release requires.
 """
 
 from __future__ import annotations
@@ -170,7 +170,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--again", action="store_true", help="repeat units that passed on the same code")
     parser.add_argument("--sample", action="store_true", help="only a sample of the expensive cases")
     parser.add_argument(
-        "--write", action="store_true", help="write validation/report.md and docs/accuracy.md"
+        "--write", action="store_true", help="write validation/report.md and docs/reference/accuracy.md"
     )
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="units at a time (default: 2)")
     parser.add_argument(

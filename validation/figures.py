@@ -1,7 +1,7 @@
 """Figures that a validation measures, and the report they are compared with.
 
 Every accuracy test records its section, a table and a note. `python -m validation` collects the sections of a
-run in a store and writes validation/report.md and docs/accuracy.md from them (`validation.report`).
+run in a store and writes validation/report.md and docs/reference/accuracy.md from them (`validation.report`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ STORE: Final = "SAGITTAL_VALIDATION_STORE"
 """Environment variable: the file to which figures are appended, one JSON object a line."""
 
 IN_SHORT: Final = "In short"
-"""Section with one row per key figure; it is printed in docs/accuracy.md."""
+"""Section with one row per key figure; it is printed in docs/reference/accuracy.md."""
 GOALS: Final = "Speed: goals"
 """Section with one row per performance goal."""
 GOALS_HEADER: Final = ("what", "goal", "measured", "met")

@@ -1,4 +1,4 @@
-"""Writes validation/report.md and docs/accuracy.md from the figures of a validation."""
+"""Writes validation/report.md and docs/reference/accuracy.md from the figures of a validation."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from validation.figures import (
     read_sections,
 )
 
-ACCURACY: Final = ROOT / "docs" / "accuracy.md"
+ACCURACY: Final = ROOT / "docs" / "reference" / "accuracy.md"
 
 RUN: Final = "Run"
 DIFFERENCES: Final = "Differences from the previous report"
@@ -133,7 +133,7 @@ def describe_run(results: Sequence[UnitResult]) -> str:
 
 
 def write_report(results: Sequence[UnitResult], path: Path = REPORT, accuracy: Path = ACCURACY) -> None:
-    """Write the report with the figures of these results, and the key figures of docs/accuracy.md."""
+    """Write the report with these results, and the key figures of docs/reference/accuracy.md."""
     old = read_sections(path)
     new = merge_figures(old, (line for r in results for line in r.figures))
     new = {name: text for name, text in new.items() if name not in GENERATED}

@@ -2,7 +2,8 @@
 
 A message is an English text with `{placeholders}`: what a template, a page module or `core` says. A sentence
 that was made from it, now or in a result stored years ago, is found again by the pattern of the message; what
-stands in its placeholders is translated by itself, numbers and dates by the locale (docs/languages.md).
+stands in its placeholders is translated by itself, numbers and dates by the locale
+(docs/how-to/languages.md).
 """
 
 from __future__ import annotations

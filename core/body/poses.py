@@ -28,8 +28,8 @@ class Poses:
     ----------
     q : segment → (n, 4) segment to world, scalar first.
     p : segment → (n, 3) position of the segment's origin, m, world W (floor at z = 0). Origins: pelvis
-        mid-hip, thigh hip centre, shank knee centre, foot ankle centre (docs/coordinate-systems.md).
-    valid : (n,) all segments of the figure measured.
+        mid-hip, thigh hip centre, shank knee centre, foot ankle centre
+    (docs/reference/coordinate-systems.md). valid : (n,) all segments of the figure measured.
     contact : segment (feet) → (n,) True while the foot is taken to be on the floor.
     q, p : in single precision where the take is long (`figure_precision`).
     method : of an estimator of `sagittal.core.estimators`, or its NO_FIGURE.

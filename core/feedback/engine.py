@@ -25,8 +25,8 @@ OPENING: Final = 10
 
 LATE_S: Final = 0.5
 """A stride told later than this after its last sample is too old to be shown: nobody is told of the past
-(docs/feedback.md, "Which strides get a cue"); so the strides that calibration walked through give no late
-burst of cues."""
+(docs/science/feedback.md, "Which strides get a cue"); so the strides that calibration walked through give no
+late burst of cues."""
 
 REMEMBERED: Final = 200
 """A stride is told at most twice, within few others: `n` this far back will not come again."""

@@ -31,7 +31,8 @@ _ADVICE: Final = {
     "Xsens MTB": "export it from MT Manager as text, with acceleration and rate of turn.",
 }
 _TABLE: Final = (
-    "it is not read directly; export it as a table and name its columns in a manifest (docs/formats.md)."
+    "it is not read directly; export it as a table and name its columns in a manifest "
+    "(docs/reference/formats.md)."
 )
 
 

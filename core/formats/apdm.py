@@ -1,7 +1,7 @@
 """APDM Opal: CSV of Motion Studio ("Format=7") and of Mobility Lab, all monitors in one file.
 
 Acceleration in m/s², angular rate in rad/s and magnetic field in µT in the monitor's axes; orientation with
-the scalar first. A monitor's label says where it is worn (docs/formats.md, "APDM").
+the scalar first. A monitor's label says where it is worn (docs/reference/formats.md, "APDM").
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""APDM Opal: HDF5 files of version 5 (docs/formats.md, "APDM"). Reading them needs h5py.
+"""APDM Opal: HDF5 files of version 5 (docs/reference/formats.md, "APDM"). Reading them needs h5py.
 
 `Sensors/<id>`: Accelerometer m/s², Gyroscope rad/s, Magnetometer µT, (n, 3) each in the monitor's axes,
 Time in µs since 1970; its group Configuration says by "Label 0" where the monitor is worn.

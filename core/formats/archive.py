@@ -1,8 +1,8 @@
 """Zip and gzip opened in memory, within limits that are checked against real bytes.
 
 The directory of a zip may lie, so the declared sizes are checked before anything is unpacked and no member
-may give more than it declared. Limits: docs/formats.md, "Limits" (entries, total, ratio 100, no nesting, no
-absolute or parent paths, no links, no encryption).
+may give more than it declared. Limits: docs/reference/formats.md, "Limits" (entries, total, ratio 100, no
+nesting, no absolute or parent paths, no links, no encryption).
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ _RATIO_FLOOR = 1 << 20
 
 @dataclass(frozen=True)
 class ArchiveLimits:
-    """What an archive may unpack to (docs/formats.md, "Limits"; 1 GB holds 7 sensors × 4 h × 100 Hz as text).
+    """What an archive may unpack to (docs/reference/formats.md, "Limits"; 1 GB holds 7 sensors × 4 h × 100 Hz
+    as text).
 
     Parameters
     ----------

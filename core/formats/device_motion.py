@@ -1,4 +1,4 @@
-"""A phone's DeviceMotion events as JSON (docs/formats.md, "Phone").
+"""A phone's DeviceMotion events as JSON (docs/reference/formats.md, "Phone").
 
 Acceleration with gravity in m/s², rotation rate in deg/s. Browsers disagree on which axis alpha, beta and
 gamma turn about; gravity decides: it must turn as the rates say, ġ = −ω × g. That holds for either sign of

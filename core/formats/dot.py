@@ -1,4 +1,5 @@
-"""Xsens and Movella DOT: the CSV that the DOT app and its SDK write (docs/formats.md, "Movella DOT").
+"""Xsens and Movella DOT: the CSV that the DOT app and its SDK write (docs/reference/formats.md, "Movella
+DOT").
 
 A line "sep=,", lines "key:,value", a blank line, a header line, then rows: one file per sensor. Acceleration
 in m/s² and angular rate in deg/s in the sensor's axes, orientation sensor → earth; the clock counts µs with

@@ -1,6 +1,7 @@
 """What a live tablet says first: which device clocks there are and which sensors tick on each.
 
-docs/live-protocol.md, `hello`. The token is read with it and is never part of what is compared or stored.
+docs/reference/live-protocol.md, `hello`. The token is read with it and is never part of what is compared or
+stored.
 """
 
 from __future__ import annotations

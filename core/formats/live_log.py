@@ -1,4 +1,5 @@
-"""Batches of the live protocol and the log of a take: `sagittal.live.v1` as bytes (docs/live-protocol.md).
+"""Batches of the live protocol and the log of a take: `sagittal.live.v1` as bytes
+(docs/reference/live-protocol.md).
 
 A batch is what one device clock sampled in a row. The log is the file mark and records
 (u32 length, u32 crc32, body) with body[0] = H hello, B batch as received, F finish. It is written while the

@@ -1,4 +1,4 @@
-"""The manifest: what the files cannot say themselves (docs/formats.md).
+"""The manifest: what the files cannot say themselves (docs/reference/formats.md).
 
 Parsed by hand instead of by a schema library: core knows only numpy and scipy, and a message must name the
 exact place ("sources[0].columns.foot_l.acc") and what would be right there.

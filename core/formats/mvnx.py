@@ -1,4 +1,4 @@
-"""Xsens MVNX: XML of MVN and Xsens Analyze, version 4 (docs/formats.md, "MVNX").
+"""Xsens MVNX: XML of MVN and Xsens Analyze, version 4 (docs/reference/formats.md, "MVNX").
 
 It holds no raw inertial signals. Orientation R (sensor → a frame whose z is up) and free acceleration a (in
 that frame, m/s²) give the acceleration back, Rᵀ(a + g e_z); the angular rate is what turns one orientation

@@ -1,6 +1,6 @@
 """Orientations over time from another system: OpenSim .sto, or a table with four columns for each segment.
 
-A reference to compare with, never a recording: it holds no measurement of ours (docs/formats.md,
+A reference to compare with, never a recording: it holds no measurement of ours (docs/reference/formats.md,
 "Reference orientations").
 """
 

@@ -1,5 +1,5 @@
 """Sagittal's own recording file: Parquet with one column per channel
-(docs/formats.md, "Sagittal recording (Parquet)").
+(docs/reference/formats.md, "Sagittal recording (Parquet)").
 
 int64 time in µs, float32 signals, zstd with byte-stream split, page checksums and no dictionary; what is not
 a signal (units, sensor → segment, subject, protocol, hashes of the originals) is JSON in the schema metadata.
@@ -242,7 +242,7 @@ def _read_info(stored: bytes | None, source: str) -> dict[str, object]:
         raise FormatError(
             "foreign_parquet",
             f"{source} is a Parquet file that Sagittal did not write; export the recording as CSV and "
-            "describe it in a manifest (docs/formats.md).",
+            "describe it in a manifest (docs/reference/formats.md).",
         )
     info: Any = read_json(stored)
     if info["schema"] > SCHEMA:

@@ -244,7 +244,7 @@ def _needs_manifest(name: str, data: bytes) -> str:
     start = lines[0][:80].decode("utf-8", errors="replace")
     return (
         f"{name} is a table that starts with '{start}'; say in a manifest which columns are which sensor "
-        "and their units (docs/formats.md)."
+        "and their units (docs/reference/formats.md)."
     )
 
 

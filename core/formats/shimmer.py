@@ -1,4 +1,4 @@
-"""Shimmer: CSV that Consensys writes (docs/formats.md, "Shimmer Consensys").
+"""Shimmer: CSV that Consensys writes (docs/reference/formats.md, "Shimmer Consensys").
 
 A line "sep=,", a line of names like Shimmer_952D_Accel_LN_X_CAL, a line of units, then rows that end with a
 separator. Time in ms; of the two accelerometers the low-noise one is read while it stays within its ±2 g.

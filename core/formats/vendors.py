@@ -43,7 +43,7 @@ VENDOR_FORMATS: Final[list[VendorFormat]] = [
     VendorFormat(cwa.LABEL, cwa.looks_like, cwa.read),
     VendorFormat(device_motion.LABEL, device_motion.looks_like, device_motion.read),
 ]
-"""All of them, in the order in which they are tried (docs/contributing.md, "Add a reader")."""
+"""All of them, in the order in which they are tried (docs/how-to/contributing.md, "Add a reader")."""
 
 
 def find_vendor(data: bytes) -> VendorFormat | None:

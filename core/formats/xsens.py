@@ -1,4 +1,5 @@
-"""Xsens MT Manager text exports, 4.x to 2022 (docs/formats.md, "Xsens MT Manager text"): one file per sensor.
+"""Xsens MT Manager text exports, 4.x to 2022 (docs/reference/formats.md, "Xsens MT Manager text"): one file
+per sensor.
 
 Comment lines ("//"), one header line, then rows separated by tab, comma, semicolon or space. Any subset of
 the columns may be there; blank or "NaN" cells are missing; the packet counter has 16 bit.

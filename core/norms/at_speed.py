@@ -37,7 +37,8 @@ N_ADULTS: Final = 52
 
 BLEND: Final = (0.15, 0.20)
 """v* below which only the mean level of the anchor is kept, and the width over which its shape comes in:
-the shape of a slow curve is that of the slow people (chosen with the other sets of docs/norms.md in view)."""
+the shape of a slow curve is that of the slow people (chosen with the other sets of
+docs/science/norms-and-scores.md in view)."""
 
 HIP_SD_DEG: Final = 3.0
 """What the change of a hip figure is known to: there are no single curves of the hip."""

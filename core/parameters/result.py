@@ -15,7 +15,7 @@ class Parameter:
 
     Parameters
     ----------
-    name : field term with its unit, e.g. "stride_time_s" (docs/parameters.md).
+    name : field term with its unit, e.g. "stride_time_s" (docs/reference/parameters.md).
     side : "left", "right" or None for the whole take.
     n : strides behind the number. mean, sd : None with a `reason` when undefined (sd also when n < 2).
     reason : None, or a stable code: "no_strides", "opposite_foot_missing", "no_terminal_contact" …

@@ -1,4 +1,4 @@
-"""Walking bouts, turns and steps of a trunk sensor → parameters of the whole take (docs/parameters.md)."""
+"""Bouts, turns and steps of a trunk sensor → parameters of the take (docs/reference/parameters.md)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Quaternions, rotation matrices and rotation vectors: on arrays (`arrays`) and one at a time (`compiled`).
 
 Hamilton, scalar first (w, x, y, z); q maps body to world: v_W = q ⊗ v_B ⊗ q*.
-Source: docs/coordinate-systems.md, "Frames"; references in docs/science/orientation.md.
+Source: docs/reference/coordinate-systems.md, "Frames"; references in docs/science/orientation.md.
 
 What this package gives itself is numpy and takes arrays with any leading axes. Compiled loops import
 `sagittal.core.rotation.compiled`, which brings numba; readers of results do without.

@@ -1,7 +1,7 @@
 """What a sensor's values are multiplied by and which axes they belong to, where its file says it wrongly.
 
-A correction is part of what somebody declares about a take (docs/formats.md, "The manifest"); the files stay
-as they came.
+A correction is part of what somebody declares about a take (docs/reference/formats.md, "The manifest"); the
+files stay as they came.
 """
 
 from __future__ import annotations

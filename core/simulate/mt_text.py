@@ -1,4 +1,4 @@
-"""Streams as Xsens MT Manager 4.x writes them: one text file per sensor (docs/formats.md)."""
+"""Streams as Xsens MT Manager 4.x writes them: one text file per sensor (docs/reference/formats.md)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """What really happened: poses, angles, contacts and strides that belong to a simulated recording.
 
-Angles follow the sequence and signs of docs/coordinate-systems.md, taken here from the rotation matrices on
-their own, so that a sign error in core/angles cannot hide.
+Angles follow the sequence and signs of docs/reference/coordinate-systems.md, taken here from the rotation
+matrices on their own, so that a sign error in core/angles cannot hide.
 """
 
 from __future__ import annotations

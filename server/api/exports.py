@@ -27,7 +27,7 @@ Reader = Annotated[Identity, require(Action.READ_RESULT)]
 class ExportNew(schemas.Request):
     """Which format is wanted."""
 
-    kind: Annotated[ExportName, Field(description="as docs/exports.md names them")]
+    kind: Annotated[ExportName, Field(description="as docs/reference/exports.md names them")]
 
 
 @router.post(

@@ -1,4 +1,4 @@
-"""The film of the tablet's camera, piece by piece (docs/live-protocol.md); its door is the take's token."""
+"""The film of the tablet's camera in pieces (docs/reference/live-protocol.md); the take's token opens it."""
 
 from __future__ import annotations
 

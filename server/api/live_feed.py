@@ -1,4 +1,5 @@
-"""The browsers' socket of a session: `WS /sessions/{sid}/live/feed`, JSON texts (docs/api.md, Live).
+"""The browsers' socket of a session: `WS /sessions/{sid}/live/feed`, JSON texts (docs/reference/api.md,
+Live).
 
 Only goes down; commands come over the API. While a take streams, watching it counts as activity: nobody is
 signed out in the middle of a training.

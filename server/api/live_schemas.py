@@ -1,4 +1,4 @@
-"""What goes over the wire about live takes; the feed's messages are in docs/api.md."""
+"""What goes over the wire about live takes; the feed's messages are in docs/reference/api.md."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def read_recording(
 def set_manifest(
     session_id: Id, body: schemas.Json, db: Db, who: Annotated[Identity, require(Action.UPLOAD)]
 ) -> schemas.RecordingAnswer:
-    """Set the mapping (docs/formats.md); the next analysis uses it."""
+    """Set the mapping (docs/reference/formats.md); the next analysis uses it."""
     with db.write() as c:
         return make_answer(schemas.RecordingAnswer, recordings.set_manifest(c, who, session_id, body))
 

@@ -1,4 +1,4 @@
-"""Large files in parts (docs/api.md, "Large files"): what came stays, and the upload goes on from there."""
+"""Large files in parts (docs/reference/api.md, "Large files"): what came stays, and the upload goes on."""
 
 from __future__ import annotations
 

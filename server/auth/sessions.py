@@ -44,7 +44,7 @@ class Logins:
     Parameters
     ----------
     db : the database.
-    idle, absolute : life without activity, and life in all (docs/operations.md, "Settings").
+    idle, absolute : life without activity, and life in all (docs/how-to/operations.md, "Settings").
     clock : aware time now.
     """
 

@@ -52,7 +52,7 @@ def analyse(
     except SagittalError as error:
         sys.stderr.write(f"Nothing analysable ({error.code}): {error.message}\n")
         if error.code == "no_mapping":
-            sys.stderr.write("Here --manifest FILE says it (docs/formats.md).\n")
+            sys.stderr.write("Here --manifest FILE says it (docs/reference/formats.md).\n")
         return 1
     for name, content in files.items():
         fs.write_file(out / name, content)

@@ -5,7 +5,7 @@
 Pseudonyms and the shift of days are HMAC-SHA256 (RFC 2104) of the ids under the clinic's key: the same key
 gives the same ones again, so a later export goes on from an earlier one, and nobody without it can try ids.
 Days of a person are all shifted by the same number of days, so intervals stay; ages from 89 are 89. Of texts
-only codes of our own go out (docs/exports.md, "For research").
+only codes of our own go out (docs/reference/exports.md, "For research").
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ from sagittal.server.report.words.guided_words import tell_person
 CHUNK_BYTES: Final = 1 << 14
 """Read and estimated in one turn, half a second of seven sensors: who catches up lets others through."""
 EVERY_S: Final = 1 / 30
-"""Pictures are sent no more often (docs/data-flow.md, "The 3D figure")."""
+"""Pictures are sent no more often (docs/reference/architecture.md, "The 3D figure")."""
 SLOW_S: Final = 0.2
 """What is for reading (sensors, calibration) is made anew no more often."""
 DRIFT: Final = 1e-4

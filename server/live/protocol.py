@@ -1,4 +1,5 @@
-"""What tablet and server say to each other on a live socket, beside the batches (docs/live-protocol.md).
+"""What tablet and server say to each other on a live socket, beside the batches
+(docs/reference/live-protocol.md).
 
 Parsing answers every malformed message with a code; nothing here knows of sockets, clocks or disks.
 """

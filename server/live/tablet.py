@@ -1,4 +1,4 @@
-"""The tablet's socket: `WS /api/v1/live`, protocol sagittal.live.v1 (docs/live-protocol.md).
+"""The tablet's socket: `WS /api/v1/live`, protocol sagittal.live.v1 (docs/reference/live-protocol.md).
 
 Its door is the take's token in the first message; no cookie is looked at.
 """

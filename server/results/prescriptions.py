@@ -1,7 +1,7 @@
 """Prescriptions of biofeedback: written, replaced, ended, and made ready for a live take.
 
 A record never changes: to change it ends it and writes another, so that every take and its cues point to what
-was in force. One is in force at a time; one parameter is trained (docs/feedback.md).
+was in force. One is in force at a time; one parameter is trained (docs/science/feedback.md).
 """
 
 from __future__ import annotations

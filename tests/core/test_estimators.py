@@ -81,7 +81,7 @@ def test_what_can_run_is_what_the_list_says_of_every_set_of_sensors() -> None:
 
 @pytest.mark.parametrize("method", [*ESTIMATORS, SQUAT_CHAIN], ids=lambda m: m.method)
 def test_the_documents_have_its_names_its_equations_and_its_paper(method: PoseMethod) -> None:
-    overview = (ROOT / "docs" / "estimators.md").read_text("utf-8")
+    overview = (ROOT / "docs" / "reference" / "estimators.md").read_text("utf-8")
     names = (
         (method.name, method.choice) if isinstance(method, PoseEstimator) else (method.method, method.label)
     )

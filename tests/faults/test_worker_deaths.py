@@ -1,4 +1,4 @@
-"""Jobs survive the death of whoever works on them: one visible result (docs/operations.md, "One machine")."""
+"""Jobs survive the death of their worker: one visible result (docs/how-to/operations.md, "One machine")."""
 
 from __future__ import annotations
 

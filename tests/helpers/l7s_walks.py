@@ -1,6 +1,6 @@
 """Simulated walks for L7S with their truth, and its scores against it as Sy 2021 §III-B defines them.
 
-Sensors sit on skin, are mounted at random and have the errors of docs/simulation.md. Calibration,
+Sensors sit on skin, are mounted at random and have the errors of docs/science/simulation.md. Calibration,
 orientations and stillness come from the signals alone; only the body's lengths are known, as in the paper.
 """
 

@@ -1,4 +1,5 @@
-"""The tables of docs/parameters.md, written from the catalogue: `python -m tests.helpers.parameter_page`.
+"""The tables of docs/reference/parameters.md, written from the catalogue: `python -m
+tests.helpers.parameter_page`.
 
 Each stands between `<!-- catalogue: heading -->` and `<!-- end -->`; what is around them is written by hand.
 """
@@ -12,7 +13,7 @@ from typing import Final
 from sagittal.core.parameters.catalogue import CATALOGUE, NEEDS, CurveFigure, ParameterEntry
 from tests.data import ROOT
 
-PAGE: Final = ROOT / "docs" / "parameters.md"
+PAGE: Final = ROOT / "docs" / "reference" / "parameters.md"
 
 TABLE: Final = re.compile(r"(<!-- catalogue: (?P<group>[^>]+) -->\n).*?(?=<!-- end -->)", re.DOTALL)
 

@@ -368,7 +368,7 @@ def update(language: str) -> tuple[int, int]:
     with path.open("rb") as file:
         before = {str(entry.id): str(entry.string) for entry in read_po(file) if entry.id}
     catalog = Catalog(locale=language, project="Sagittal", fuzzy=False)
-    catalog.header_comment = f"# {LANGUAGES[language]} texts of Sagittal (docs/languages.md)."
+    catalog.header_comment = f"# {LANGUAGES[language]} texts of Sagittal (docs/how-to/languages.md)."
     messages = list_messages()
     for message, files in messages.items():
         catalog.add(message, before.get(message, ""), locations=[(name, None) for name in files])  # type: ignore[misc]  # without lines

@@ -1,4 +1,4 @@
-"""Every promise of docs/promises.md names tests that exist."""
+"""Every promise of docs/reference/promises.md names tests that exist."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ FEWEST = 9
 
 def find_untested_promises() -> list[str]:
     """Promises without a test, and tests they name that do not exist."""
-    lines = re.findall(r"^\| P\d+ \|.*$", (ROOT / "docs" / "promises.md").read_text("utf-8"), re.MULTILINE)
+    lines = re.findall(
+        r"^\| P\d+ \|.*$", (ROOT / "docs" / "reference" / "promises.md").read_text("utf-8"), re.MULTILINE
+    )
     named = [re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", line) for line in lines]
     if len(lines) < FEWEST:
-        return [f"docs/promises.md: {len(lines)} promises found, expected {FEWEST} or more"]
+        return [f"docs/reference/promises.md: {len(lines)} promises found, expected {FEWEST} or more"]
     return [line for line, tests in zip(lines, named, strict=True) if not tests] + [
         f"{path}::{name}"
         for tests in named

@@ -30,7 +30,7 @@ THESE: Final = (Path("tests/lint/references.py"), Path("tests/lint/test_referenc
 OUTSIDE: Final = {
     "a design file": re.compile(
         r"\b(?:spec|design|review|prototypes)/[a-z0-9_-]+(?:\.md|/)|\b(?:spec|design) §|\bDESIGN\.md"
-        r"|(?<![\w/-])(?:service|viewer|experience|clinic|fusion|patients|kernels|real-data|field|architecture)\.md"
+        r"|(?<![\w/-])(?:service|viewer|experience|clinic|fusion|patients|kernels|real-data|field)\.md"
     ),
     "a path of a machine": re.compile(r"(?<![\w.])/(?:work|root|home)/"),
     "a folder beside the repository": re.compile(r"\.\./shared"),

@@ -55,7 +55,7 @@ def test_flexion_stays_within_two_degrees_over_five_minutes(seed: int) -> None:
                 for angle in (*FLEXION, *FRONTAL, *TRANSVERSE)
             ],
             "Whole take, standing, turns and changes of speed included; seed 0; both sides minus their own "
-            "standing. Sensor errors: the MEMS model of docs/simulation.md. Limit 2° for flexion.",
+            "standing. Sensor errors: the MEMS model of docs/science/simulation.md. Limit 2° for flexion.",
         )
     for angles, limit in ((FLEXION, LIMIT_DEG), (FRONTAL, FRONTAL_LIMIT_DEG)):
         for angle in angles:

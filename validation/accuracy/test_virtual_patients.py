@@ -1,7 +1,7 @@
 """What the whole chain tells of the virtual people beside what they did: figures for validation/report.md.
 
 A deviation that the analysis loses, exaggerates or invents would show here; how well it does on patients does
-not (docs/simulation.md).
+not (docs/science/simulation.md).
 """
 
 from __future__ import annotations

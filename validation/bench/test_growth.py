@@ -1,5 +1,6 @@
 """How time and memory grow with the length of a take, live sessions and patients; written into
-docs/performance.md with the goals. The longest and most are measured only where figures are written.
+docs/reference/performance.md with the goals. The longest and most are measured only where figures are
+written.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What an L7S run says about itself (docs/estimators.md, "Health")."""
+"""What an L7S run says about itself (docs/reference/estimators.md, "Health")."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The one catalogue of parameters: what each is, its unit, words, reference and limits, in the tables' order.
 
-Reports, forms, the API's documentation, files, docs/parameters.md and the live pages read it; nothing else
-declares a parameter. docs/contributing.md says how to add one.
+Reports, forms, the API's documentation, files, docs/reference/parameters.md and the live pages read it;
+nothing else declares a parameter. docs/how-to/contributing.md says how to add one.
 """
 
 from __future__ import annotations

@@ -300,7 +300,7 @@ def _walking(analysis: TakeAnalysis) -> dict[str, object] | None:
 
 
 def _estimator(analysis: TakeAnalysis) -> dict[str, object] | None:
-    """Which pose estimator ran on what, and its health (docs/estimators.md, "Health")."""
+    """Which pose estimator ran on what, and its health (docs/reference/estimators.md, "Health")."""
     poses = analysis.poses
     if poses is None:
         return None

@@ -1,8 +1,8 @@
 """Figures over the visits of a person: what changed since the first assessment, and by how much it must.
 
 All of them are walked under one condition. The first assessment is the base: its measurement error is the
-band that a later value must leave to be a real change (docs/norms.md, "Change"). Trainings are shown and
-never the base; with feedback they are not compared with it either.
+band that a later value must leave to be a real change (docs/science/change.md, "Verdict"). Trainings are
+shown and never the base; with feedback they are not compared with it either.
 """
 
 from __future__ import annotations

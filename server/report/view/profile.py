@@ -1,4 +1,7 @@
-"""The movement analysis profile: how far each curve is from healthy adults (docs/norms.md, "Scores")."""
+"""The movement analysis profile: how far each curve is from healthy adults.
+
+docs/science/norms-and-scores.md, "GVS and GPS".
+"""
 
 from __future__ import annotations
 

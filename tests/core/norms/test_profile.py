@@ -23,7 +23,10 @@ from tests.helpers.wbds import people
 
 @pytest.mark.recorded
 def test_the_healthy_side_score_is_the_published_one_leave_one_out() -> None:
-    """docs/norms.md, "Scores": side GPS 4.95 ± 1.46° raw, 2.35 ± 0.51° shape alone; overall 5.23 ± 1.33°."""
+    """Side GPS 4.95 ± 1.46° raw, 2.35 ± 0.51° shape alone; overall 5.23 ± 1.33°.
+
+    docs/science/norms-and-scores.md, "GVS and GPS".
+    """
     spreads = leave_one_out(people())
     side = spreads["raw"]["gps_side"]
     assert (side.mean_deg, side.sd_deg) == pytest.approx((4.95, 1.46), abs=0.005)

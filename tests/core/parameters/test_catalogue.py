@@ -1,4 +1,4 @@
-"""The catalogue and docs/parameters.md know every parameter there is, and none that there is not."""
+"""The catalogue and docs/reference/parameters.md know every parameter there is, and no other."""
 
 from __future__ import annotations
 

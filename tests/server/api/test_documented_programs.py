@@ -1,4 +1,4 @@
-"""The programs of docs/api.md do what the document says, against a real server with a real worker."""
+"""The programs of docs/reference/api.md do what it says, against a real server with a real worker."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ from tests.server.serving import serve
 
 pytestmark = pytest.mark.anyio
 
-PROGRAMS = dict(re.findall(r"```(bash|python)\n(.*?)```", (ROOT / "docs" / "api.md").read_text(), re.DOTALL))
+PROGRAMS = dict(
+    re.findall(r"```(bash|python)\n(.*?)```", (ROOT / "docs" / "reference" / "api.md").read_text(), re.DOTALL)
+)
 RUNNERS = {"bash": ["bash", "-c"], "python": [sys.executable, "-c"]}
 
 

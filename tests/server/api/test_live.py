@@ -133,8 +133,8 @@ async def test_who_may_not_run_a_take_gets_neither_api_nor_feed(
             async with websockets.connect(url, additional_headers=cookie):
                 pass
         assert refused.value.response.status_code == (403 if role else 401)
-        # as docs/api.md says: everything else is under /api/v1, the feed is not
-        text = (Path(__file__).parents[3] / "docs/api.md").read_text(encoding="utf-8")
+        # as docs/reference/api.md says: everything else is under /api/v1, the feed is not
+        text = (Path(__file__).parents[3] / "docs/reference/api.md").read_text(encoding="utf-8")
         assert "`WS /sessions/{id}/live/feed`, the only address here that is **not** under `/api/v1`" in text
         if role is None:
             with pytest.raises(websockets.exceptions.InvalidStatus) as nowhere:

@@ -55,7 +55,7 @@ async def test_figures_of_requests_jobs_parts_disk_and_backups(clinic: Clinic) -
     assert found["sagittal_disk_free_bytes",] > 0
     assert CANARY not in text
     assert made.json()["id"] not in text
-    dashboard = json.loads((ROOT / "docs" / "grafana-dashboard.json").read_text())
+    dashboard = json.loads((ROOT / "docs" / "how-to" / "grafana-dashboard.json").read_text())
     asked = {t["expr"] for panel in dashboard["panels"] for t in panel["targets"]}
     names = {name for expr in asked for name in re.findall(r"(?:sagittal|process)_\w+", expr)}
     assert len(names) > 10

@@ -1,4 +1,4 @@
-"""What docs/live-protocol.md shows is what happens."""
+"""What docs/reference/live-protocol.md shows is what happens."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.helpers.live_clinic import new_session
 
 pytestmark = pytest.mark.anyio
 
-TEXT = (ROOT / "docs" / "live-protocol.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs" / "reference" / "live-protocol.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```(\w*)\n(.*?)```", TEXT, re.DOTALL)
 
 

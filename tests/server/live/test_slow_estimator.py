@@ -24,7 +24,7 @@ pytestmark = pytest.mark.anyio
 
 SECONDS = 4.0
 GROUP_S = 0.25
-"""Longest time to an acknowledgement when nothing else happens (docs/live-protocol.md)."""
+"""Longest time to an acknowledgement when nothing else happens (docs/reference/live-protocol.md)."""
 
 
 def some_of_the_walk() -> Sequence[DueBatch]:

@@ -2,7 +2,7 @@
 import { clock } from "./clock.js";
 import { fixed, localise, speak, translate } from "./common/words.js";
 
-const RATE_MS = 33; // the figure is posed at most 30 times a second (docs/data-flow.md, "The 3D figure")
+const RATE_MS = 33; // the figure is posed at most 30 times a second (docs/reference/architecture.md, "The 3D figure")
 const RETRY_MS = [500, 1000, 2000, 5000];
 const FADE_MS = 400; // longer than the first picture takes to go (pages.css)
 const LINE_MS = 3500; // shorter than the server keeps a client waiting for its view (viewer/views.py)

@@ -1,4 +1,4 @@
-// A large file in parts (docs/api.md, "Large files"): after a lost connection, or when the page was loaded again and the file
+// A large file in parts (docs/reference/api.md, "Large files"): after a lost connection, or when the page was loaded again and the file
 // is chosen again, it goes on behind what the server has.
 import { request, Problem } from "./common/api.js";
 import { Sha256 } from "./common/sha256.js";

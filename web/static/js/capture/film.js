@@ -1,4 +1,4 @@
-// What the camera has filmed and the server does not have yet (docs/live-protocol.md, "The film"). Every piece is in
+// What the camera has filmed and the server does not have yet (docs/reference/live-protocol.md, "The film"). Every piece is in
 // IndexedDB before it is sent and until it is acknowledged, so that neither a line nor a page that breaks loses one.
 import { done, finished } from "./stored.js";
 

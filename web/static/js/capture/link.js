@@ -1,4 +1,4 @@
-// The tablet's socket (docs/live-protocol.md): says hello, sends what the outbox holds from where the server stands,
+// The tablet's socket (docs/reference/live-protocol.md): says hello, sends what the outbox holds from where the server stands,
 // lets go of what is acknowledged, and connects again with growing pauses until the take is finished.
 import { PROTOCOL } from "../common/wire.js";
 import { fixed, plural, speak } from "../common/words.js";

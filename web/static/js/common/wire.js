@@ -1,4 +1,4 @@
-// The bytes of sagittal.live.v1, little endian (docs/live-protocol.md): batches as they travel, the log as it is kept.
+// The bytes of sagittal.live.v1, little endian (docs/reference/live-protocol.md): batches as they travel, the log as it is kept.
 export const PROTOCOL = "sagittal.live.v1";
 export const CHANNELS = 9; // acceleration m/s², rate rad/s, magnetic field a.u.; NaN = not measured
 const MAGIC = 0x314c4753; // "SGL1"

@@ -1,7 +1,7 @@
 // The line to the server: newest state, feedback and frame, the last strides and cues, and whether they are fresh.
 // It comes back by itself; the server then sends what was missed (state, feedback, frame, last strides and cues).
 const RETRY_MS = [250, 500, 1000, 2000, 5000];
-export const STALE_MS = 500; // live feedback pauses when data are older (docs/feedback.md)
+export const STALE_MS = 500; // live feedback pauses when data are older (docs/science/feedback.md)
 const CHECK_MS = 100;
 const KEPT = 60; // strides and cues kept of each; the strip shows 20
 

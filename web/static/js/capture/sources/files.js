@@ -122,7 +122,7 @@ function logTracks(bytes, name, segments) {
       }
     }
     for (const sensor of stream.sensors) if (sensor.segment) segments[sensor.id] = sensor.segment;
-    // clocks of their own meet where their fastest message of the first second was sent (docs/live-protocol.md)
+    // clocks of their own meet where their fastest message of the first second was sent (docs/reference/live-protocol.md)
     return {
       ids: stream.sensors.map((s) => s.id), sensors: stream.sensors, rateHz: stream.rate_hz, clock: stream.clock,
       lagUs: stream.clock === "own" ? lag : 0, tUs, values,
