@@ -1,9 +1,7 @@
-"""Eight numbers of a row at a time in compiled loops.
+"""`lanes` of eight numbers, built for LLVM directly, which splits eight into what a processor has.
 
-LLVM does so on its own where it can prove that what is written is not what is read. Of rows of one covariance
-it can not: it asks before every loop, and loops here are a dozen lines of the cache long. Same operations in
-the same order, so the same bits. LLVM splits eight into what a processor has.
-What is built here for LLVM directly compiles in half the time of the same written in Python.
+It compiles in half the time of the same written in Python, but with names that neither Numba nor llvmlite
+promises to keep: only `lanes` imports it, and only with versions it was tested with.
 """
 
 from __future__ import annotations
@@ -15,10 +13,10 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic, models, overload, register_model
 
-IN_LINE: Final = 8
-"""Numbers in one line of the processor's cache, and in one `Lanes`."""
+STEP: Final = 8
+"""Numbers in one `Lanes`: a line of the processor's cache."""
 
-_VECTOR: Final = ir.VectorType(ir.DoubleType(), IN_LINE)
+_VECTOR: Final = ir.VectorType(ir.DoubleType(), STEP)
 
 
 class LanesType(types.Type):  # type: ignore[misc, unused-ignore]
@@ -30,7 +28,7 @@ class LanesType(types.Type):  # type: ignore[misc, unused-ignore]
 
 LANES: Final = LanesType()
 
-_EIGHT: Final[Any] = types.UniTuple(LANES, IN_LINE)  # type: ignore[attr-defined, unused-ignore]
+_EIGHT: Final[Any] = types.UniTuple(LANES, STEP)  # type: ignore[attr-defined, unused-ignore]
 
 
 @register_model(LanesType)
@@ -81,7 +79,7 @@ def spread(_: Any, number: Any) -> Any:
 def _spread(builder: Any, number: Any) -> Any:
     none, index = ir.Constant(_VECTOR, ir.Undefined), ir.IntType(32)
     one = builder.insert_element(none, number, index(0))
-    return builder.shuffle_vector(one, none, ir.Constant(ir.VectorType(index, IN_LINE), [0] * IN_LINE))
+    return builder.shuffle_vector(one, none, ir.Constant(ir.VectorType(index, STEP), [0] * STEP))
 
 
 @intrinsic
@@ -100,7 +98,7 @@ def write_columns(_: Any, array: Any, row: Any, column: Any, columns: Any) -> An
     """The way back of `read_columns`."""
 
     def make(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        rows = _transpose(builder, cgutils.unpack_tuple(builder, args[3], IN_LINE))
+        rows = _transpose(builder, cgutils.unpack_tuple(builder, args[3], STEP))
         for found, place in zip(rows, _find_rows(context, builder, signature, args), strict=True):
             builder.store(found, place, align=8)
         return context.get_dummy_value()
@@ -110,7 +108,7 @@ def write_columns(_: Any, array: Any, row: Any, column: Any, columns: Any) -> An
 
 def _find_rows(context: Any, builder: Any, signature: Any, args: Any) -> list[Any]:
     """Addresses as `_find` gives them, of a row and the seven below it."""
-    steps = (ir.Constant(args[1].type, k) for k in range(IN_LINE))
+    steps = (ir.Constant(args[1].type, k) for k in range(STEP))
     rows = [builder.add(args[1], step) for step in steps]
     return [_find(context, builder, signature.args[0], (args[0], row, args[2])) for row in rows]
 
@@ -118,11 +116,11 @@ def _find_rows(context: Any, builder: Any, signature: Any, args: Any) -> list[An
 def _transpose(builder: Any, rows: Any) -> list[Any]:
     """Eight `Lanes` as the rows of a matrix → its columns."""
     found = list(rows)
-    mask = ir.VectorType(ir.IntType(32), IN_LINE)
+    mask = ir.VectorType(ir.IntType(32), STEP)
     for s in (1, 2, 4):
-        low = ir.Constant(mask, [IN_LINE + (k ^ s) if k & s else k for k in range(IN_LINE)])
-        high = ir.Constant(mask, [IN_LINE + k if k & s else k ^ s for k in range(IN_LINE)])
-        for i in range(IN_LINE):
+        low = ir.Constant(mask, [STEP + (k ^ s) if k & s else k for k in range(STEP)])
+        high = ir.Constant(mask, [STEP + k if k & s else k ^ s for k in range(STEP)])
+        for i in range(STEP):
             if not i & s:
                 a, b = found[i], found[i | s]
                 found[i] = builder.shuffle_vector(a, b, low)
