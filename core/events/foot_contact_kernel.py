@@ -311,6 +311,72 @@ def _lands_between(pitch, counters, k, rate_hz, rule):  # type: ignore[no-untype
     return rise >= rule.hump_rad and slap <= -2.0 * rule.least_rad_s
 
 
+@inner_njit()
+def _close_contact(  # type: ignore[no-untyped-def]
+    found_int, found_float, total, pitch, acc, counters, sums, k, measured, reach, moves, rule
+):  # fmt: skip
+    """Tell a contact whose window has ended, here or with the last sample that was `measured`; returns how
+    many reports there are."""
+    top, first = counters[OPEN_TOP], max(reach, counters[BOTTOM])
+    at, sd = _landing(pitch, acc, top, first, measured, moves, rule.rate_hz, rule)
+    if at != at:
+        at = top + sums[OFFSET] + rule.lead_s * rule.rate_hz
+    if moves:
+        total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule)
+    number = counters[OPEN_NUMBER]
+    total = _tell(found_int, found_float, total, IC, number, k, YES, at, sd)
+    counters[OPEN_TOP] = -1
+    # the foot is on the floor: what moves from here on is another movement
+    _begin_movement(counters, sums, k, NO)
+    return total
+
+
+@inner_njit()
+def _take_extreme(  # type: ignore[no-untyped-def]
+    found_int, found_float, total, pitch, counters, sums, k, reach, kind, index, offset, rule
+):  # fmt: skip
+    """Tell an event of the pitch rule: a foot-off for good, a contact until its window ends; returns how many
+    reports there are."""
+    counters[TOLD], counters[PITCHED] = 1, k
+    if counters[HELD] >= k - rule.pause:
+        # the foot walks on: its step before was one
+        total = _tell_held(found_int, found_float, total, counters, sums, k)
+    number = counters[NUMBER]
+    counters[NUMBER] = number + 1
+    if kind == TC:
+        at, sd = _leaving(pitch, index, reach, rule.rate_hz, rule)
+        if at != at:
+            at = index + offset - rule.lag_s * rule.rate_hz
+        counters[BOTTOM], counters[LEFT], sums[LEFT_AT] = index, number, at
+        return _tell(found_int, found_float, total, TC, number, k, YES, at, sd)
+    at = index + offset + rule.lead_s * rule.rate_hz
+    counters[OPEN_TOP], counters[OPEN_KNOWN], counters[OPEN_NUMBER] = index, k, number
+    sums[OFFSET] = offset
+    return _tell(found_int, found_float, total, IC, number, k, NO, at, rule.late_sd_s)
+
+
+@inner_njit()
+def _find_swing(  # type: ignore[no-untyped-def]
+    found_int, found_float, total, pitch, acc, counters, sums, k, reach, first, end, top, swinging, moves,
+    rule,
+):  # fmt: skip
+    """Tell the contact of a swing that the pitch rule waits for, or hold a step without pitch until the foot
+    walks on; returns how many reports there are. top : sample of the highest pitch, −1 if not known."""
+    if top < 0:
+        top = _highest(pitch, first + (end - first) // 2, end)
+    at, sd = _landing(pitch, acc, top, first, k, moves, rule.rate_hz, rule)
+    sd = max(sd, rule.loose_sd_s)
+    if swinging:
+        total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule)
+        total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, YES, at, sd)
+        counters[NUMBER] += 1
+        return total
+    sums[HELD_IC], sums[HELD_IC + 1] = at, sd
+    if counters[PITCHED] >= k - rule.pause:
+        total = _tell_held(found_int, found_float, total, counters, sums, k)
+    return total
+
+
 @njit(cache=True, nogil=True)
 def foot_contact_kernel(  # type: ignore[no-untyped-def]
     q, speed, acc, valid, moves, pitch_ring, pitch_counters, pitch_held, window, need, threshold,
@@ -345,20 +411,9 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
         measured = k if valid[i] else k - 1
         reach = max(measured - counters[MEASURED] + 1, measured - size + 1 + rule.apart)
         if counters[OPEN_TOP] >= 0 and (not valid[i] or k >= counters[OPEN_KNOWN] + rule.after):
-            # the window of a contact has ended: here, or with the last sample that was measured
-            top, first = counters[OPEN_TOP], max(reach, counters[BOTTOM])
-            at, sd = _landing(pitch, accs, top, first, measured, moves, rate_hz, rule)
-            if at != at:
-                at = top + sums[OFFSET] + rule.lead_s * rate_hz
-            if moves:
-                total = _mend_leaving(
-                    found_int, found_float, total, pitch, counters, sums, k, reach, at, rule
-                )
-            number = counters[OPEN_NUMBER]
-            total = _tell(found_int, found_float, total, IC, number, k, YES, at, sd)
-            counters[OPEN_TOP] = -1
-            # the foot is on the floor: what moves from here on is another movement
-            _begin_movement(counters, sums, k, NO)
+            total = _close_contact(
+                found_int, found_float, total, pitch, accs, counters, sums, k, measured, reach, moves, rule
+            )
         n = foot_pitch_kernel(
             s, valid[i : i + 1], pitch_ring, pitch_counters, pitch_held,
             window, need, threshold, fall, kind, index, known, offset,
@@ -371,23 +426,10 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             # the foot rests with its heel raised: what leaves the floor moves
             n, pitch_counters[2] = 0, 0
         for e in range(n):
-            counters[TOLD], counters[PITCHED] = 1, k
-            if counters[HELD] >= k - rule.pause:
-                # the foot walks on: its step before was one
-                total = _tell_held(found_int, found_float, total, counters, sums, k)
-            number = counters[NUMBER]
-            counters[NUMBER] = number + 1
-            if kind[e] == TC:
-                at, sd = _leaving(pitch, index[e], reach, rate_hz, rule)
-                if at != at:
-                    at = index[e] + offset[e] - rule.lag_s * rate_hz
-                counters[BOTTOM], counters[LEFT], sums[LEFT_AT] = index[e], number, at
-                total = _tell(found_int, found_float, total, TC, number, k, YES, at, sd)
-            else:
-                at = index[e] + offset[e] + rule.lead_s * rate_hz
-                counters[OPEN_TOP], counters[OPEN_KNOWN], counters[OPEN_NUMBER] = index[e], k, number
-                sums[OFFSET] = offset[e]
-                total = _tell(found_int, found_float, total, IC, number, k, NO, at, rule.late_sd_s)
+            total = _take_extreme(
+                found_int, found_float, total, pitch, counters, sums, k, reach, kind[e], index[e], offset[e],
+                rule,
+            )  # fmt: skip
         if not moves:
             continue
         if speed[i] < rule.still_rad_s:
@@ -423,18 +465,10 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             first, at, sd = _leaving_loosely(pitch, start, middle, reach, rule)
             sums[HELD_TC], sums[HELD_TC + 1] = at, sd
             counters[HELD] = k
-        if top < 0:
-            top = _highest(pitch, first + (end - first) // 2, end)
-        at, sd = _landing(pitch, accs, top, first, k, moves, rate_hz, rule)
-        sd = max(sd, rule.loose_sd_s)
-        if swinging:
-            total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule)
-            total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, YES, at, sd)
-            counters[NUMBER] += 1
-        else:
-            sums[HELD_IC], sums[HELD_IC + 1] = at, sd
-            if counters[PITCHED] >= k - rule.pause:
-                total = _tell_held(found_int, found_float, total, counters, sums, k)
+        total = _find_swing(
+            found_int, found_float, total, pitch, accs, counters, sums, k, reach, first, end, top, swinging,
+            moves, rule,
+        )  # fmt: skip
         # the pitch rule need not wait for a maximum any more
         pitch_counters[2], pitch_counters[4], pitch_counters[5] = 0, k, -1
         _begin_movement(counters, sums, k, NO)

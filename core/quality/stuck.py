@@ -124,7 +124,7 @@ def _new_state(n: int, packet: int) -> StuckState:
         mean=np.zeros(each),
         dev=np.zeros(each),
         top=np.zeros(each),
-        count=np.zeros(each),
+        stays=np.zeros(each),
         begun=np.zeros(each, np.int64),
         clip=np.zeros(each),
         clip_begun=np.zeros(each, np.int64),

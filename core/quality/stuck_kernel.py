@@ -52,7 +52,7 @@ class StuckState(NamedTuple):
     Parameters
     ----------
     now : (1,) index of the next sample. last, mean, dev, top : (n, 6) last sample, its mean and mean
-        deviation, and the largest size. count, begun, clip, clip_begun : (n, 6) repeats, samples at the end
+        deviation, and the largest size. stays, begun, clip, clip_begun : (n, 6) repeats, samples at the end
         of the range, and where either began. same : (n,) samples in a row equal to the one before.
     others, others_begun : (n, 2) the same of all of acc, of gyr, while another sensor moved, and where that
         began. ring : (n, P, 6) last samples, `place` (1,) the next to be written. loop : (n, P) samples in a
@@ -64,7 +64,7 @@ class StuckState(NamedTuple):
     mean: Floats
     dev: Floats
     top: Floats
-    count: Floats
+    stays: Floats
     begun: Ints
     clip: Floats
     clip_begun: Ints
@@ -173,11 +173,11 @@ def _follow_channels(s, i, x, equal, stays, at, full, rule):  # type: ignore[no-
     for c in range(CHANNELS):
         size = abs(x[c])
         if not equal[c]:
-            s.count[i, c] = max(0.0, s.count[i, c] - rule.change)
-            if s.count[i, c] == 0.0:
+            s.stays[i, c] = max(0.0, s.stays[i, c] - rule.change)
+            if s.stays[i, c] == 0.0:
                 s.begun[i, c] = at
         elif stays:
-            s.count[i, c] += 1.0
+            s.stays[i, c] += 1.0
         s.top[i, c] = max(s.top[i, c], size)
         end = size >= 0.99 * s.top[i, c] and size >= (rule.acc_floor if c < 3 else rule.gyr_floor)
         if end and not equal[c]:
@@ -200,8 +200,8 @@ def _judge(s, i, whole, at, rule):  # type: ignore[no-untyped-def]
     """Write whether a sensor is out for good from now on, and by which channels; where that began."""
     first = at
     for c in range(CHANNELS):
-        s.channels[i, c] = s.count[i, c] >= 0.8 * rule.dead
-        if s.count[i, c] >= rule.dead:
+        s.channels[i, c] = s.stays[i, c] >= 0.8 * rule.dead
+        if s.stays[i, c] >= rule.dead:
             s.kind[i] = DEAD
             first = min(first, s.begun[i, c])
     for t in range(2):
