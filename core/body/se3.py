@@ -13,7 +13,7 @@ from math import factorial, sin, sqrt
 import numba
 
 from sagittal.core.rotation.compiled import multiply3, orthonormalise, skew_polynomial
-from sagittal.core.signals.inner import inner_njit
+from sagittal.core.signals.inner import UNCOUNTED, inner_njit
 
 SMALL = 0.25
 """Square of the angle up to which seven terms of a series are exact to 1e-17: no sine is needed."""
@@ -24,7 +24,7 @@ _SLOPE_A = tuple((-1.0) ** k * 2 * k / factorial(2 * k + 2) for k in range(1, 8)
 _SLOPE_B = tuple((-1.0) ** k * 2 * k / factorial(2 * k + 3) for k in range(1, 8))
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def _sum_powers(terms, x):  # type: ignore[no-untyped-def]
     total = terms[6]
     for k in range(5, -1, -1):
@@ -32,7 +32,7 @@ def _sum_powers(terms, x):  # type: ignore[no-untyped-def]
     return total
 
 
-@inner_njit(error_model="numpy", _nrt=False)
+@inner_njit(error_model="numpy", **UNCOUNTED)
 def _quotients(square):  # type: ignore[no-untyped-def]
     """a = (1 − cos θ) / θ² and b = (θ − sin θ) / θ³ of an angle θ given as its square."""
     if square < SMALL:
@@ -41,7 +41,7 @@ def _quotients(square):  # type: ignore[no-untyped-def]
     return 2.0 * (sin(0.5 * angle) / angle) ** 2, (1.0 - sin(angle) / angle) / square
 
 
-@inner_njit(error_model="numpy", _nrt=False)
+@inner_njit(error_model="numpy", **UNCOUNTED)
 def _slopes(square, a, b):  # type: ignore[no-untyped-def]
     """Derivatives of a and b by θ, over θ."""
     if square < SMALL:
@@ -49,7 +49,7 @@ def _slopes(square, a, b):  # type: ignore[no-untyped-def]
     return (1.0 - square * b - 2.0 * a) / square, (a - 3.0 * b) / square
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def move_pose(R, p, xi, at, work):  # type: ignore[no-untyped-def]
     """T ← T Exp(ξ) of a pose R (3, 3), p (3,); ξ is xi[at : at + 6], work (3, 3, 3) of scratch."""
     x, y, z = xi[at + 3], xi[at + 4], xi[at + 5]

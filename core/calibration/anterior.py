@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import degrees, hypot, radians
+from math import degrees, radians
 from typing import Literal
 
 import numpy as np
@@ -29,70 +29,37 @@ from sagittal.core.calibration.gyro_pca import (
 from sagittal.core.calibration.heading import (
     Complexes,
     HeadingParams,
-    Part,
     WalkingDirection,
     acceleration_axis,
     horizontal_acceleration,
     nearest_sign,
     pendulum_agreement,
-    rest_to_rest_velocity,
-    start_direction,
-    stride_direction,
     subtract_angles,
-    velocity_direction,
 )
 from sagittal.core.calibration.mounting import read_declared_angle
-from sagittal.core.calibration.sensor_in_walk import WalkRungParams, find_flat_moments
 from sagittal.core.calibration.standing import SensorAtRest, vertical_frame
 from sagittal.core.calibration.walking import TRUNK
+from sagittal.core.calibration.ways import (
+    DISAGREEMENT,
+    CalibrationWalk,
+    choose_way,
+    list_ways,
+    measure_ways,
+    tell_disagreement,
+)
 from sagittal.core.errors import CalibrationError, Notice
-from sagittal.core.frames import FOOT, Bools, Floats, Segment
+from sagittal.core.frames import Floats, Segment
 from sagittal.core.rotation import rotate
 from sagittal.core.signals.recording import SensorSignals
-from sagittal.core.signals.rest import Window
-
-DISAGREEMENT = radians(15.0)
-"""Difference of two measures of the walking direction that is told
-(docs/science/real-recordings.md, "Heading")."""
-
-COARSE = radians(30.0)
-"""The same where velocity comes from one rest only: a tilt of 1° and 3 s make 0.5 m/s across (our choice)."""
 
 CONFLICT = radians(120.0)
 """Difference from the declared mounting that is a contradiction: within 60° of the opposite way."""
-
-STRONG_AXIS = 0.6
-"""Share of the acceleration axis from which it goes before a velocity that disagrees with it. Fitted to
-nothing: the shares were .73 to .97 on neura_walk and gaitmap_foot, .22 where the axis of a simulated pelvis
-was wrong."""
 
 CLEAR_MARGIN = radians(15.0)
 """Gait-rule margin that contradicts a measured direction: right signs had 18 to 40° on neura_walk
 (docs/science/calibration.md, "Signs"), while a simulated thigh shows 8° the other way."""
 
 Method = Literal["walking_direction", "gyro_pca"]
-
-
-@dataclass(frozen=True, eq=False)
-class CalibrationWalk:
-    """The straight walking that shows the direction, as seen from the rest that calibration uses.
-
-    Parameters
-    ----------
-    rest : the whole rest window. leads : it comes before the walk. parts : straight parts, the nearest first.
-    bearing : turn of each part since standing, rad. span : index range between two rests, None if there is no
-    second rest near enough. mask : (n,) samples of the parts. steps_s : step time in each part,
-    None without a trunk sensor.
-    """
-
-    rest: Window
-    leads: bool
-    parts: list[Part]
-    bearing: list[float]
-    span: Part | None
-    mask: Bools
-    steps_s: list[float] | None
-    rate_hz: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,23 +133,6 @@ def find_anterior_axis(
     return found
 
 
-def _by_strides(
-    segment: Segment,
-    signals: SensorSignals,
-    standing: SensorAtRest,
-    a: Complexes,
-    walk: CalibrationWalk,
-    params: HeadingParams,
-) -> WalkingDirection | None:
-    """Direction of a foot's strides, each from one flat moment to the next; None for other segments."""
-    if segment not in FOOT.values():
-        return None
-    flats = find_flat_moments(
-        signals.gyr - standing.gyro_bias, walk.mask & signals.valid, walk.rate_hz, WalkRungParams()
-    )
-    return stride_direction(a, flats, walk.parts, walk.bearing, walk.rate_hz, params)
-
-
 def _by_walking(
     segment: Segment,
     signals: SensorSignals,
@@ -199,56 +149,19 @@ def _by_walking(
     a = horizontal_acceleration(q, signals.acc)
     steps_s = walk.steps_s if segment in TRUNK else None
     axis = acceleration_axis(a, walk.parts, walk.bearing, walk.rate_hz, params, steps_s)
-    velocity = None
-    if walk.span is not None:
-        first, last = walk.span
-        v = rest_to_rest_velocity(a[first:last], True, walk.rate_hz)
-        inside = [
-            (p, b) for p, b in zip(walk.parts, walk.bearing, strict=True) if first <= p[0] and p[1] <= last
-        ]
-        velocity = velocity_direction(v, first, [p for p, _ in inside], [b for _, b in inside], params)
+    ways = measure_ways(segment, signals, standing, a, walk, params)
     facts: dict[str, object] = {"axis_share": axis.score}
-    start = None
-    strides = _by_strides(segment, signals, standing, a, walk, params)
-    if strides is not None:
-        off = subtract_angles(nearest_sign(axis.angle, strides.angle), strides.angle)
-        facts |= {"source": "strides", "disagreement_rad": off}
-        chosen = strides
-    elif velocity is not None:
-        off = subtract_angles(nearest_sign(axis.angle, velocity.angle), velocity.angle)
-        facts |= {"source": "velocity", "disagreement_rad": off}
-        if abs(off) > DISAGREEMENT and axis.score > STRONG_AXIS:
-            # one lost impact bends an integrated velocity, many strides hold the axis
-            facts["source"] = "acceleration"
-            chosen = WalkingDirection(nearest_sign(axis.angle, velocity.angle), axis.score)
-        else:
-            chosen = velocity
-    else:
-        gap_s = params.trunk_gap_s if segment in TRUNK else params.leg_gap_s
-        start = start_direction(
-            a, walk.rest, walk.parts[0], walk.bearing[0], walk.leads, walk.rate_hz, gap_s, params
+    way = choose_way(ways, axis)
+    if way is None:
+        angle, notices, signed = _sign_axis(
+            segment, signals, R_vertical, q, a, axis.angle, walk, written, params
         )
-        if start is None:
-            agrees = _vaulting(segment, signals, q, a, axis.angle, walk)
-            if written is None and abs(agrees) >= params.pendulum:
-                facts |= {"source": "acceleration", "sign": "pendulum", "pendulum": agrees}
-                angle = nearest_sign(axis.angle, axis.angle + (0.0 if agrees > 0.0 else np.pi))
-                heard, mirror = list_axis_measures(segment, angle, axis, pca, forward)
-                return AnteriorAxis(
-                    angle, "walking_direction", axis.score, (), facts, measures=heard, mirror=mirror
-                )
-            angle, notices = _signed(segment, axis.angle, written, R_vertical, q, walk)
-            facts |= {"source": "acceleration", "sign": "declared" if written is not None else "gait"}
-            heard, mirror = list_axis_measures(segment, angle, axis, pca, forward)
-            return AnteriorAxis(
-                angle, "walking_direction", axis.score, notices, facts, measures=heard, mirror=mirror
-            )
-        off = subtract_angles(nearest_sign(axis.angle, start.angle), start.angle)
-        facts |= {"source": "acceleration", "sign": "velocity", "disagreement_rad": off}
-        chosen = WalkingDirection(nearest_sign(axis.angle, start.angle), axis.score)
-        if abs(off) > COARSE and axis.score <= STRONG_AXIS:
-            facts["source"] = "velocity"
-            chosen = WalkingDirection(start.angle, 0.5)
+        heard, mirror = list_axis_measures(segment, angle, axis, pca, forward)
+        return AnteriorAxis(
+            angle, "walking_direction", axis.score, notices, facts | signed, measures=heard, mirror=mirror
+        )
+    chosen = way.chosen
+    facts |= way.facts
     agrees = _vaulting(segment, signals, q, a, chosen.angle, walk)
     if abs(agrees) >= params.pendulum:
         facts["pendulum"] = agrees
@@ -256,36 +169,41 @@ def _by_walking(
         # a velocity gained since a standing that swayed can point backwards, a walking trunk cannot
         facts |= {"source": "acceleration", "sign": "pendulum"}
         chosen = WalkingDirection(nearest_sign(axis.angle, chosen.angle + np.pi), axis.score)
-        velocity = start = None
+        ways = replace(ways, velocity=None, start=None)
     notices = _sign_notices(segment, chosen.angle, R_vertical, q, walk)
     heard, mirror = list_axis_measures(segment, chosen.angle, axis, pca, forward)
-    if strides is not None:
-        heard = (ForwardMeasure("strides", strides.angle, forward.strides_sd, forward.strides_doubt),)
-        if abs(off) > DISAGREEMENT:
-            message = (
-                f"{segment}: strides and acceleration show ways {abs(degrees(off)):.0f}° apart, "
-                f"{degrees(DISAGREEMENT):.0f}° are expected at most; the strides were used. Frontal and "
-                "transverse angles of this segment are doubtful; look at the mounting."
-            )
-            notices += (Notice("heading_disagreement", message, sensor=segment),)
-    elif velocity is not None:
-        sd = hypot(forward.velocity_sd, forward.velocity_error_mps / velocity.speed_mps)
-        heard = (*heard, ForwardMeasure("velocity", velocity.angle, sd, forward.velocity_doubt))
-    elif start is not None:
-        heard = (
-            *heard,
-            ForwardMeasure("start_velocity", start.angle, forward.start_sd, forward.start_doubt),
-        )
+    if ways.strides is not None and abs(way.off) > DISAGREEMENT:
+        notices += (tell_disagreement(segment, way.off),)
     return AnteriorAxis(
         chosen.angle,
         "walking_direction",
         chosen.score,
         notices,
         facts,
-        measures=heard,
+        measures=list_ways(ways, heard, forward),
         mirror=mirror,
-        kept=strides is not None,
+        kept=ways.strides is not None,
     )
+
+
+def _sign_axis(
+    segment: Segment,
+    signals: SensorSignals,
+    R_vertical: Floats,
+    q: Floats,
+    a: Complexes,
+    axis: float,
+    walk: CalibrationWalk,
+    written: float | None,
+    params: HeadingParams,
+) -> tuple[float, tuple[Notice, ...], dict[str, object]]:
+    """The end of the acceleration's axis that is forward where no velocity tells it, and by what."""
+    agrees = _vaulting(segment, signals, q, a, axis, walk)
+    if written is None and abs(agrees) >= params.pendulum:
+        angle = nearest_sign(axis, axis + (0.0 if agrees > 0.0 else np.pi))
+        return angle, (), {"source": "acceleration", "sign": "pendulum", "pendulum": agrees}
+    angle, notices = _signed(segment, axis, written, R_vertical, q, walk)
+    return angle, notices, {"source": "acceleration", "sign": "gait" if written is None else "declared"}
 
 
 def list_axis_measures(

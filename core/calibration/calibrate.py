@@ -10,7 +10,6 @@ import numpy as np
 
 from sagittal.core.calibration.anterior import (
     AnteriorAxis,
-    CalibrationWalk,
     Method,
     find_anterior_axis,
     weigh_axes,
@@ -47,6 +46,7 @@ from sagittal.core.calibration.walking import (
     turn_sensors,
     turning_mask,
 )
+from sagittal.core.calibration.ways import CalibrationWalk
 from sagittal.core.errors import CalibrationError, Notice, SignalError
 from sagittal.core.frames import R_NEUTRAL, Bools, Floats, Segment
 from sagittal.core.fusion.attitude import AttitudeParams, estimate_orientation

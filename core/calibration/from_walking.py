@@ -7,36 +7,24 @@ of walking (docs/science/calibration.md, "Without standing").
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 
-from sagittal.core.calibration.anterior import AnteriorAxis, Method, list_axis_measures, weigh_axes
-from sagittal.core.calibration.forward import ForwardMeasure, ForwardParams
+from sagittal.core.calibration.anterior import AnteriorAxis, Method, weigh_axes
+from sagittal.core.calibration.forward import ForwardParams
+from sagittal.core.calibration.forward_in_walk import NeutralSensor, find_forward_in_walk, mask_of
 from sagittal.core.calibration.gyro_pca import (
-    WEAK_MARGIN,
     about_vertical,
     count_steps,
-    flexion_axis,
-    gait_margin,
-    measure_flexion,
     sagittal_angle,
 )
 from sagittal.core.calibration.heading import (
-    Complexes,
     HeadingParams,
     Part,
-    acceleration_axis,
-    horizontal_acceleration,
-    nearest_sign,
-    pendulum_agreement,
-    step_time,
-    stride_direction,
 )
 from sagittal.core.calibration.joint_turns import JointTurnParams, measure_joint_turns
-from sagittal.core.calibration.mounting import read_declared_angle
 from sagittal.core.calibration.sensor_in_walk import SensorInWalk, WalkRungParams, follow_sensor
 from sagittal.core.calibration.standing import vertical_frame
 from sagittal.core.calibration.walking import (
@@ -49,26 +37,13 @@ from sagittal.core.calibration.walking import (
     turn_sensors,
     turning_mask,
 )
-from sagittal.core.errors import CalibrationError, Notice, SignalError
-from sagittal.core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, THIGH, Bools, Floats, Segment
+from sagittal.core.errors import Notice, SignalError
+from sagittal.core.frames import FOOT, R_NEUTRAL, Bools, Segment
 from sagittal.core.fusion.attitude import AttitudeParams
-from sagittal.core.rotation import about, find_vertical, from_matrix, multiply, rotate
+from sagittal.core.rotation import about, find_vertical, from_matrix, multiply
 from sagittal.core.signals.calibrated import CalibratedRecording, Calibration, SegmentCalibration
-from sagittal.core.signals.filtering import low_pass
 from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.signals.rest import Window, find_runs
-
-SWING_HZ: Final = 1.6
-"""Low-pass under which the sensors of one leg are pushed forward together: a stride and its double."""
-
-TOGETHER: Final = 0.3
-"""Least correlation of the forward acceleration of two sensors of a leg from which one has its sign of the
-other. Seen: foot and shank .83 to .96, shank and thigh .55 to .95 (neura_walk, qmt_fullbody, seven virtual
-people)."""
-
-CLEAR_SKEW: Final = 0.3
-"""Skewness of a shank's rate from which its sign is clear: it swings forward faster than it ever falls back.
-Seen: .59 to 1.8 on the same sets. Thighs have −.2 to 1.4: they tell nothing by themselves."""
 
 FROM_WALKING: Final = (
     "Nobody stood still, so sensors were calibrated from walking: joint angles have ranges, no levels. Stand "
@@ -79,21 +54,6 @@ FROM_PAUSES: Final = (
     "The person only paused in mid-stride, so sensors were calibrated from walking: joint angles have "
     "ranges, no levels. Stand still for 3 seconds with both feet side by side next time."
 )
-
-
-@dataclass(frozen=True, eq=False)
-class _Neutral:
-    """A sensor with its neutral posture.
-
-    Parameters
-    ----------
-    up : (3,) vertical in sensor axes in that posture. q : (n, 4) sensor to its own world, turned so that in
-    that posture, over the reference part, its vertical frame faces x.
-    """
-
-    up: Floats
-    q: Floats
-    sensor: SensorInWalk
 
 
 def calibrate_from_walking(
@@ -125,24 +85,7 @@ def calibrate_from_walking(
     none can be calibrated.
     """
     rate = recording.rate_hz
-    moving = moving_mask(recording, walking)
-    walks = [r for r in find_runs(moving) if r[1] - r[0] >= params.least_s * rate]
-    if not walks:
-        raise why
-    straight = moving
-    sensors: dict[Segment, SensorInWalk] = {}
-    # where the person turns is known once a sensor's vertical is
-    for segments in (turn_sensors(recording), list(recording.sensors)):
-        sensors = {
-            s: x
-            for s in segments
-            if (x := follow_sensor(s, recording.sensors[s], walks, straight, rate, attitude, params))
-        }
-        if not all(s in sensors for s in turn_sensors(recording)):
-            raise why
-        bias, q = {s: x.gyro_bias for s, x in sensors.items()}, {s: x.q for s, x in sensors.items()}
-        turning = turning_mask(recording, bias, q, walking) & moving
-        straight = moving & ~turning
+    sensors, moving, turning = _follow_sensors(recording, walking, attitude, params, why)
     parts = straight_parts(moving, turning, rate, walking)
     if not parts:
         raise why
@@ -151,7 +94,7 @@ def calibrate_from_walking(
     near = [p for p in parts if abs(0.5 * (p[0] + p[1] - home[0] - home[1])) <= reach]
     bearing = _bearings(recording, sensors, near, home)
     neutral = {s: _find_neutral(s, x, near, home) for s, x in sensors.items()}
-    found, notices = _find_forward(recording, neutral, near, bearing, heading, method, forward)
+    found, notices = find_forward_in_walk(recording, neutral, near, bearing, heading, method, forward)
     joints = measure_joint_turns(
         recording,
         {s: neutral[s].sensor.gyro_bias for s in found},
@@ -179,6 +122,36 @@ def calibrate_from_walking(
     return CalibratedRecording(recording, calibration)
 
 
+def _follow_sensors(
+    recording: UniformRecording,
+    walking: WalkingParams,
+    attitude: AttitudeParams,
+    params: WalkRungParams,
+    why: SignalError,
+) -> tuple[dict[Segment, SensorInWalk], Bools, Bools]:
+    """Every sensor through the walks, and the samples (n,) in which the person moves, and those of turns."""
+    rate = recording.rate_hz
+    moving = moving_mask(recording, walking)
+    walks = [r for r in find_runs(moving) if r[1] - r[0] >= params.least_s * rate]
+    if not walks:
+        raise why
+    straight, turning = moving, moving
+    sensors: dict[Segment, SensorInWalk] = {}
+    # where the person turns is known once a sensor's vertical is
+    for segments in (turn_sensors(recording), list(recording.sensors)):
+        sensors = {
+            s: x
+            for s in segments
+            if (x := follow_sensor(s, recording.sensors[s], walks, straight, rate, attitude, params))
+        }
+        if not all(s in sensors for s in turn_sensors(recording)):
+            raise why
+        bias, q = {s: x.gyro_bias for s, x in sensors.items()}, {s: x.q for s, x in sensors.items()}
+        turning = turning_mask(recording, bias, q, walking) & moving
+        straight = moving & ~turning
+    return sensors, moving, turning
+
+
 def _bearings(
     recording: UniformRecording, sensors: Mapping[Segment, SensorInWalk], parts: list[Part], home: Part
 ) -> list[float]:
@@ -195,7 +168,7 @@ def _bearings(
     return turns
 
 
-def _find_neutral(segment: Segment, sensor: SensorInWalk, parts: list[Part], home: Part) -> _Neutral:
+def _find_neutral(segment: Segment, sensor: SensorInWalk, parts: list[Part], home: Part) -> NeutralSensor:
     """Posture of a foot that is flat, or the mean of straight walking."""
     q, n = sensor.q, len(sensor.q)
     seen, here = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
@@ -212,176 +185,10 @@ def _find_neutral(segment: Segment, sensor: SensorInWalk, parts: list[Part], hom
     up = up / np.linalg.norm(up)
     facing = from_matrix(R_NEUTRAL @ vertical_frame(up))
     turned = float(np.angle(np.exp(1j * measure_turned_angle(q[here], facing)).mean()))
-    return _Neutral(up, multiply(about(2, -turned), q), sensor)
+    return NeutralSensor(up, multiply(about(2, -turned), q), sensor)
 
 
-def _find_forward(
-    recording: UniformRecording,
-    neutral: Mapping[Segment, _Neutral],
-    parts: list[Part],
-    bearing: list[float],
-    params: HeadingParams,
-    method: Method,
-    weights: ForwardParams,
-) -> tuple[dict[Segment, AnteriorAxis], list[Notice]]:
-    """Anterior axis of every sensor whose sign can be told, by itself, and what is to be said of others."""
-    found: dict[Segment, AnteriorAxis] = {}
-    notices: list[Notice] = []
-    pushed: dict[Segment, Floats] = {}
-    failed: CalibrationError | None = None
-    mask = _mask(len(recording.t_s), parts)
-    for segment in _in_order(neutral):
-        x, signals = neutral[segment], recording.sensors[segment]
-        a = horizontal_acceleration(x.q, signals.acc)
-        vaulting = 0.0
-        R = vertical_frame(x.up)
-        try:
-            strides, seen = None, None
-            if method == "gyro_pca" and segment not in TRUNK:
-                pca = flexion_axis(signals.gyr[mask] - x.sensor.gyro_bias, R, segment)
-                axis, share = -pca.gamma, pca.rho
-            else:
-                steps_s = None
-                if segment in TRUNK:
-                    upwards = rotate(x.q, signals.acc)[:, 2]
-                    steps_s = [step_time(upwards[p[0] : p[1]], recording.rate_hz) for p in parts]
-                seen = acceleration_axis(a, parts, bearing, recording.rate_hz, params, steps_s)
-                axis, share = seen.angle, seen.score
-                strides = stride_direction(a, x.sensor.flats, parts, bearing, recording.rate_hz, params)
-                if strides is not None:
-                    axis, share = strides.angle, strides.score
-                if steps_s is not None:
-                    vaulting = pendulum_agreement(
-                        a, upwards, axis, parts, bearing, recording.rate_hz, steps_s
-                    )
-            forward = _push(a, axis, parts, bearing, recording.rate_hz)
-            angle, how, own = _sign(
-                segment, axis, strides is not None, recording, x, mask, forward, pushed, vaulting,
-                params.pendulum,
-            )  # fmt: skip
-        except CalibrationError as error:
-            failed = failed or error
-            notices.append(Notice(error.code, error.message, sensor=segment))
-            continue
-        pushed[segment] = forward if np.cos(angle - axis) > 0.0 else -forward
-        heard: tuple[ForwardMeasure, ...]
-        if seen is None:
-            heard, mirror = (ForwardMeasure("gyro_pca", angle, weights.pca_sd, weights.pca_doubt),), None
-        else:
-            pca = measure_flexion(signals.gyr[mask] - x.sensor.gyro_bias, R)
-            heard, mirror = list_axis_measures(segment, angle, seen, pca, weights)
-        if strides is not None:
-            heard = (ForwardMeasure("strides", angle, weights.strides_sd, weights.strides_doubt),)
-        found[segment] = AnteriorAxis(
-            angle,
-            method if segment not in TRUNK else "walking_direction",
-            share,
-            own,
-            {"sign": how},
-            measures=heard,
-            mirror=mirror,
-            kept=seen is None or strides is not None,
-        )
-    if not found and failed is not None:
-        raise failed
-    return found, notices
-
-
-def _in_order(worn: Mapping[Segment, object]) -> Iterator[Segment]:
-    """Sensors that tell their sign by themselves first: shanks, then feet, thighs, the trunk."""
-    for group in (SHANK, FOOT, THIGH):
-        yield from (group[side] for side in SIDES if group[side] in worn)
-    yield from (s for s in TRUNK if s in worn)
-
-
-def _sign(
-    segment: Segment,
-    axis: float,
-    directed: bool,
-    recording: UniformRecording,
-    x: _Neutral,
-    mask: Bools,
-    forward: Floats,
-    pushed: Mapping[Segment, Floats],
-    vaulting: float,
-    least_vaulting: float,
-) -> tuple[float, str, tuple[Notice, ...]]:
-    """The end of the axis that is forward, what told it, and what to say.
-
-    Parameters
-    ----------
-    directed : the axis is the direction of a foot's strides, which has a sign.
-
-    Raises
-    ------
-    CalibrationError `forward_unknown`, `pelvis_heading_unknown`.
-    """
-    R = vertical_frame(x.up)
-    written = read_declared_angle(recording.mounting.get(segment, ""), R, segment)
-    if written is not None:
-        return nearest_sign(axis, written), "declared", ()
-    if directed:
-        return axis, "strides", ()
-    if segment in TRUNK:
-        if segment == "pelvis" and abs(vaulting) >= least_vaulting:
-            return (axis if vaulting > 0 else nearest_sign(axis, axis + np.pi)), "pendulum", ()
-        raise CalibrationError(
-            "pelvis_heading_unknown",
-            f"{segment}: which way it faces is not known without standing. Stand still for 3 s before "
-            "walking, or declare the mounting, for example “sacrum, face backwards”.",
-            sensor=segment,
-        )
-    for other, theirs in pushed.items():
-        if other[-1] == segment[-1] and np.ptp(forward) > 0.0 and np.ptp(theirs) > 0.0:
-            together = float(np.corrcoef(forward, theirs)[0, 1])
-            if abs(together) >= TOGETHER:
-                return (axis if together > 0 else nearest_sign(axis, axis + np.pi)), other, ()
-    if segment in SHANK.values():
-        signals = recording.sensors[segment]
-        rate = (signals.gyr - x.sensor.gyro_bias)[mask] @ (about_vertical(-axis) @ R)[2]
-        skew = float(np.mean((rate - rate.mean()) ** 3) / max(float(rate.std()) ** 3, 1e-12))
-        clear, margin = abs(skew) >= CLEAR_SKEW, skew
-    elif segment in FOOT.values():
-        up = find_vertical(x.q)
-        margin = gait_margin(sagittal_angle(up, about_vertical(-axis) @ R), mask, segment)
-        clear = abs(margin) >= WEAK_MARGIN
-    else:
-        raise CalibrationError(
-            "forward_unknown",
-            f"{segment}: which way is forward cannot be told from it alone. Wear a sensor on the shank or "
-            "foot of that leg, or declare the mounting.",
-            sensor=segment,
-        )
-    weak = () if clear else (_weak(segment),)
-    return (axis if margin > 0 else nearest_sign(axis, axis + np.pi)), "gait", weak
-
-
-def _push(a: Complexes, axis: float, parts: list[Part], bearing: list[float], rate_hz: float) -> Floats:
-    """Slow acceleration along an axis over all parts, one after the other, each without its mean."""
-    pieces = []
-    for (start, end), turn in zip(parts, bearing, strict=True):
-        x = low_pass((a[start:end] * np.exp(-1j * (axis + turn))).real, SWING_HZ, rate_hz)
-        pieces.append(x - x.mean())
-    return np.concatenate(pieces)
-
-
-def _weak(segment: Segment) -> Notice:
-    return Notice(
-        "calibration_sign_weak",
-        f"{segment}: forward and backward are hard to tell apart in this walk. Declare the mounting, or "
-        "check the sign of its angles.",
-        sensor=segment,
-    )
-
-
-def _mask(n: int, parts: list[Part]) -> Bools:
-    mask = np.zeros(n, np.bool_)
-    for a, b in parts:
-        mask[a:b] = True
-    return mask
-
-
-def _mounted(x: _Neutral, found: AnteriorAxis, at: int) -> SegmentCalibration:
+def _mounted(x: NeutralSensor, found: AnteriorAxis, at: int) -> SegmentCalibration:
     return SegmentCalibration(
         R_segment_sensor=about_vertical(-found.angle) @ vertical_frame(x.up),
         gyro_bias=x.sensor.gyro_bias,
@@ -394,11 +201,11 @@ def _mounted(x: _Neutral, found: AnteriorAxis, at: int) -> SegmentCalibration:
 
 
 def _straight_steps(
-    found: Mapping[Segment, AnteriorAxis], neutral: Mapping[Segment, _Neutral], parts: list[Part]
+    found: Mapping[Segment, AnteriorAxis], neutral: Mapping[Segment, NeutralSensor], parts: list[Part]
 ) -> int | None:
     leg = next((s for s in found if s not in TRUNK), None)
     if leg is None:
         return None
     x = neutral[leg]
     up, R = find_vertical(x.q), about_vertical(-found[leg].angle) @ vertical_frame(x.up)
-    return count_steps(sagittal_angle(up, R), _mask(len(x.q), parts))
+    return count_steps(sagittal_angle(up, R), mask_of(len(x.q), parts))

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from math import asin, sqrt
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numba import njit
 
+from sagittal.core.events.contact_moments_kernel import (
+    ContactRule,
+    deepest,
+    guess_leaving,
+    highest,
+    lowest,
+    refine_landing,
+    refine_leaving,
+)
 from sagittal.core.events.foot_pitch_kernel import foot_pitch_kernel
 from sagittal.core.signals.inner import inner_njit
 
@@ -56,40 +65,6 @@ LEAST_SWING: Final = 0.2
 """A swing in a rhythm takes at least this share of the stride. Shorter ones are pieces of a swing that is
 slower than the limit of rest, as in a severe shuffle (our choice; the paretic foot of stroke_treadmill swings
 for 0.43)."""
-STOP_SHARE: Final = 0.2
-"""Where there is neither slap nor acceleration, a foot lands where its pitch rate falls under this share of
-its fastest (our choice). No take is without acceleration, so it is no parameter."""
-
-
-class ContactRule(NamedTuple):
-    """`FootContactParams` at a sample rate; whole numbers are samples."""
-
-    rate_hz: float
-    contact_share: float
-    leaving_share: float
-    least_rad_s: float
-    push_s: float
-    lead_s: float
-    lag_s: float
-    still_rad_s: float
-    swing_rad_s: float
-    step_m: float
-    hump_rad: float
-    dip_rad: float
-    contact_sd_s: float
-    leaving_sd_s: float
-    flat_sd_s: float
-    late_sd_s: float
-    loose_sd_s: float
-    leaving: int
-    after: int
-    quiet: int
-    apart: int
-    swing: int
-    longest: int
-    onset: int
-    pause: int
-    least: int
 
 
 @inner_njit()
@@ -100,151 +75,6 @@ def _read_rule(x):  # type: ignore[no-untyped-def]
         x[16], int(x[17]), int(x[18]), int(x[19]), int(x[20]), int(x[21]), int(x[22]), int(x[23]), int(x[24]),
         int(x[25]),
     )  # fmt: skip
-
-
-@inner_njit()
-def _rate(pitch, j, rate_hz):  # type: ignore[no-untyped-def]
-    """Pitch rate between samples j and j + 1, rad/s."""
-    size = pitch.shape[0]
-    return (pitch[(j + 1) % size] - pitch[j % size]) * rate_hz
-
-
-@inner_njit()
-def _knock(acc, j, apart):  # type: ignore[no-untyped-def]
-    """Change of the acceleration over the `apart` samples before j, m/s²."""
-    size = acc.shape[0]
-    a, b = acc[(j - apart) % size], acc[j % size]
-    return sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-
-
-@inner_njit()
-def _deepest(pitch, rate_hz, first, last):  # type: ignore[no-untyped-def]
-    """Place j and value of the least pitch rate between samples first and last + 1."""
-    place, least = first, _rate(pitch, first, rate_hz)
-    for j in range(first + 1, last + 1):
-        r = _rate(pitch, j, rate_hz)
-        if r < least:
-            place, least = j, r
-    return place, least
-
-
-@inner_njit()
-def _highest(pitch, first, last):  # type: ignore[no-untyped-def]
-    """Sample of the highest pitch among first … last."""
-    size = pitch.shape[0]
-    place = first
-    for j in range(first, last + 1):
-        if pitch[j % size] > pitch[place % size]:
-            place = j
-    return place
-
-
-@inner_njit()
-def _lowest(pitch, first, last):  # type: ignore[no-untyped-def]
-    """Sample of the lowest pitch among first … last."""
-    size = pitch.shape[0]
-    place = first
-    for j in range(first, last + 1):
-        if pitch[j % size] < pitch[place % size]:
-            place = j
-    return place
-
-
-@inner_njit()
-def _landing(pitch, acc, top, first, last, moves, rate_hz, rule):  # type: ignore[no-untyped-def]
-    """Sample and uncertainty (s) of a contact whose highest pitch is at `top`, from samples first … last.
-
-    NaN where neither pitch nor acceleration shows it.
-    """
-    if last - top >= 2:
-        place, slap = _deepest(pitch, rate_hz, top, last - 1)
-        if slap <= -rule.least_rad_s:
-            level, start = rule.contact_share * slap, max(first, top - 2)
-            j = place
-            while j >= start and _rate(pitch, j, rate_hz) < level:
-                j -= 1
-            if j >= start:
-                here, after = _rate(pitch, j, rate_hz), _rate(pitch, j + 1, rate_hz)
-                at = j + 0.5 + (level - here) / (after - here)
-                start += rule.apart
-                if not moves or start > place:
-                    return at, rule.contact_sd_s
-                hardest = 0.0
-                for j in range(start, place + 2):
-                    hardest = max(hardest, _knock(acc, j, rule.apart))
-                j = start
-                while _knock(acc, j, rule.apart) < rule.contact_share * hardest:
-                    j += 1
-                half = 0.5 * (j - 0.5 * rule.apart - at)
-                return at + half, sqrt(rule.contact_sd_s**2 + (half / rate_hz) ** 2)
-    # no slap: the foot came down flat or on its tip
-    peak, place = 0.0, first
-    for j in range(first, min(top, last - 1) + 1):
-        r = _rate(pitch, j, rate_hz)
-        if r > peak:
-            peak, place = r, j
-    size = pitch.shape[0]
-    if moves:
-        half = 0.5 * (pitch[_lowest(pitch, first, top) % size] + pitch[top % size])
-        place = max(place, first + rule.apart)
-        while place < top and pitch[place % size] < half:
-            place += 1
-        hardest = place
-        for j in range(place, last + 1):
-            if _knock(acc, j, rule.apart) > _knock(acc, hardest, rule.apart):
-                hardest = j
-        return hardest - 0.5 * rule.apart, rule.flat_sd_s
-    if peak < rule.least_rad_s:
-        return np.nan, rule.late_sd_s
-    level = STOP_SHARE * peak
-    j = min(top, last - 1)
-    while j > first and _rate(pitch, j, rate_hz) < level:
-        j -= 1
-    if j >= last - 1:
-        return np.nan, rule.late_sd_s
-    here, after = _rate(pitch, j, rate_hz), _rate(pitch, j + 1, rate_hz)
-    return j + 0.5 + (level - here) / min(after - here, -1e-9), rule.flat_sd_s
-
-
-@inner_njit()
-def _leaving(pitch, bottom, first, rate_hz, rule):  # type: ignore[no-untyped-def]
-    """Sample and uncertainty (s) of a foot-off whose lowest pitch is at `bottom`, from samples first …
-
-    NaN where the pitch rate shows no push-off, or one that is long over.
-    """
-    first = max(first, bottom - rule.leaving)
-    if bottom - first < 2:
-        return np.nan, rule.late_sd_s
-    place, push = _deepest(pitch, rate_hz, first, bottom - 1)
-    if push > -rule.least_rad_s:
-        return np.nan, rule.late_sd_s
-    level = rule.leaving_share * push
-    j = place
-    while j < bottom and _rate(pitch, j, rate_hz) < level:
-        j += 1
-    before, here = _rate(pitch, j - 1, rate_hz), _rate(pitch, j, rate_hz)
-    if here <= before:
-        return np.nan, rule.late_sd_s
-    at = j - 0.5 + (level - before) / (here - before)
-    width = (bottom - at) / rate_hz
-    if width > rule.push_s:
-        return np.nan, rule.late_sd_s
-    return at, sqrt(rule.leaving_sd_s**2 + 0.25 * width * width)
-
-
-@inner_njit()
-def _leaving_loosely(pitch, start, middle, reach, rule):  # type: ignore[no-untyped-def]
-    """Sample of the lowest pitch, foot-off and its uncertainty (s) of a movement from `start` on."""
-    size = pitch.shape[0]
-    bottom = _lowest(pitch, start, middle)
-    at, sd = np.nan, 0.0
-    if bottom < middle - 1 and pitch[start % size] - pitch[bottom % size] >= rule.dip_rad:
-        at, sd = _leaving(pitch, bottom, reach, rule.rate_hz, rule)
-    if at != at:
-        # the foot left the floor without a push
-        bottom = min(start + rule.onset, middle)
-        at, sd = float(bottom), 2.0 * rule.loose_sd_s
-    return bottom, at, max(sd, rule.loose_sd_s)
 
 
 @inner_njit()
@@ -306,7 +136,7 @@ def _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach
     if at - left >= rule.least or start < reach or start >= left:
         return total
     middle = start + (int(left) - start) // 2
-    _, off, sd = _leaving_loosely(pitch, start, middle, reach, rule)
+    _, off, sd = guess_leaving(pitch, start, middle, reach, rule)
     return _tell(found_int, found_float, total, TC, counters[LEFT], k, YES, off, sd)
 
 
@@ -345,9 +175,79 @@ def _lands_between(pitch, counters, k, rate_hz, rule):  # type: ignore[no-untype
     start, top, size = counters[START], counters[TOP], pitch.shape[0]
     if k != top + rule.after or top - start < 2:
         return False
-    rise = pitch[top % size] - pitch[_lowest(pitch, start, top) % size]
-    _, slap = _deepest(pitch, rate_hz, top, k - 1)
+    rise = pitch[top % size] - pitch[lowest(pitch, start, top) % size]
+    _, slap = deepest(pitch, rate_hz, top, k - 1)
     return rise >= rule.hump_rad and slap <= -2.0 * rule.least_rad_s
+
+
+@inner_njit()
+def _close_contact(  # type: ignore[no-untyped-def]
+    found_int, found_float, total, pitch, acc, counters, sums, k, measured, reach, moves, rule
+):  # fmt: skip
+    """Tell a contact whose window has ended, here or with the last sample that was `measured`; returns how
+    many reports there are."""
+    top, first = counters[OPEN_TOP], max(reach, counters[BOTTOM])
+    at, sd = refine_landing(pitch, acc, top, first, measured, moves, rule.rate_hz, rule)
+    if at != at:
+        at = top + sums[OFFSET] + rule.lead_s * rule.rate_hz
+    if moves:
+        total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule)
+    number = counters[OPEN_NUMBER]
+    total = _tell(found_int, found_float, total, IC, number, k, YES, at, sd)
+    counters[OPEN_TOP] = -1
+    # the foot is on the floor: what moves from here on is another movement
+    _begin_movement(counters, sums, k, NO)
+    return total
+
+
+@inner_njit()
+def _take_extreme(  # type: ignore[no-untyped-def]
+    found_int, found_float, total, pitch, counters, sums, k, reach, kind, index, offset, rule
+):  # fmt: skip
+    """Tell an event of the pitch rule: a foot-off for good, a contact until its window ends; returns how many
+    reports there are."""
+    counters[TOLD], counters[PITCHED] = 1, k
+    if counters[HELD] >= k - rule.pause:
+        # the foot walks on: its step before was one
+        total = _tell_held(found_int, found_float, total, counters, sums, k, YES)
+    counters[HELD], counters[LOOSE], counters[UNTOLD] = NONE, NO, NO
+    number = counters[NUMBER]
+    counters[NUMBER] = number + 1
+    if kind == TC:
+        at, sd = refine_leaving(pitch, index, reach, rule.rate_hz, rule)
+        if at != at:
+            at = index + offset - rule.lag_s * rule.rate_hz
+        counters[BOTTOM], counters[LEFT], sums[LEFT_AT] = index, number, at
+        return _tell(found_int, found_float, total, TC, number, k, YES, at, sd)
+    at = index + offset + rule.lead_s * rule.rate_hz
+    counters[OPEN_TOP], counters[OPEN_KNOWN], counters[OPEN_NUMBER] = index, k, number
+    sums[OFFSET] = offset
+    return _tell(found_int, found_float, total, IC, number, k, NO, at, rule.late_sd_s)
+
+
+@inner_njit()
+def _find_swing(  # type: ignore[no-untyped-def]
+    found_int, found_float, total, pitch, acc, counters, sums, k, reach, first, end, top, swinging, moves,
+    off, off_sd, rule,
+):  # fmt: skip
+    """Tell the contact of a swing that the pitch rule waits for, or hold a step without pitch until the foot
+    walks on; returns how many reports there are. top : sample of the highest pitch, −1 if not known."""
+    if top < 0:
+        top = highest(pitch, first + (end - first) // 2, end)
+    at, sd = refine_landing(pitch, acc, top, first, k, moves, rule.rate_hz, rule)
+    sd = max(sd, rule.loose_sd_s)
+    if swinging:
+        total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule)
+        total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, YES, at, sd)
+        counters[NUMBER] += 1
+        return total
+    _hold(counters, sums, k, off, off_sd, at, sd)
+    if _walks_on(counters, sums, rule):
+        total = _tell_held(found_int, found_float, total, counters, sums, k, RHYTHM)
+        counters[PITCHED] = k
+    elif counters[PITCHED] >= k - rule.pause:
+        total = _tell_held(found_int, found_float, total, counters, sums, k, YES)
+    return total
 
 
 @njit(cache=True, nogil=True)
@@ -384,20 +284,9 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
         measured = k if valid[i] else k - 1
         reach = max(measured - counters[MEASURED] + 1, measured - size + 1 + rule.apart)
         if counters[OPEN_TOP] >= 0 and (not valid[i] or k >= counters[OPEN_KNOWN] + rule.after):
-            # the window of a contact has ended: here, or with the last sample that was measured
-            top, first = counters[OPEN_TOP], max(reach, counters[BOTTOM])
-            at, sd = _landing(pitch, accs, top, first, measured, moves, rate_hz, rule)
-            if at != at:
-                at = top + sums[OFFSET] + rule.lead_s * rate_hz
-            if moves:
-                total = _mend_leaving(
-                    found_int, found_float, total, pitch, counters, sums, k, reach, at, rule
-                )
-            number = counters[OPEN_NUMBER]
-            total = _tell(found_int, found_float, total, IC, number, k, YES, at, sd)
-            counters[OPEN_TOP] = -1
-            # the foot is on the floor: what moves from here on is another movement
-            _begin_movement(counters, sums, k, NO)
+            total = _close_contact(
+                found_int, found_float, total, pitch, accs, counters, sums, k, measured, reach, moves, rule
+            )
         n = foot_pitch_kernel(
             s, valid[i : i + 1], pitch_ring, pitch_counters, pitch_held,
             window, need, threshold, fall, kind, index, known, offset,
@@ -410,24 +299,10 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             # the foot rests with its heel raised: what leaves the floor moves
             n, pitch_counters[2] = 0, 0
         for e in range(n):
-            counters[TOLD], counters[PITCHED] = 1, k
-            if counters[HELD] >= k - rule.pause:
-                # the foot walks on: its step before was one
-                total = _tell_held(found_int, found_float, total, counters, sums, k, YES)
-            counters[HELD], counters[LOOSE], counters[UNTOLD] = NONE, NO, NO
-            number = counters[NUMBER]
-            counters[NUMBER] = number + 1
-            if kind[e] == TC:
-                at, sd = _leaving(pitch, index[e], reach, rate_hz, rule)
-                if at != at:
-                    at = index[e] + offset[e] - rule.lag_s * rate_hz
-                counters[BOTTOM], counters[LEFT], sums[LEFT_AT] = index[e], number, at
-                total = _tell(found_int, found_float, total, TC, number, k, YES, at, sd)
-            else:
-                at = index[e] + offset[e] + rule.lead_s * rate_hz
-                counters[OPEN_TOP], counters[OPEN_KNOWN], counters[OPEN_NUMBER] = index[e], k, number
-                sums[OFFSET] = offset[e]
-                total = _tell(found_int, found_float, total, IC, number, k, NO, at, rule.late_sd_s)
+            total = _take_extreme(
+                found_int, found_float, total, pitch, counters, sums, k, reach, kind[e], index[e], offset[e],
+                rule,
+            )  # fmt: skip
         if not moves:
             continue
         if speed[i] < rule.still_rad_s:
@@ -460,22 +335,11 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             continue
         else:
             middle = top if top >= 0 else start + (end - start) // 2
-            first, off, off_sd = _leaving_loosely(pitch, start, middle, reach, rule)
-        if top < 0:
-            top = _highest(pitch, first + (end - first) // 2, end)
-        at, sd = _landing(pitch, accs, top, first, k, moves, rate_hz, rule)
-        sd = max(sd, rule.loose_sd_s)
-        if swinging:
-            total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule)
-            total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, YES, at, sd)
-            counters[NUMBER] += 1
-        else:
-            _hold(counters, sums, k, off, off_sd, at, sd)
-            if _walks_on(counters, sums, rule):
-                total = _tell_held(found_int, found_float, total, counters, sums, k, RHYTHM)
-                counters[PITCHED] = k
-            elif counters[PITCHED] >= k - rule.pause:
-                total = _tell_held(found_int, found_float, total, counters, sums, k, YES)
+            first, off, off_sd = guess_leaving(pitch, start, middle, reach, rule)
+        total = _find_swing(
+            found_int, found_float, total, pitch, accs, counters, sums, k, reach, first, end, top, swinging,
+            moves, off, off_sd, rule,
+        )  # fmt: skip
         # the pitch rule need not wait for a maximum any more
         pitch_counters[2], pitch_counters[4], pitch_counters[5] = 0, k, -1
         _begin_movement(counters, sums, k, NO)

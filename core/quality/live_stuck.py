@@ -9,7 +9,8 @@ import numpy as np
 
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Segment
-from sagittal.core.quality.stuck import CLIPPED, StuckParams, StuckWatch
+from sagittal.core.quality.stuck import StuckParams, StuckWatch
+from sagittal.core.quality.stuck_kernel import CLIPPED
 from sagittal.core.timeline.live import UniformBlock
 
 

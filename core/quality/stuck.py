@@ -12,25 +12,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from sagittal.core.errors import Notice
 from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
 from sagittal.core.quality.signals import RANGES
+from sagittal.core.quality.stuck_kernel import (
+    CHANNELS,
+    CLIPPED,
+    DEAD,
+    FROZEN,
+    LOOPED,
+    Ints,
+    StuckRule,
+    StuckState,
+    stuck_kernel,
+)
 from sagittal.core.signals.recording import SensorSignals, UniformRecording
 from sagittal.core.signals.rest import find_runs
-
-CHANNELS: Final = 6
-"""Of a sensor: three axes of the accelerometer, three of the gyroscope."""
-
-DEAD, CLIPPED, FROZEN, LOOPED = 1, 2, 3, 4
-"""What is wrong with a sensor. The first two stay: such a sensor is out from then on. A sensor that repeats
-its last sample, or its last packet, has lost samples and is there again with the next new one."""
-
-
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -74,158 +73,6 @@ class StuckParams:
     packet_s: float = 0.5
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _rests(x, gravity, rest_acc, rest_gyr):  # type: ignore[no-untyped-def]
-    """Whether a sample (6,) is one of a sensor at rest."""
-    force = np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2)
-    rate = np.sqrt(x[3] ** 2 + x[4] ** 2 + x[5] ** 2)
-    return abs(force - gravity) < rest_acc and rate < rest_gyr
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _watch(  # type: ignore[no-untyped-def]
-    acc, gyr, valid, limits, full, now, last, mean, dev, top, count, begun, clip, clip_begun,
-    same, others, others_begun, ring, loop, place, kind, channels, bad, back,
-):  # fmt: skip
-    """Advance the state over a block; whether a sensor of it does not measure.
-
-    Parameters
-    ----------
-    acc, gyr : (T, n, 3). valid : (T, n). limits : `_limits`. full : ends of usual ranges. now : (1,) index
-        of the block's first sample. last, mean, dev, top : (n, 6). count, begun, clip, clip_begun : (n, 6)
-        repeats, samples at the end of the range, and where either began. same : (n,) samples in a row equal
-        to the one before. others, others_begun : (n, 2) the same of all of acc, of gyr, while another
-        sensor moved, and where that began. ring : (n, P, 6) last samples, `place`
-        (1,) the next to be written. loop : (n, P) samples in a row equal to the one p + 1 before.
-    kind : (n,) what is wrong for good. channels : (n, 6) which.
-    bad : (T, n) written, the fault. back : (T, n) written, samples before it for which it holds as well.
-    """
-    share, moving_acc, moving_gyr, dead, change, clipped, relief = limits[:7]
-    acc_floor, gyr_floor, frozen, resting, rest_acc, rest_gyr, looped = limits[7:14]
-    gravity, jump = limits[14], limits[15]
-    T, n = valid.shape
-    P = ring.shape[1]
-    x = np.empty(6)
-    equal = np.empty(6, np.bool_)
-    moving = np.zeros(n, np.bool_)
-    found = False
-    for k in range(T):
-        at = now[0] + k
-        for i in range(n):
-            moving[i] = False
-            for c in range(6):
-                if dev[i, c] > (moving_acc if c < 3 else moving_gyr):
-                    moving[i] = True
-        movers = 0
-        for i in range(n):
-            movers += moving[i] and valid[k, i]
-        for i in range(n):
-            bad[k, i], back[k, i] = kind[i], 0
-            found = found or kind[i] != 0
-            if not valid[k, i]:
-                continue
-            whole = True
-            for c in range(6):
-                x[c] = acc[k, i, c] if c < 3 else gyr[k, i, c - 3]
-                equal[c] = x[c] == last[i, c]
-                whole = whole and equal[c]
-            # a whole sensor that repeats one sample
-            before = same[i]
-            same[i] = same[i] + 1 if whole else 0
-            elsewhere = movers - moving[i] > 0
-            for t in range(2):
-                if equal[3 * t] and equal[3 * t + 1] and equal[3 * t + 2]:
-                    others[i, t] += elsewhere
-                else:
-                    others[i, t] = 0
-                    others_begun[i, t] = at
-            rate = np.sqrt(x[3] ** 2 + x[4] ** 2 + x[5] ** 2)
-            rests = _rests(x, gravity, rest_acc, rest_gyr)
-            if kind[i] == 0 and ((same[i] >= frozen and not rests) or others[i].min() >= resting):
-                bad[k, i] = 3
-                back[k, i] = same[i]
-            elif (
-                kind[i] == 0
-                and before >= frozen
-                and not whole
-                and rate > jump
-                and _rests(last[i], gravity, rest_acc, rest_gyr)
-            ):
-                bad[k, i] = 3
-                back[k, i] = before
-            # a whole sensor that repeats its last samples
-            j = place[0] - 1
-            for p in range(1, P):
-                j = j - 1 if j > 0 else j - 1 + P
-                again = True
-                for c in range(6):
-                    if x[c] != ring[i, j, c]:
-                        again = False
-                        break
-                loop[i, p] = loop[i, p] + 1 if again else 0
-                long = loop[i, p] >= looped and loop[i, p] >= 2 * (p + 1)
-                if long and movers > 0 and same[i] < p and bad[k, i] == 0:
-                    bad[k, i] = 4
-                    back[k, i] = loop[i, p]
-            for c in range(6):
-                ring[i, place[0], c] = x[c]
-            for c in range(6):
-                size = abs(x[c])
-                # one channel that stays while the sensor moves
-                if not equal[c]:
-                    count[i, c] = max(0.0, count[i, c] - change)
-                    if count[i, c] == 0.0:
-                        begun[i, c] = at
-                elif moving[i] and not whole:
-                    count[i, c] += 1.0
-                # one that stays at the end of its range
-                top[i, c] = max(top[i, c], size)
-                end = size >= 0.99 * top[i, c] and size >= (acc_floor if c < 3 else gyr_floor)
-                if end and not equal[c]:
-                    near = False
-                    for f in range(len(full)):
-                        near = near or abs(size / full[f] - 1.0) < 0.01
-                    end = near and abs(last[i, c]) >= 0.99 * top[i, c]
-                if end:
-                    if clip[i, c] == 0.0:
-                        clip_begun[i, c] = at - 1
-                    clip[i, c] += 1.0
-                else:
-                    clip[i, c] = max(0.0, clip[i, c] - relief)
-                if np.isnan(last[i, c]):
-                    mean[i, c] = x[c]
-                mean[i, c] += share * (x[c] - mean[i, c])
-                dev[i, c] += share * (abs(x[c] - mean[i, c]) - dev[i, c])
-                last[i, c] = x[c]
-            found = found or bad[k, i] != 0
-            if kind[i] != 0:
-                continue
-            first = at
-            for c in range(6):
-                channels[i, c] = count[i, c] >= 0.8 * dead
-                if count[i, c] >= dead:
-                    kind[i] = 1
-                    first = min(first, begun[i, c])
-            for t in range(2):
-                if others[i, t] >= resting and not whole:
-                    kind[i] = 1
-                    channels[i, 3 * t : 3 * t + 3] = True
-                    first = min(first, others_begun[i, t])
-            if kind[i] == 0:
-                for c in range(6):
-                    channels[i, c] = clip[i, c] >= 0.8 * clipped
-                    if clip[i, c] >= clipped:
-                        kind[i] = 2
-                        first = min(first, clip_begun[i, c])
-            if kind[i] != 0:
-                bad[k, i] = kind[i]
-                back[k, i] = at - first
-            found = found or bad[k, i] != 0
-        place[0] = (place[0] + 1) % P
-    now[0] += T
-    return found
-
-
 class StuckWatch:
     """The rule on n sensors, block by block; any division into blocks gives the same bits.
 
@@ -236,26 +83,14 @@ class StuckWatch:
 
     def __init__(self, n: int, rate_hz: float, params: StuckParams | None = None) -> None:
         p = params or StuckParams()
-        self._limits = np.array(
-            [
-                1.0 - np.exp(-1.0 / (p.smooth_s * rate_hz)), p.moving_acc, p.moving_gyr, p.dead_s * rate_hz,
-                p.change, p.clipped_s * rate_hz, p.clipped_share, p.acc_floor, p.gyr_floor,
-                max(p.frozen_s * rate_hz, p.fewest), p.resting_s * rate_hz, p.rest_acc, p.rest_gyr,
-                p.looped_s * rate_hz, GRAVITY, p.jump_gyr,
-            ]
+        self._rule = StuckRule(
+            1.0 - float(np.exp(-1.0 / (p.smooth_s * rate_hz))), p.moving_acc, p.moving_gyr,
+            p.dead_s * rate_hz, p.change, p.clipped_s * rate_hz, p.clipped_share, p.acc_floor, p.gyr_floor,
+            max(p.frozen_s * rate_hz, float(p.fewest)), p.resting_s * rate_hz, p.rest_acc, p.rest_gyr,
+            p.looped_s * rate_hz, GRAVITY, p.jump_gyr,
         )  # fmt: skip
-        each = (n, CHANNELS)
         self._full = np.array(RANGES)
-        self._now = np.zeros(1, np.int64)
-        self._last, self._mean, self._dev = np.full(each, np.nan), np.zeros(each), np.zeros(each)
-        self._top, self._count, self._clip = np.zeros(each), np.zeros(each), np.zeros(each)
-        self._begun, self._clip_begun = np.zeros(each, np.int64), np.zeros(each, np.int64)
-        self._same = np.zeros(n, np.int64)
-        self._others, self._others_begun = np.zeros((n, 2), np.int64), np.zeros((n, 2), np.int64)
-        packet = max(2, round(p.packet_s * rate_hz)) + 1
-        self._ring = np.full((n, packet, CHANNELS), np.nan)
-        self._loop, self._place = np.zeros((n, packet), np.int64), np.zeros(1, np.int64)
-        self._kind, self._channels = np.zeros(n, np.int64), np.zeros(each, np.bool_)
+        self._state = _new_state(n, max(2, round(p.packet_s * rate_hz)) + 1)
 
     def push(self, acc: Floats, gyr: Floats, valid: Bools) -> tuple[Ints, Ints] | None:
         """The fault (T, n) at each sample, 0 = none, and for how many samples before it holds as well (T, n).
@@ -267,19 +102,41 @@ class StuckWatch:
         acc, gyr : (T, n, 3) m/s², rad/s. valid : (T, n); other samples are passed over.
         """
         bad, back = np.empty(valid.shape, np.int64), np.empty(valid.shape, np.int64)
-        found = _watch(
-            np.ascontiguousarray(acc), np.ascontiguousarray(gyr), np.ascontiguousarray(valid), self._limits,
-            self._full, self._now, self._last, self._mean, self._dev, self._top, self._count, self._begun,
-            self._clip, self._clip_begun, self._same, self._others, self._others_begun, self._ring,
-            self._loop, self._place, self._kind, self._channels, bad, back,
+        found = stuck_kernel(
+            np.ascontiguousarray(acc), np.ascontiguousarray(gyr), np.ascontiguousarray(valid),
+            tuple(self._rule), self._full, tuple(self._state), bad, back,
         )  # fmt: skip
         return (bad, back) if found else None
 
     def describe(self, segment: Segment, sensor: int, kind: int, first_s: float) -> Notice:
         """Say what is wrong with a sensor and since when."""
         code, words = TOLD[kind]
-        which = channel_words(np.flatnonzero(self._channels[sensor]).tolist())
+        which = channel_words(np.flatnonzero(self._state.channels[sensor]).tolist())
         return Notice(code, words.format(segment=segment, which=which, first=first_s), segment, first_s)
+
+
+def _new_state(n: int, packet: int) -> StuckState:
+    """The state before the first sample of n sensors; packet : samples that are kept of each."""
+    each = (n, CHANNELS)
+    return StuckState(
+        now=np.zeros(1, np.int64),
+        last=np.full(each, np.nan),
+        mean=np.zeros(each),
+        dev=np.zeros(each),
+        top=np.zeros(each),
+        stays=np.zeros(each),
+        begun=np.zeros(each, np.int64),
+        clip=np.zeros(each),
+        clip_begun=np.zeros(each, np.int64),
+        same=np.zeros(n, np.int64),
+        others=np.zeros((n, 2), np.int64),
+        others_begun=np.zeros((n, 2), np.int64),
+        ring=np.full((n, packet, CHANNELS), np.nan),
+        loop=np.zeros((n, packet), np.int64),
+        place=np.zeros(1, np.int64),
+        kind=np.zeros(n, np.int64),
+        channels=np.zeros(each, np.bool_),
+    )
 
 
 TOLD: Final[Mapping[int, tuple[str, str]]] = {

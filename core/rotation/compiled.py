@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from sagittal.core.frames import Floats
-from sagittal.core.signals.inner import inner_njit
+from sagittal.core.signals.inner import UNCOUNTED, inner_njit
 
 SMALL = 1e-8
 """Below this angle in rad the series of one term replaces the sine."""
@@ -21,13 +21,13 @@ SERIES = 1e-4
 """Angle in rad below which series of three terms are exact to 1e-16."""
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def wrap_angle(angle):  # type: ignore[no-untyped-def]
     """The same angle in rad in [−π, π)."""
     return (angle + pi) % (2.0 * pi) - pi
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def multiply(pw, px, py, pz, qw, qx, qy, qz):  # type: ignore[no-untyped-def]
     """Components (w, x, y, z) of the Hamilton product p ⊗ q."""
     return (
@@ -38,7 +38,7 @@ def multiply(pw, px, py, pz, qw, qx, qy, qz):  # type: ignore[no-untyped-def]
     )
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def to_matrix(q, R):  # type: ignore[no-untyped-def]
     """Write the matrix R (3, 3) of a unit quaternion q (4,)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -53,7 +53,7 @@ def to_matrix(q, R):  # type: ignore[no-untyped-def]
     R[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def from_matrix(R, q):  # type: ignore[no-untyped-def]
     """Write the unit quaternion q (4,), w ≥ 0, of a matrix R (3, 3), by its largest component."""
     a, b, c = R[0, 0], R[1, 1], R[2, 2]
@@ -79,14 +79,14 @@ def from_matrix(R, q):  # type: ignore[no-untyped-def]
         q[i] /= length
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def transform(R, v, out):  # type: ignore[no-untyped-def]
     """Write R v (3,) of a matrix (3, 3) and a vector (3,)."""
     for i in range(3):
         out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def cross(a, b, out):  # type: ignore[no-untyped-def]
     """Write the cross product a × b (3,)."""
     out[0] = a[1] * b[2] - a[2] * b[1]
@@ -94,7 +94,7 @@ def cross(a, b, out):  # type: ignore[no-untyped-def]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def turn(q, a, b, c):  # type: ignore[no-untyped-def]
     """Turn q (4,) in place by the rotation vector (a, b, c), rad: q ← q ⊗ Exp((a, b, c)), normalised."""
     angle = sqrt(a * a + b * b + c * c)
@@ -104,7 +104,7 @@ def turn(q, a, b, c):  # type: ignore[no-untyped-def]
     q[0], q[1], q[2], q[3] = w * s, i * s, j * s, k * s
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def skew(a: Floats, out: Floats) -> None:
     """Write [a]× (3, 3)."""
     out[0, 0], out[0, 1], out[0, 2] = 0.0, -a[2], a[1]
@@ -112,7 +112,7 @@ def skew(a: Floats, out: Floats) -> None:
     out[2, 0], out[2, 1], out[2, 2] = -a[1], a[0], 0.0
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def times_cross(M, r, k, out):  # type: ignore[no-untyped-def]
     """Write k M [r]× (3, 3) of a matrix M (3, 3), a vector r (3,) and a factor k."""
     for i in range(3):
@@ -122,7 +122,7 @@ def times_cross(M, r, k, out):  # type: ignore[no-untyped-def]
         out[i, 2] = x * r[1] - y * r[0]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def skew_polynomial(phi, k, c1, c2, out):  # type: ignore[no-untyped-def]
     """Write k 1 + c1 [φ]× + c2 [φ]×² (3, 3); the exponential and its Jacobians are of this form."""
     x, y, z = phi[0], phi[1], phi[2]
@@ -137,7 +137,7 @@ def skew_polynomial(phi, k, c1, c2, out):  # type: ignore[no-untyped-def]
     out[2, 1] = c2 * y * z + c1 * x
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def multiply3(a: Floats, b: Floats, out: Floats) -> None:
     """Write the product of two matrices (3, 3)."""
     for i in range(3):
@@ -145,7 +145,7 @@ def multiply3(a: Floats, b: Floats, out: Floats) -> None:
             out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def sine_quotients(square):  # type: ignore[no-untyped-def]
     """sin θ / θ, (1 − cos θ) / θ² and (θ − sin θ) / θ³ of an angle θ given as its square."""
     if square < SERIES * SERIES:
@@ -156,7 +156,7 @@ def sine_quotients(square):  # type: ignore[no-untyped-def]
     return first, 2.0 * sin(0.5 * angle) ** 2 / square, (1.0 - first) / square
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def exp_so3(phi: Floats, rotation: Floats, jacobian: Floats) -> None:
     """Write Exp(φ) and the left Jacobian J_l(φ), both (3, 3)."""
     s1, s2, s3 = sine_quotients(phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
@@ -164,7 +164,7 @@ def exp_so3(phi: Floats, rotation: Floats, jacobian: Floats) -> None:
     skew_polynomial(phi, 1.0, s2, s3, jacobian)
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def log_so3(rotation: Floats, out: Floats) -> None:
     """Write the rotation vector (3,), norm ≤ π, of a matrix, by way of the quaternion's largest component."""
     d0, d1, d2 = rotation[0, 0], rotation[1, 1], rotation[2, 2]
@@ -191,7 +191,7 @@ def log_so3(rotation: Floats, out: Floats) -> None:
     out[0], out[1], out[2] = scale * i, scale * j, scale * k
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def orthonormalise(rotation: Floats, work: Floats) -> None:
     """Take rounding out of a rotation (3, 3) in place: R ← R (3 − RᵀR) / 2; work is (2, 3, 3)."""
     gram, copy = work[0], work[1]

@@ -1,30 +1,41 @@
-"""Compilation of functions that only other compiled functions call."""
+"""Compilation of functions that only other compiled functions call, as far as Numba is known to allow it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NoReturn
+from collections.abc import Callable, Mapping
+from typing import Any, Final, NoReturn
 
 import numba
-from numba.core.registry import CPUDispatcher
 
+TESTED: Final = ((0, 61), (0, 68))
+"""First and last version of Numba with which the bits were looked at: the same with and without what it does
+not promise to keep, the options of `inner_njit` and `UNCOUNTED` and the lanes of the ErKF."""
 
-class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
-    """A compiled function without an entry point for Python; compiled callers use it as any other."""
+IS_TESTED: Final = TESTED[0] <= tuple(int(x) for x in numba.__version__.split(".")[:2]) <= TESTED[1]
+"""Whether Numba is one of them. With others all is compiled the ordinary way: the same bits, more slowly."""
 
-    def __call__(self, *args: object, **kwargs: object) -> NoReturn:
-        """Refuse a call from Python, for which there is no machine code to jump to.
+UNCOUNTED: Final[Mapping[str, bool]] = {"_nrt": False} if IS_TESTED else {}
+"""Options for `numba.njit` of a loop that holds arrays but makes none: no counting of references."""
 
-        Raises
-        ------
-        TypeError
-            Always.
-        """
-        name = f"{self.py_func.__module__}.{self.py_func.__qualname__}"
-        raise TypeError(
-            f"{name} is compiled for other compiled functions only and cannot be called from Python. "
-            f"To try it, compile it with an entry point of its own: numba.njit({name}.py_func)(…)."
-        )
+if IS_TESTED:
+    from numba.core.registry import CPUDispatcher
+
+    class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
+        """A compiled function without an entry point for Python; compiled callers use it as any other."""
+
+        def __call__(self, *args: object, **kwargs: object) -> NoReturn:
+            """Refuse a call from Python, for which there is no machine code to jump to.
+
+            Raises
+            ------
+            TypeError
+                Always.
+            """
+            name = f"{self.py_func.__module__}.{self.py_func.__qualname__}"
+            raise TypeError(
+                f"{name} is compiled for other compiled functions only and cannot be called from Python. "
+                f"To try it, compile it with an entry point of its own: numba.njit({name}.py_func)(…)."
+            )
 
 
 def inner_njit(**options: bool | str) -> Callable[[Callable[..., Any]], Any]:
@@ -37,6 +48,9 @@ def inner_njit(**options: bool | str) -> Callable[[Callable[..., Any]], Any]:
     ----------
     options : of `numba.njit`, in addition to those that all our loops share.
     """
+    if not IS_TESTED:
+        ordinary: Callable[[Callable[..., Any]], Any] = numba.njit(cache=True, nogil=True, **options)
+        return ordinary
     compile_function: Callable[[Callable[..., Any]], Any] = numba.njit(
         cache=True, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options
     )

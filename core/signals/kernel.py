@@ -13,8 +13,10 @@ from math import sqrt
 
 import numba
 
+from sagittal.core.signals.inner import UNCOUNTED
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def filter_both_ways(rows, section, start, pad, room, out):  # type: ignore[no-untyped-def]
     """Write each row (n,) of rows (k, n) filtered into out (k, n).
 
@@ -48,7 +50,7 @@ def filter_both_ways(rows, section, start, pad, room, out):  # type: ignore[no-u
                 out[i, k - pad] = y
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def find_lows(end, level, valleys, higher, lows):  # type: ignore[no-untyped-def]
     """Write the lowest point (k,) behind each top until something higher comes, or the end.
 
@@ -70,7 +72,7 @@ def find_lows(end, level, valleys, higher, lows):  # type: ignore[no-untyped-def
         count += 1
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def find_steadiest_rate(gyr, valid, width, whole, mean):  # type: ignore[no-untyped-def]
     """Write which windows (n − width + 1,) have no lost sample, and the mean rate (3,) of the steadiest one.
 
@@ -105,7 +107,7 @@ def find_steadiest_rate(gyr, valid, width, whole, mean):  # type: ignore[no-unty
         lost -= not valid[i]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def measure_norms(x, offset, out):  # type: ignore[no-untyped-def]
     """Write the norms (n,) of vectors x (n, 3) less an offset (3,)."""
     for k in range(len(x)):
@@ -113,7 +115,7 @@ def measure_norms(x, offset, out):  # type: ignore[no-untyped-def]
         out[k] = sqrt(a * a + b * b + c * c)
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def measure_windows(x, width, mean, sd):  # type: ignore[no-untyped-def]
     """Write mean and standard deviation (n,) of x (n,) in the window around every sample, borders held."""
     n, half = len(x), width // 2

@@ -20,7 +20,7 @@ DATED = (
     "core/formats/cwa.py",
 )
 """They handle dates read from a device's file; none reads the clock."""
-COMPILER = "core/body/erkf/lanes.py"
+COMPILER = "core/body/erkf/vector_lanes.py"
 """It extends Numba's compiler, llvmlite, by a vector type."""
 EFFECTS = {
     "socket",

@@ -30,7 +30,7 @@ from sagittal.core.body.erkf.updates import (
 )
 from sagittal.core.frames import Bools, Floats
 from sagittal.core.rotation.compiled import to_matrix, turn
-from sagittal.core.signals.inner import inner_njit
+from sagittal.core.signals.inner import UNCOUNTED, inner_njit
 
 INVALID, CONTACT, STILL, PATCHED = 1, 2, 4, 8
 """Bits of a sample's flags."""
@@ -146,7 +146,7 @@ class Links(NamedTuple):
     sd: Floats
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     """vᵀ S⁻¹ v ≤ gate for the zero velocity of the IMU whose errors begin at b."""
     S = P[b + 3 : b + 6, b + 3 : b + 6]
@@ -160,7 +160,7 @@ def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     return s <= gate * det
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-def]
     """Move every IMU and the covariance over the time before sample k; F (n, 5, 3, 3) is kept."""
     x, before, dx, acc, gyr = memory.x, memory.before, memory.dx, samples.acc, samples.gyr
@@ -171,7 +171,7 @@ def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-d
     propagate(memory.P, F, m, dt)
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def add_noise(memory, samples, k, links, noise, Q):  # type: ignore[no-untyped-def]
     """Add the process noise of sample k, its diagonal into Q (N,), and make that the last sample."""
     P, before, dt = memory.P, memory.before, samples.step[k]
@@ -197,7 +197,7 @@ def add_noise(memory, samples, k, links, noise, Q):  # type: ignore[no-untyped-d
         P[r, r] += Q[r]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def judge_contacts(memory, samples, k, noise, scratch, Q, refused):  # type: ignore[no-untyped-def]
     """Write for sample k how far each zero velocity is believed, which are taken and which the gate refuses.
 
@@ -228,7 +228,7 @@ def judge_contacts(memory, samples, k, noise, scratch, Q, refused):  # type: ign
                 Q[b + 3 + c] += speed2
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: ignore[no-untyped-def]
     """Take all blocks of sample k into the covariance and the correction; False if one is not positive."""
     x, P, dx, R, y, U = memory.x, memory.P, memory.dx, scratch.R, scratch.y, scratch.U
@@ -280,7 +280,7 @@ def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: i
     return good
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-untyped-def]
     """Move the correction into the state, and write that (n, 16) and its headings' deviations (n,)."""
     x, P, dx, R = memory.x, memory.P, memory.dx, scratch.R
@@ -302,7 +302,7 @@ def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-unty
         copy_row(x[i], nominal[i])
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def measure_joints(x, links, scratch, residual):  # type: ignore[no-untyped-def]
     """Write how far both ends of each joint are apart (J,), m, in states x (n, 16) turned by `scratch.R`."""
     y = scratch.y
@@ -314,7 +314,7 @@ def measure_joints(x, links, scratch, residual):  # type: ignore[no-untyped-def]
         residual[j] = np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2)
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def advance(  # type: ignore[no-untyped-def]
     memory, samples, k, links, noise, scratch, record, slot, output, row
 ):
@@ -332,7 +332,7 @@ def advance(  # type: ignore[no-untyped-def]
     return good
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def keep_state(memory, row):  # type: ignore[no-untyped-def]
     """Write the state into one row (`row_length`,), of P what is on and below the diagonal."""
     x, before, P, at = memory.x, memory.before, memory.P, 0
@@ -350,7 +350,7 @@ def keep_state(memory, row):  # type: ignore[no-untyped-def]
         at += r + 2
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def restore_state(memory, row):  # type: ignore[no-untyped-def]
     """The way back of `keep_state`; above the diagonal P stays as it is."""
     x, before, P, at = memory.x, memory.before, memory.P, 0
@@ -410,7 +410,7 @@ def filter_segments(  # type: ignore[no-untyped-def]
     )
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def run_segments(  # type: ignore[no-untyped-def]
     memory, samples, links, noise, record, output, kept, length, smoothing, scratch, adjoint,
 ):  # fmt: skip
@@ -455,7 +455,7 @@ def run_segments(  # type: ignore[no-untyped-def]
     return -1
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def measure_smoothed(states, links, scratch, residual):  # type: ignore[no-untyped-def]
     """Write how far the two ends of each joint are apart in states (K, n, 16), (K, J), m."""
     for k in range(states.shape[0]):

@@ -10,7 +10,15 @@ from __future__ import annotations
 
 import numba
 
-from sagittal.core.body.erkf.lanes import IN_LINE, mix, read_columns, read_lanes, write_columns, write_lanes
+from sagittal.core.body.erkf.lanes import (
+    IN_LINE,
+    STEP,
+    mix,
+    read_columns,
+    read_lanes,
+    write_columns,
+    write_lanes,
+)
 from sagittal.core.frames import GRAVITY
 from sagittal.core.rotation.compiled import (
     multiply3,
@@ -20,13 +28,13 @@ from sagittal.core.rotation.compiled import (
     to_matrix,
     turn,
 )
-from sagittal.core.signals.inner import inner_njit
+from sagittal.core.signals.inner import UNCOUNTED, inner_njit
 
 A, S, D, GAMMA, C = range(5)
 """Blocks of F per IMU, δv'=δv+A δθ+D δb_g+C δb_a, δp'=δp+Δt δv+½Δt(δv'−δv), δθ'=S δθ+Γ δb_g."""
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-untyped-def]
     """Advance one IMU's nominal state x (16,) and write its blocks F (5, 3, 3) and new matrix R (3, 3).
 
@@ -65,7 +73,7 @@ def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-unty
             F[C, i, j] = -dt * (first * start[i, j] + last * R[i, j])
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def reset_before(F, d):  # type: ignore[no-untyped-def]
     """Fold the reset Jacobian G = 1 − ½[δθ̂]× of the last correction (eq 27) into A and S: F ← F G."""
     a, b, c = 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]
@@ -77,7 +85,7 @@ def reset_before(F, d):  # type: ignore[no-untyped-def]
             F[k, i, 2] = z - (x * b - y * a)
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
     """P ← F P Fᵀ, on and below the diagonal, for the blocks F (n, 5, 3, 3) of n IMUs with m errors each.
 
@@ -93,15 +101,15 @@ def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
                 P[c, r] = P[r, c]
         move_rows(P, F[j], b, m, dt, half)
     for j in range(N // m):
-        for r in range(j * m, N, IN_LINE):
+        for r in range(j * m, N, STEP):
             move_columns(P, F[j], r, j * m, m, dt, half)
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def move_rows(P, f, b, m, dt, half):  # type: ignore[no-untyped-def]
     """The rows of one IMU, whose errors begin at b, up to the end of its block."""
     a, s, d, g, e = f[A], f[S], f[D], f[GAMMA], f[C]
-    for c in range(0, b + m, IN_LINE):
+    for c in range(0, b + m, STEP):
         t0, t1, t2 = read_lanes(P, b + 6, c), read_lanes(P, b + 7, c), read_lanes(P, b + 8, c)
         if m == 15:
             g0, g1, g2 = read_lanes(P, b + 9, c), read_lanes(P, b + 10, c), read_lanes(P, b + 11, c)
@@ -118,9 +126,9 @@ def move_rows(P, f, b, m, dt, half):  # type: ignore[no-untyped-def]
             write_lanes(P, b + 6 + i, c, turned)
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def move_columns(P, f, r, b, m, dt, half):  # type: ignore[no-untyped-def]
-    """Eight rows from r on, in the columns of the IMU whose errors begin at b."""
+    """As many rows as lanes have numbers from r on, in the columns of the IMU whose errors begin at b."""
     a, s, d, g, e = f[A], f[S], f[D], f[GAMMA], f[C]
     p0, p1, p2, v0, v1, v2, t0, t1 = read_columns(P, r, b)
     # of 15 columns the second eight begin with t1, of 9 with p1
@@ -144,7 +152,7 @@ def move_columns(P, f, r, b, m, dt, half):  # type: ignore[no-untyped-def]
         write_columns(P, r, b + 1, (p1, p2, v0, v1, v2, y0, y1, y2))
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def propagate_error(d, F, m, dt):  # type: ignore[no-untyped-def]
     """δ ← F δ, the same step for one error (N,)."""
     for j in range(len(d) // m):
@@ -163,7 +171,7 @@ def propagate_error(d, F, m, dt):  # type: ignore[no-untyped-def]
             x[6 + i] = turned
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def propagate_back(lam, F, m, dt):  # type: ignore[no-untyped-def]
     """λ ← Fᵀ λ, the same step for the smoother."""
     for j in range(len(lam) // m):

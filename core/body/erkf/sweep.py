@@ -8,17 +8,17 @@ from __future__ import annotations
 from sagittal.core.body.erkf.predict import propagate_back, propagate_error
 from sagittal.core.body.erkf.updates import back_correct
 from sagittal.core.rotation.compiled import turn
-from sagittal.core.signals.inner import inner_njit
+from sagittal.core.signals.inner import UNCOUNTED, inner_njit
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def copy_row(source, target):  # type: ignore[no-untyped-def]
     """Write one row (k,) over another; numba compiles this in a tenth of the time of `target[:] = source`."""
     for c in range(len(target)):
         target[c] = source[c]
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def sweep_back(lam, step, record, m, swept):  # type: ignore[no-untyped-def]
     """Sweep λ (N,) back over a recorded segment; `swept` (K, N): λ of each sample before its blocks."""
     for k in range(len(step) - 1, -1, -1):
@@ -28,7 +28,7 @@ def sweep_back(lam, step, record, m, swept):  # type: ignore[no-untyped-def]
         propagate_back(lam, record.F[k], m, step[k])
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def multiply_lower(P, lam, d):  # type: ignore[no-untyped-def]
     """d ← −P λ, of P only what is on and below the diagonal."""
     d[:] = 0.0
@@ -39,7 +39,7 @@ def multiply_lower(P, lam, d):  # type: ignore[no-untyped-def]
         d[r] -= P[r, r] * lam[r]
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def move_smoothed(d, step, record, m, swept, out):  # type: ignore[no-untyped-def]
     """Turn a segment's filtered states `out` (K, n, 16) into smoothed ones.
 

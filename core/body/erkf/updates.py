@@ -12,9 +12,9 @@ from math import atan2, sqrt
 
 import numba
 
-from sagittal.core.body.erkf.lanes import IN_LINE, mix, read_lanes, spread, write_lanes
+from sagittal.core.body.erkf.lanes import STEP, mix, read_lanes, spread, write_lanes
 from sagittal.core.rotation.compiled import skew, times_cross, wrap_angle
-from sagittal.core.signals.inner import inner_njit
+from sagittal.core.signals.inner import UNCOUNTED, inner_njit
 
 FIRST, SECOND, UNIT, TURNS = range(4)
 """A block's place: first error of its IMUs (SECOND is −1 for one IMU), offset of the ±1 (−1: none), whether
@@ -24,7 +24,7 @@ POSITION, VELOCITY = 0, 3
 """Offsets in an IMU's errors."""
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def turn_apart(R, i, j, ri, rj, y):  # type: ignore[no-untyped-def]
     """Write R_j r_j − R_i r_i (3,)."""
     for k in range(3):
@@ -32,7 +32,7 @@ def turn_apart(R, i, j, ri, rj, y):  # type: ignore[no-untyped-def]
         y[k] -= R[i, k, 0] * ri[0] + R[i, k, 1] * ri[1] + R[i, k, 2] * ri[2]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-untyped-def]
     """Joint centre p_i + R_i r_i = p_j + R_j r_j, or with centre False joint axis R_i e_i = R_j e_j."""
     place[FIRST], place[SECOND] = i * m, j * m
@@ -45,7 +45,7 @@ def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-u
             y[k] += x[j, k] - x[i, k]
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
     """Variance of the joint centre's second-order term, ½ σ⁴ |r_xy|² of both levers, in m².
 
@@ -69,7 +69,7 @@ def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def
     return min(0.5 * var * var, 1.5) * reach
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def velocity_rows(v, m, i, place, y):  # type: ignore[no-untyped-def]
     """Zero velocity: the error of v (3,) itself is observed."""
     place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, VELOCITY, 0
@@ -77,7 +77,7 @@ def velocity_rows(v, m, i, place, y):  # type: ignore[no-untyped-def]
         y[k] = -v[k]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def tilt_rows(R, f, m, i, place, H, y):  # type: ignore[no-untyped-def]
     """Tilt: Rᵀẑ is the direction of the specific force at rest; δθ: [Rᵀẑ]×."""
     place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, -1, 1
@@ -87,7 +87,7 @@ def tilt_rows(R, f, m, i, place, H, y):  # type: ignore[no-untyped-def]
         y[k] = f[k] * norm - R[2, k]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-untyped-def]
     """Heading of the axis t = R f; two empty rows make it a block of three. False when t is near vertical."""
     tx = R[0, 0] * forward[0] + R[0, 1] * forward[1] + R[0, 2] * forward[2]
@@ -105,7 +105,7 @@ def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-un
     return True
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def complete_rows(P, first):  # type: ignore[no-untyped-def]
     """Copy what is below the diagonal of P into its rows first … first + 2, so that they are whole."""
     for q in range(3):
@@ -115,13 +115,13 @@ def complete_rows(P, first):  # type: ignore[no-untyped-def]
         P[first, c], P[first + 1, c], P[first + 2, c] = P[c, first], P[c, first + 1], P[c, first + 2]
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def take_rows(P, place, H, V, U, taken):  # type: ignore[no-untyped-def]
     """Write H (P − Σ VᵀV) of a block into V[taken], the sum over the blocks before it; U[a]: H V[a]ᵀ."""
     b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
     new = V[taken]
     h, g = H[0], H[1]
-    for c in range(0, P.shape[1], IN_LINE):
+    for c in range(0, P.shape[1], STEP):
         if place[TURNS] == 1:
             x, y, z = read_lanes(P, b + 6, c), read_lanes(P, b + 7, c), read_lanes(P, b + 8, c)
             n0, n1, n2 = mix(h, 0, x, y, z), mix(h, 1, x, y, z), mix(h, 2, x, y, z)
@@ -147,7 +147,7 @@ def take_rows(P, place, H, V, U, taken):  # type: ignore[no-untyped-def]
         write_lanes(new, 2, c, n2)
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyped-def]
     """Take one block into dx, but not yet into P; False if S is not positive.
 
@@ -217,7 +217,7 @@ def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyp
     e0 = y[0] * i0
     e1 = (y[1] - l10 * e0) * i1
     e2 = (y[2] - l20 * e0 - l21 * e1) * i2
-    for c in range(0, new.shape[1], IN_LINE):
+    for c in range(0, new.shape[1], STEP):
         v0 = i0 * read_lanes(new, 0, c)
         v1 = i1 * (read_lanes(new, 1, c) - l10 * v0)
         v2 = i2 * (read_lanes(new, 2, c) - l20 * v0 - l21 * v1)
@@ -231,18 +231,18 @@ def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyp
     return True
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def subtract_blocks(P, V, blocks):  # type: ignore[no-untyped-def]
     """P ← P − Σ VᵀV on and below the diagonal, four rows and two lines at a time; V (≥ blocks, 3, as P).
 
     A row is run through up to two whole lines of the cache; what is above the diagonal means nothing. P has
     rows to spare (`memory_of`).
     """
-    last = P.shape[1] - IN_LINE
+    last = P.shape[1] - STEP
     for r in range(0, P.shape[0], 4):
-        for c in range(0, r + 4, 2 * IN_LINE):
+        for c in range(0, r + 4, 2 * STEP):
             # in the last pair the second line may be the first again
-            e = min(c + IN_LINE, last)
+            e = min(c + STEP, last)
             p0, p1 = read_lanes(P, r, c), read_lanes(P, r + 1, c)
             p2, p3 = read_lanes(P, r + 2, c), read_lanes(P, r + 3, c)
             q0, q1 = read_lanes(P, r, e), read_lanes(P, r + 1, e)
@@ -273,7 +273,7 @@ def subtract_blocks(P, V, blocks):  # type: ignore[no-untyped-def]
             write_lanes(P, r + 3, e, q3)
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def back_correct(lam, place, H, V, E):  # type: ignore[no-untyped-def]
     """λ ← λ − Hᵀ L⁻ᵀ (V λ + e): one block of the modified Bryson–Frazier smoother
     (docs/science/erkf.md, "Smoother")."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from sagittal.core.body.l7s.updates import WIDTH, inject
 from sagittal.core.body.se3 import move_pose
-from sagittal.core.signals.inner import inner_njit
+from sagittal.core.signals.inner import UNCOUNTED, inner_njit
 
 MOST: Final = 4
 """Rows: two of a leg."""
@@ -50,7 +50,7 @@ def constraint_rows(R, p, leg, half_hip, half_foot, leg_length, C, d, first):  #
     return count
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def _solve(S, d, rows):  # type: ignore[no-untyped-def]
     """d ← S⁻¹ d by Cholesky in the lower triangle of S (4, 4); False if S is singular."""
     for r in range(rows):

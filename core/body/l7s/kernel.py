@@ -8,10 +8,10 @@ import numpy as np
 from sagittal.core.body.l7s.constraints import make_scratch, project
 from sagittal.core.body.l7s.updates import VELOCITY, WIDTH, N, apply_rows, inject, make_form, reset
 from sagittal.core.rotation.compiled import log_so3
-from sagittal.core.signals.inner import inner_njit
+from sagittal.core.signals.inner import UNCOUNTED, inner_njit
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def predict(R, p, v, P, acc, dt, q_acc, q_turn, printed, turned, factors, n):  # type: ignore[no-untyped-def]
     """Move the mean by eq 3–4 with ω = 0 and P by eq 5 (docs/science/l7s.md, "Prediction").
 
@@ -58,7 +58,7 @@ def predict(R, p, v, P, acc, dt, q_acc, q_turn, printed, turned, factors, n):  #
             P[WIDTH * (phi + j) + rho + k] -= h * omega[i]
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def _add_rows(P, factors, n):  # type: ignore[no-untyped-def]
     """P ← F P; F differs from 1 in the rows ρ and reads of ν and φ."""
     for b in range(3):
@@ -74,7 +74,7 @@ def _add_rows(P, factors, n):  # type: ignore[no-untyped-def]
                 )  # fmt: skip
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def _add_columns(P, factors):  # type: ignore[no-untyped-def]
     """P ← P Fᵀ of F times a symmetric matrix: the result is symmetric, so that most of it is copied."""
     for b in range(3):
@@ -93,7 +93,7 @@ def _add_columns(P, factors):  # type: ignore[no-untyped-def]
                     P[WIDTH * (VELOCITY + 3 * c + k) + column] = P[WIDTH * column + VELOCITY + 3 * c + k]
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def _relative(a, b, out):  # type: ignore[no-untyped-def]
     """Write aᵀ b (3, 3)."""
     for i in range(3):
@@ -101,7 +101,7 @@ def _relative(a, b, out):  # type: ignore[no-untyped-def]
             out[i, j] = a[0, i] * b[0, j] + a[1, i] * b[1, j] + a[2, i] * b[2, j]
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def _write_rows(group, R, p, v, measured, z_variance, heights, r, form, turned):  # type: ignore[no-untyped-def]
     """Write three rows of the measurement into `form`; return how many triples of ε they read.
 
@@ -164,7 +164,7 @@ def _write_rows(group, R, p, v, measured, z_variance, heights, r, form, turned):
     return 3
 
 
-@inner_njit(error_model="numpy", _nrt=False)
+@inner_njit(error_model="numpy", **UNCOUNTED)
 def apply_measurement(  # type: ignore[no-untyped-def]
     R, p, v, P, measured, three, step, z_variance, heights, r, dx, form, work
 ):

@@ -15,7 +15,7 @@ from typing import Final
 import numba
 import numpy as np
 
-from sagittal.core.signals.inner import inner_njit
+from sagittal.core.signals.inner import UNCOUNTED, inner_njit
 
 SIZE: Final = 9
 """Places of a node: pelvis, left foot, right foot."""
@@ -27,7 +27,7 @@ _WIDTH: Final = 12
 """Of a row of [B g], filled up."""
 
 
-@inner_njit(error_model="numpy", _nrt=False)
+@inner_njit(error_model="numpy", **UNCOUNTED)
 def _combine(factors, apart, rows, width, base, out, n):  # type: ignore[no-untyped-def]
     """Write the first n of `base` and of nine rows, so wide, each times its factor; those lie `apart`."""
     a, b, c = factors[0], factors[apart], factors[2 * apart]
@@ -41,7 +41,7 @@ def _combine(factors, apart, rows, width, base, out, n):  # type: ignore[no-unty
         )  # fmt: skip
 
 
-@inner_njit(error_model="numpy", _nrt=False)
+@inner_njit(error_model="numpy", **UNCOUNTED)
 def _sweep(A, column):  # type: ignore[no-untyped-def]
     """Write −A⁻¹ over the lower triangle of A (81,); False if A is not positive definite."""
     for k in range(SIZE):
@@ -62,7 +62,7 @@ def _sweep(A, column):  # type: ignore[no-untyped-def]
     return True
 
 
-@inner_njit(error_model="numpy", _nrt=False)
+@inner_njit(error_model="numpy", **UNCOUNTED)
 def _add_legs(x, R, k, still, spread, lengths, A, B):  # type: ignore[no-untyped-def]
     """Add the rows of both legs at node k: hinge, leg that carries, leg too long.
 

@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from sagittal.core.body.se3 import move_pose, right_jacobian
-from sagittal.core.signals.inner import inner_njit
+from sagittal.core.signals.inner import UNCOUNTED, inner_njit
 
 N = 27
 """Length of the error vector."""
@@ -34,7 +34,7 @@ def make_form():  # type: ignore[no-untyped-def]
     return np.zeros(3, np.int64), np.zeros((3, 9)), np.zeros(3), np.zeros(3), np.zeros(3 * WIDTH)
 
 
-@inner_njit(error_model="numpy", _nrt=False)
+@inner_njit(error_model="numpy", **UNCOUNTED)
 def apply_rows(P, dx, triples, form):  # type: ignore[no-untyped-def]
     """Three rows of the stacked update, P at the end: fetching it costs more than the arithmetic.
 
@@ -112,7 +112,7 @@ def reset(P, dx, blocks):  # type: ignore[no-untyped-def]
             P[WIDTH * j + i] = mean
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def _turn_rows(P, blocks, n):  # type: ignore[no-untyped-def]
     """P ← Φ P."""
     for b in range(3):
@@ -132,7 +132,7 @@ def _turn_rows(P, blocks, n):  # type: ignore[no-untyped-def]
             rows[j + 5 * WIDTH] = J[2, 0] * x + J[2, 1] * y + J[2, 2] * z
 
 
-@inner_njit(_nrt=False)
+@inner_njit(**UNCOUNTED)
 def _transpose(P, n):  # type: ignore[no-untyped-def]
     """P ← Pᵀ."""
     for i in range(n):

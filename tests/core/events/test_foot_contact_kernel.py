@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sagittal.core.events import contact_moments_kernel as moments
 from sagittal.core.events import foot_contact_kernel as kernel
 from sagittal.core.events.foot_contact import FootContactParams, FootContactState
 from sagittal.core.events.foot_contact_kernel import (
@@ -61,15 +62,15 @@ def test_every_parameter_arrives_under_its_name() -> None:
 def test_samples_are_found_in_a_ring() -> None:
     ring = np.array([4.0, 5.0, 1.0, 3.0])
     # samples 6, 7, 4, 5 … of the take: 1, 3 are the older ones
-    assert kernel._rate(ring, 3, 10.0) == 10.0
-    assert kernel._rate(ring, 2, 10.0) == 20.0
-    assert kernel._deepest(np.array([3.0, 1.0, 2.0, 2.5]), 10.0, 0, 2) == (0, -20.0)
-    assert kernel._highest(ring, 2, 5) == 5
-    assert kernel._lowest(ring, 2, 5) == 2
+    assert moments.rate_at(ring, 3, 10.0) == 10.0
+    assert moments.rate_at(ring, 2, 10.0) == 20.0
+    assert moments.deepest(np.array([3.0, 1.0, 2.0, 2.5]), 10.0, 0, 2) == (0, -20.0)
+    assert moments.highest(ring, 2, 5) == 5
+    assert moments.lowest(ring, 2, 5) == 2
     acc = np.zeros((4, 3))
     acc[1] = (2.0, 3.0, 6.0)
-    assert kernel._knock(acc, 5, 1) == 7.0
-    assert kernel._knock(acc, 6, 2) == 0.0
+    assert moments.knock_at(acc, 5, 1) == 7.0
+    assert moments.knock_at(acc, 6, 2) == 0.0
 
 
 def stride() -> tuple[Floats, int, int]:
@@ -80,7 +81,7 @@ def stride() -> tuple[Floats, int, int]:
 
 def test_a_clear_landing_is_where_the_slap_begins() -> None:
     pitch, bottom, top = stride()
-    at, sd = kernel._landing(pitch, NO_ACC, top, bottom, top + 15, False, RATE, rule())
+    at, sd = moments.refine_landing(pitch, NO_ACC, top, bottom, top + 15, False, RATE, rule())
     assert at / RATE == pytest.approx(true_moments(1, PARAMS)[1][0], abs=1.5e-3)
     assert sd == PARAMS.contact_sd_s
 
@@ -88,10 +89,10 @@ def test_a_clear_landing_is_where_the_slap_begins() -> None:
 def test_a_knock_pulls_the_landing_towards_it_and_widens_its_uncertainty() -> None:
     pitch, bottom, top = stride()
     acc = NO_ACC.copy()
-    alone, _ = kernel._landing(pitch, acc, top, bottom, top + 15, False, RATE, rule())
+    alone, _ = moments.refine_landing(pitch, acc, top, bottom, top + 15, False, RATE, rule())
     knock = top + 4
     acc[knock:] = (0.0, 0.0, 30.0)
-    at, sd = kernel._landing(pitch, acc, top, bottom, top + 15, True, RATE, rule())
+    at, sd = moments.refine_landing(pitch, acc, top, bottom, top + 15, True, RATE, rule())
     assert at == pytest.approx(0.5 * (alone + knock - 0.5))
     assert sd == pytest.approx(np.hypot(PARAMS.contact_sd_s, (at - alone) / RATE))
 
@@ -99,21 +100,21 @@ def test_a_knock_pulls_the_landing_towards_it_and_widens_its_uncertainty() -> No
 def test_a_flat_landing_is_where_the_pitch_stops_to_rise() -> None:
     pitch = np.minimum(np.maximum(T - 0.5, 0.0), 0.3)
     top = int(np.argmax(pitch))
-    at, sd = kernel._landing(pitch, NO_ACC, top, 20, top + 15, False, RATE, rule())
+    at, sd = moments.refine_landing(pitch, NO_ACC, top, 20, top + 15, False, RATE, rule())
     assert at == pytest.approx(top - 0.2 + 0.5 - 0.5, abs=1.0)
     assert sd == PARAMS.flat_sd_s
-    still, sd = kernel._landing(np.zeros(len(T)), NO_ACC, 100, 20, 115, False, RATE, rule())
+    still, sd = moments.refine_landing(np.zeros(len(T)), NO_ACC, 100, 20, 115, False, RATE, rule())
     assert np.isnan(still)
     assert sd == PARAMS.late_sd_s
     acc = NO_ACC.copy()
     acc[top + 3 :] = (5.0, 0.0, 0.0)
-    at, sd = kernel._landing(pitch, acc, top, 20, top + 15, True, RATE, rule())
+    at, sd = moments.refine_landing(pitch, acc, top, 20, top + 15, True, RATE, rule())
     assert (at, sd) == (top + 3 - 0.5, PARAMS.flat_sd_s)
 
 
 def test_a_clear_foot_off_is_where_the_push_ends() -> None:
     pitch, bottom, _ = stride()
-    at, sd = kernel._leaving(pitch, bottom, 0, RATE, rule())
+    at, sd = moments.refine_leaving(pitch, bottom, 0, RATE, rule())
     true = true_moments(1, PARAMS)[0][0]
     assert at / RATE == pytest.approx(true, abs=1.5e-3)
     assert sd == pytest.approx(np.hypot(PARAMS.leaving_sd_s, 0.5 * (bottom - at) / RATE))
@@ -131,20 +132,20 @@ def test_a_push_that_shows_nothing_gives_no_foot_off(why: str) -> None:
         end = round((REST_S + PUSH_S) * RATE)
         pitch = np.concatenate((pitch[:end], np.linspace(pitch[end], pitch[end] - 0.01, 20), pitch[end:]))
         bottom = end + 20
-    at, sd = kernel._leaving(pitch, bottom, first, RATE, rule())
+    at, sd = moments.refine_leaving(pitch, bottom, first, RATE, rule())
     assert np.isnan(at)
     assert sd == PARAMS.late_sd_s
 
 
 def test_without_a_dip_the_foot_leaves_some_time_after_it_moves() -> None:
     flat = np.zeros(len(T))
-    assert kernel._leaving_loosely(flat, 50, 90, 0, rule()) == (63, 63.0, 2.0 * PARAMS.loose_sd_s)
-    assert kernel._leaving_loosely(flat, 50, 55, 0, rule())[:2] == (55, 55.0), "not beyond its middle"
+    assert moments.guess_leaving(flat, 50, 90, 0, rule()) == (63, 63.0, 2.0 * PARAMS.loose_sd_s)
+    assert moments.guess_leaving(flat, 50, 55, 0, rule())[:2] == (55, 55.0), "not beyond its middle"
     pitch, bottom, _ = stride()
     start = round(REST_S * RATE)
-    found, at, sd = kernel._leaving_loosely(pitch, start, bottom + 20, 0, rule())
+    found, at, sd = moments.guess_leaving(pitch, start, bottom + 20, 0, rule())
     assert found == bottom
-    assert at == pytest.approx(kernel._leaving(pitch, bottom, 0, RATE, rule())[0])
+    assert at == pytest.approx(moments.refine_leaving(pitch, bottom, 0, RATE, rule())[0])
     assert sd == PARAMS.loose_sd_s
 
 
