@@ -12,6 +12,8 @@ from typing import Final
 
 from cyclopts import App, CycloptsError, Parameter
 
+from sagittal import __version__
+
 COMMANDS: Final = {
     "serve": "Run the web server and its workers.",
     "worker": "Run one worker on the data folder of a server, on another computer too.",
@@ -91,7 +93,7 @@ def make_app() -> App:
     app = App(
         name="sagittal",
         help="Gait analysis from body-worn IMUs. Not a medical device.",
-        version=_version,
+        version=f"sagittal {__version__}",
         version_flags=["--version"],
         help_format="plaintext",
         help_formatter="plain",
@@ -101,15 +103,6 @@ def make_app() -> App:
         function = name.replace("-", "_")
         app.command(f"sagittal.server.commands.{function}:{function}", name=name, help=text)
     return app
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return f"sagittal {version('sagittal')}"
-    except PackageNotFoundError:
-        return "sagittal (source tree)"
 
 
 if __name__ == "__main__":
