@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Analysis", "Notice", "Recording", "SagittalError", "SimulatedWalk", "analyse", "read", "simulate"]
 
+__version__ = "0.2.0"
+
 _DIRECTORY = Path(__file__).parent
 if (_DIRECTORY / "core").is_file():
     raise ImportError(

@@ -21,6 +21,8 @@ def create_app(settings: Settings) -> FastAPI:
     ------
     UndeclaredRouteError
         a route declares no action.
+    UnknownViserError
+        the installed viser lacks what the 3D views need.
     """
     # the web stack and its routes take seconds to import: only who builds an application waits for them
     from fastapi import FastAPI
@@ -37,6 +39,9 @@ def create_app(settings: Settings) -> FastAPI:
     from sagittal.server.nodes.forwarding import Forwarding
     from sagittal.server.nodes.known import KnownNodes
     from sagittal.server.provenance import CODE_VERSION
+    from sagittal.server.viewer.viser_adapter import require_known_viser
+
+    require_known_viser()
 
     metrics = RequestMetrics()
     app = FastAPI(

@@ -1,15 +1,8 @@
 """Which version of the code makes the numbers."""
 
-from importlib.metadata import PackageNotFoundError, version
 from typing import Final
 
+from sagittal import __version__
 
-def _version() -> str:
-    try:
-        return version("sagittal")
-    except PackageNotFoundError:
-        return "source"
-
-
-CODE_VERSION: Final = _version()
-"""Version of the installed distribution; "source" when run from a tree that is not installed."""
+CODE_VERSION: Final = __version__
+"""Version of this source, also where an older one was installed in its place as editable."""

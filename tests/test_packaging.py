@@ -1,17 +1,27 @@
-"""What is shipped: the Dockerfile by the rules (it is read, not built), the wheel's contents, the licence."""
+"""What is shipped: the Dockerfile by the rules (it is read, not built), wheel and sdist, version, licence."""
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import re
+import shutil
+import subprocess
+import sys
+import tarfile
 import tomllib
+import zipfile
+from collections.abc import Mapping
 from importlib import metadata
+from pathlib import Path
 
 import pytest
+import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
+import sagittal
 from tests.data import ROOT
 
 DOCKERFILE = (ROOT / "Dockerfile").read_text("utf-8")
@@ -101,3 +111,143 @@ def test_the_image_installs_nothing_without_its_hash_and_lists_what_is_in_it() -
     for name in LOCKS:
         assert f"--require-hashes -r {name}" in DOCKERFILE
     assert "cyclonedx-py environment" in DOCKERFILE
+
+
+BUILD = """
+import sys
+from hatchling.build import build_sdist, build_wheel
+print({"wheel": build_wheel, "sdist": build_sdist}[sys.argv[1]](sys.argv[2]))
+"""
+
+
+def build(kind: str, tree: Path, folder: Path) -> Path:
+    """Build a wheel or an sdist of a tree by hatchling, as pip does without isolation."""
+    if importlib.util.find_spec("hatchling") is None:
+        pytest.skip("hatchling is not installed")
+    folder.mkdir()
+    done = subprocess.run(
+        [sys.executable, "-c", BUILD, kind, str(folder)],
+        cwd=tree,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return folder / done.stdout.split()[-1]
+
+
+def list_wheel(wheel: Path) -> set[str]:
+    with zipfile.ZipFile(wheel) as archive:
+        return set(archive.namelist())
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build("wheel", ROOT, tmp_path_factory.mktemp("built") / "wheel")
+
+
+@pytest.mark.slow
+def test_the_wheel_has_one_package_with_all_that_it_reads(wheel: Path) -> None:
+    names = list_wheel(wheel)
+    information = f"sagittal-{sagittal.__version__}.dist-info"
+    assert {name.split("/")[0] for name in names} == {"sagittal", information}
+    for folder in ("core", "server", "web"):
+        tracked = {
+            f"sagittal/{path.relative_to(ROOT).as_posix()}"
+            for path in (ROOT / folder).rglob("*")
+            if path.is_file() and "__pycache__" not in path.parts and path.suffix not in {".nbi", ".nbc"}
+        }
+        left_out = {f"sagittal/web/{name}" for name in ("dom.d.ts", "eslint.config.mjs", "jsconfig.json")}
+        assert tracked - names <= left_out
+    migrations = {path.name for path in (ROOT / "migrations/versions").glob("0*.py")}
+    assert {
+        Path(name).name for name in names if name.startswith("sagittal/server/migrations/versions/0")
+    } == (migrations)
+    assert {"sagittal/py.typed", "sagittal/web/texts/de.po", f"{information}/licenses/LICENSE"} <= names
+    assert any(name.startswith("sagittal/web/templates/") for name in names)
+
+
+@pytest.mark.slow
+def test_an_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
+    """Also where the links have become folders, as in an archive of a clone."""
+    sdist = build("sdist", ROOT, tmp_path / "sdist")
+    with tarfile.open(sdist) as archive:
+        assert not [member.name for member in archive if member.issym() or member.islnk()]
+        archive.extractall(tmp_path, filter="data")
+    again = build("wheel", tmp_path / f"sagittal-{sagittal.__version__}", tmp_path / "again")
+    assert list_wheel(again) == list_wheel(wheel)
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel as pip lays it out, beside everything that it needs."""
+    folder = tmp_path_factory.mktemp("site")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder)  # noqa: S202 - our own
+    return folder
+
+
+def run_in(folder: Path, code: str, site: Path) -> subprocess.CompletedProcess[str]:
+    # -m puts the folder one stands in first, as an interactive Python and a notebook do
+    code = f"import sys; sys.path.insert(0, {str(site)!r}); sys.path.insert(0, {str(folder)!r}); {code}"
+    return subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.slow
+def test_a_folder_of_somebody_with_a_core_a_server_and_a_web_is_not_in_the_way(
+    installed: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "core").mkdir()
+    (tmp_path / "web").mkdir()
+    for name in ("core/__init__.py", "server.py", "web/__init__.py"):
+        (tmp_path / name).write_text("raise RuntimeError('somebody else')\n")
+    code = (
+        "import sagittal, sagittal.core.pipeline, sagittal.server.app; "
+        "from sagittal.server.main import main; main(['--version']); print(sagittal.__file__)"
+    )
+    done = run_in(tmp_path, code, installed)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split("\n")[:2] == [
+        f"sagittal {sagittal.__version__}", str(installed / "sagittal/__init__.py"),
+    ]  # fmt: skip
+
+
+def test_a_clone_whose_links_are_texts_says_what_to_do(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "sagittal", tmp_path / "sagittal", symlinks=True)
+    (tmp_path / "sagittal/core").unlink()
+    (tmp_path / "sagittal/core").write_text("../core")
+    done = run_in(tmp_path, "import sagittal", tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith("ImportError: ")
+    assert "git config core.symlinks true" in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.slow
+def test_pyright_finds_every_import_of_the_wheel(installed: Path, tmp_path: Path) -> None:
+    if importlib.util.find_spec("pyright") is None:
+        pytest.skip("pyright is not installed")
+    names = sorted(path.relative_to(installed) for path in (installed / "sagittal").rglob("*.py"))
+    modules = [".".join(name.with_suffix("").parts).removesuffix(".__init__") for name in names]
+    code = "".join(f"import {module}\n" for module in modules if "migrations" not in module)
+    (tmp_path / "all.py").write_text(code)
+    config = {"extraPaths": [str(installed)], "include": ["all.py"], "typeCheckingMode": "off"}
+    config["reportMissingImports"] = "error"
+    (tmp_path / "pyrightconfig.json").write_text(json.dumps(config))
+    done = subprocess.run(
+        [sys.executable, "-m", "pyright", "--pythonpath", sys.executable, "-p", str(tmp_path)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+
+
+def test_version_and_citation_are_those_of_the_code() -> None:
+    assert PROJECT["tool"]["hatch"]["version"] == {"path": "sagittal/__init__.py"}
+    citation: Mapping[str, object] = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    assert citation["cff-version"] == "1.2.0"
+    assert citation["version"] == str(Version(sagittal.__version__)) == sagittal.__version__
+    assert citation["authors"] == [{"name": "Sagittal contributors"}]
+    assert citation["license"] == PROJECT["project"]["license"]
+    assert f"## {sagittal.__version__}" in (ROOT / "CHANGELOG.md").read_text("utf-8")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 from contextlib import closing
-from pathlib import Path
 
+from sagittal.server.commands.options import DataDir
 from sagittal.server.settings import load_settings
 
 
-def accept(data_dir: Path | None) -> int:
+def accept(*, data_dir: DataDir = None) -> int:
     """Trust the database from now on; 1 when it cannot be used."""
     from sagittal.server.safekeeping import custody
     from sagittal.server.storage.blob_opening import open_blobs

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import sys
 from contextlib import closing
-from pathlib import Path
 
+from sagittal.server.commands.options import DataDir
 from sagittal.server.settings import Settings, load_settings
 
 
-def adopt(data_dir: Path | None, take: str | None, session: str | None) -> int:
-    """List the logs, or make `take` a recording of `session`; 1 when that is not possible."""
+def adopt(take: str | None = None, /, *, session: str | None = None, data_dir: DataDir = None) -> int:
+    """List the logs, or make `take` a recording of `session`; 1 when that is not possible.
+
+    Parameters
+    ----------
+    take
+        one of the list
+    session
+        the session's page, or its id
+    """
     from sagittal.server.errors import ServiceError
     from sagittal.server.storage.migrate import MigrationError, require_current
 

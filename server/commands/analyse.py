@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import sys
 from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
 from sagittal.core.errors import InputError, SagittalError
 from sagittal.core.formats.json_tree import read_json
+from sagittal.server.commands.options import Manifest, Take
 from sagittal.server.processes.compiling import OFFLINE, compile_filters_once, is_compiling
 from sagittal.server.report.files import activity_files
 from sagittal.server.report.words.estimator import estimator_view
@@ -19,9 +19,11 @@ from sagittal.server.storage.compile_cache import has_compiled_filters
 
 
 def analyse(
-    paths: Sequence[Path],
-    manifest: Path | None,
+    paths: Take,
+    /,
+    *,
     out: Path,
+    manifest: Manifest = None,
     estimator: str = "auto",
     config: Path | None = None,
 ) -> int:
@@ -29,8 +31,12 @@ def analyse(
 
     Parameters
     ----------
-    estimator : of the poses, "auto" for the best that the sensors allow. config : JSON file with overrides of
-        parameters by stage, as the API takes them.
+    out
+        folder for the results
+    estimator
+        pose estimator; auto = the best for the sensors worn (docs/reference/estimators.md lists them)
+    config
+        JSON: parameters by stage, {"poses": {"least_valid": 0.7}}
 
     Returns
     -------

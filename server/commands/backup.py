@@ -5,12 +5,33 @@ from __future__ import annotations
 import sys
 from contextlib import closing
 from pathlib import Path
+from typing import Annotated
 
+from cyclopts import Parameter
+
+from sagittal.server.commands.options import DataDir
 from sagittal.server.settings import load_settings
 
 
-def backup(data_dir: Path | None, target: Path, key: Path | None, prune: bool) -> int:
-    """Make one backup; 1 when there is none, or when a stored file was already gone or damaged."""
+def backup(
+    target: Annotated[Path, Parameter(metavar="DIR|FILE")],
+    /,
+    *,
+    key: Path | None = None,
+    prune: bool = False,
+    data_dir: DataDir = None,
+) -> int:
+    """Make one backup; 1 when there is none, or when a stored file was already gone or damaged.
+
+    Parameters
+    ----------
+    target
+        a folder of backups, or the file to write
+    key
+        encrypt it (`sagittal keygen`)
+    prune
+        then keep 7 days, 4 weeks and 12 months of that folder
+    """
     from sagittal.server.safekeeping import backups
     from sagittal.server.safekeeping.tombstones import TombstoneError
     from sagittal.server.storage.archive import BackupFileError, read_key

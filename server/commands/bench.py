@@ -6,7 +6,9 @@ import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
 
 from sagittal.server.storage import fs
 
@@ -24,8 +26,30 @@ Row = tuple[str, str, tuple[float | None, ...], str]
 """Algorithm, recording, three errors in ° without and three with the gyroscope's static bias, reason."""
 
 
-def bench(what: str, folder: Path | None, show_list: bool, out: Path | None, every: bool) -> int:
-    """List the algorithms, or score each on every recording of a folder; 1 = no recording, 2 = no folder."""
+def bench(
+    what: Literal["fusion"],
+    folder: Path | None = None,
+    /,
+    *,
+    show_list: Annotated[bool, Parameter(name="--list")] = False,
+    out: Annotated[Path | None, Parameter(metavar="CSV")] = None,
+    every: bool = False,
+) -> int:
+    """List the algorithms, or score each on every recording of a folder; 1 = no recording, 2 = no folder.
+
+    Parameters
+    ----------
+    what
+        fusion: orientation filters of one sensor
+    folder
+        recordings (docs/science/filters.md)
+    show_list
+        list them, with their sources
+    out
+        write every score into a file
+    every
+        print every recording instead of their mean
+    """
     if show_list:
         sys.stdout.write(_table(_list_algorithms()))
         return 0

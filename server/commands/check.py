@@ -5,14 +5,21 @@ from __future__ import annotations
 import sys
 from contextlib import closing
 from pathlib import Path
+from typing import Annotated
 
+from cyclopts import Parameter
+
+from sagittal.server.commands.options import DataDir
 from sagittal.server.settings import load_settings
 
 
-def check(data_dir: Path | None, head: Path | None = None) -> int:
+def check(*, head: Annotated[Path | None, Parameter(metavar="JSON")] = None, data_dir: DataDir = None) -> int:
     """Check database, stored files, live logs, trash, audit chain, encrypted values; 1 if something is wrong.
 
-    `head`: a file of the audit log's newest row as it once was, kept elsewhere.
+    Parameters
+    ----------
+    head
+        newest audit row as it was, kept elsewhere
     """
     from sagittal.server.safekeeping import checks
     from sagittal.server.storage.blob_opening import open_blobs

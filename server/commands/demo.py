@@ -13,6 +13,7 @@ from pathlib import Path
 
 from sqlalchemy import func, select
 
+from sagittal.server.commands.options import Whole
 from sagittal.server.commands.serve import run, say
 from sagittal.server.processes.compiling import is_compiling
 from sagittal.server.settings import load_settings
@@ -22,8 +23,14 @@ from sagittal.server.storage.db import Database, Source
 DEMO_WORKERS = 2
 
 
-def demo(port: int | None) -> int:
-    """Serve a clinic of simulated patients on 127.0.0.1 until Ctrl-C; the folder is removed at the end."""
+def demo(*, port: Whole | None = None) -> int:
+    """Serve a clinic of simulated patients on 127.0.0.1 until Ctrl-C; the folder is removed at the end.
+
+    Parameters
+    ----------
+    port
+        port on 127.0.0.1 (default: a free one)
+    """
     from sagittal.server.auth import accounts, one_time
     from sagittal.server.auth.passwords import hash_password
     from sagittal.server.auth.roles import Role

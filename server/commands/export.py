@@ -4,17 +4,34 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from sagittal.core.errors import InputError, SagittalError
 from sagittal.server.storage import fs
 
 
-def export(folder: Path, kind: str, out: Path | None, code: str) -> int:
-    """Write the results in `folder`, of `sagittal analyse`, in one format; 1 = not possible.
+def export(
+    folder: Path,
+    /,
+    *,
+    kind: Annotated[str, Parameter(name="--as", metavar="FORMAT")],
+    out: Path | None = None,
+    code: str = "",
+) -> int:
+    """Write the results in `folder` in one format; 1 = not possible.
 
     Parameters
     ----------
-    out : file to write, None = `export-<format>.<ending>` in that folder. code : pseudonym of the person.
+    folder
+        results of `sagittal analyse`
+    kind
+        xlsx, csv … (docs/reference/exports.md)
+    out
+        file to write (default: export-<format>.<ending> there)
+    code
+        pseudonym of the person, letters and digits
     """
     from sagittal.server.export.content import VisitFacts, open_content
     from sagittal.server.export.kinds import EXPORTED, find_kind, write_export

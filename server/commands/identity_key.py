@@ -5,12 +5,31 @@ from __future__ import annotations
 import sys
 from contextlib import closing
 from pathlib import Path
+from typing import Literal
 
+from sagittal.server.commands.options import DataDir
 from sagittal.server.settings import load_settings
 
 
-def identity_key(data_dir: Path | None, what: str, really: bool, without_key: bool) -> int:
-    """Make the key, change it, or list and remove what it does not open; 1 when that is not possible."""
+def identity_key(
+    what: Literal["make", "change", "discard"],
+    /,
+    *,
+    really: bool = False,
+    without_key: bool = False,
+    data_dir: DataDir = None,
+) -> int:
+    """Make the key, change it, or list and remove what it does not open; 1 when that is not possible.
+
+    Parameters
+    ----------
+    what
+        discard: list what it does not open
+    really
+        remove what `discard` lists, for good
+    without_key
+        though the key is not there: lost for good
+    """
     from sagittal.core.errors import SagittalError
     from sagittal.server.clinic import identities
     from sagittal.server.storage.db import Database

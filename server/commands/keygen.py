@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 
-def keygen(path: Path) -> int:
+def keygen(path: Annotated[Path, Parameter(metavar="FILE")], /) -> int:
     """Write a new key pair; 1 when the file exists."""
     from sagittal.server.storage.archive import BackupFileError, make_key
 

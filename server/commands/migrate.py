@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
+from sagittal.server.commands.options import DataDir
 from sagittal.server.settings import load_settings
 
 
-def migrate(data_dir: Path | None) -> int:
+def migrate(*, data_dir: DataDir = None) -> int:
     """Upgrade the database in one transaction, after a backup; 1 when it belongs to a newer version."""
     from sagittal.server.storage.migrate import MigrationError, require_database, upgrade
 

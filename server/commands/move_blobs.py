@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
+from sagittal.server.commands.options import DataDir
 from sagittal.server.settings import load_settings
 
 
-def move_blobs(data_dir: Path | None) -> int:
+def move_blobs(*, data_dir: DataDir = None) -> int:
     """Move stored files into SAGITTAL_BUCKET; 1 when that is not possible, or damaged ones stay."""
     from sagittal.server.storage import blob_moving, fs
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 from contextlib import closing
-from pathlib import Path
 
+from sagittal.server.commands.options import DataDir
 from sagittal.server.settings import load_settings
 
 
-def move_database(data_dir: Path | None) -> int:
+def move_database(*, data_dir: DataDir = None) -> int:
     """Copy every row to SAGITTAL_DATABASE_URL and put the file aside; 1 when that is not possible."""
     from sagittal.server import audit
     from sagittal.server.storage import fs

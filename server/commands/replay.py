@@ -6,9 +6,12 @@ import asyncio
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from sagittal.core.errors import InputError, SagittalError
+from sagittal.server.commands.options import Manifest, Take, Whole
 
 if TYPE_CHECKING:
     from sagittal.core.signals.recording import Recording
@@ -17,21 +20,33 @@ if TYPE_CHECKING:
 
 
 def replay(
-    paths: Sequence[Path],
-    to: str,
+    paths: Take,
+    /,
+    *,
+    to: Annotated[str, Parameter(metavar="URL")],
     code: str,
-    manifest: Path | None = None,
+    manifest: Manifest = None,
     speed: float = 1.0,
-    drop: float = 0.0,
-    jitter: float = 0.0,
-    batch: int = 10,
+    drop: Annotated[float, Parameter(metavar="P")] = 0.0,
+    jitter: Annotated[float, Parameter(metavar="MS")] = 0.0,
+    batch: Whole = 10,
 ) -> int:
     """Pair by code and stream files, folders or zips of one take.
 
     Parameters
     ----------
-    speed : 1 = as it was recorded, 0 = as fast as it goes. batch : samples in a batch.
-    drop : probability per batch that the connection is cut. jitter : longest delay of a batch in ms.
+    to
+        address of the server, http://host:port
+    code
+        the code that the session's live page shows
+    speed
+        1 = as recorded (default), 0 = at once
+    drop
+        cut the connection, chance per batch
+    jitter
+        delay batches by up to this
+    batch
+        samples in a batch (default 10)
 
     Returns
     -------

@@ -3,29 +3,43 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
+from typing import Annotated
 
+from cyclopts import Parameter
+
+from sagittal.server.commands.options import DataDir
 from sagittal.server.settings import load_settings
 
 
 def research(
-    data_dir: Path | None,
-    out: Path | None,
+    out: Annotated[Path | None, Parameter(metavar="ZIP")] = None,
+    /,
+    *,
     key: Path,
-    patients: Sequence[str],
-    signals: bool,
-    without_consent: bool,
-    who: str | None,
+    patients: Annotated[tuple[str, ...], Parameter(metavar="CODE ...")] = (),
+    signals: bool = False,
+    without_consent: bool = False,
+    who: Annotated[str | None, Parameter(metavar="PSEUDONYM")] = None,
+    data_dir: DataDir = None,
 ) -> int:
     """Write the zip, or name the patient behind a pseudonym; 1 when that is not possible.
 
     Parameters
     ----------
-    out : zip to write. key : the clinic's key; a new one is made where there is none. patients : their codes,
-        none = all. without_consent : also those who have no consent to research written down.
-    who : a pseudonym; nothing is written.
+    out
+        the file to write
+    key
+        leads pseudonyms back; made anew where there is none
+    patients
+        these only (default: all)
+    signals
+        also what the sensors measured
+    without_consent
+        also who has not agreed to research
+    who
+        say whose pseudonym of this key it is; nothing is written
     """
     from sagittal.core.errors import SagittalError
     from sagittal.server.downloads import deidentified

@@ -4,12 +4,34 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Annotated
 
+from cyclopts import Parameter
+
+from sagittal.server.commands.options import DataDir
 from sagittal.server.settings import Settings, load_settings
 
 
-def restore(data_dir: Path | None, archive: Path, key: Path | None, erased: Path | None, test: bool) -> int:
-    """Restore a backup, everything verified first; 1 when nothing was put in place."""
+def restore(
+    archive: Annotated[Path, Parameter(metavar="FILE")],
+    /,
+    *,
+    key: Path | None = None,
+    erased: Annotated[Path | None, Parameter(metavar="JSON")] = None,
+    test: bool = False,
+    data_dir: DataDir = None,
+) -> int:
+    """Restore a backup, everything verified first; 1 when nothing was put in place.
+
+    Parameters
+    ----------
+    key
+        the private key of an encrypted backup
+    erased
+        another list of who must not come back
+    test
+        only try it, in a folder that is removed again
+    """
     from sagittal.server.safekeeping import restoring
     from sagittal.server.safekeeping.restore_room import RestoreError
     from sagittal.server.safekeeping.tombstones import TombstoneError, read_tombstones

@@ -6,9 +6,12 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
 
 from sagittal.core.errors import InputError, SagittalError
+from sagittal.server.commands.options import Manifest, Seed
 from sagittal.server.storage import fs
 
 if TYPE_CHECKING:
@@ -25,17 +28,39 @@ HEIGHT_M = 1.75
 
 
 def sensitivity(
-    paths: Sequence[Path],
-    reference: Path | None,
-    manifest: Path | None,
-    table_top: Path | None,
-    side: Side | None,
-    measures: Path | None,
-    from_standing: bool,
-    out: Path | None,
-    seed: int,
+    paths: Annotated[tuple[Path, ...], Parameter(metavar="PATH ...")] = (),
+    /,
+    *,
+    reference: Path | None = None,
+    manifest: Manifest = None,
+    table_top: Path | None = None,
+    side: Side | None = None,
+    measures: Annotated[Path | None, Parameter(metavar="JSON")] = None,
+    from_standing: bool = False,
+    out: Annotated[Path | None, Parameter(metavar="CSV")] = None,
+    seed: Seed = 1,
 ) -> int:
-    """Analyse a take, against a reference where one is given, or a simulated one; 1 = not possible."""
+    """Analyse a take, against a reference where one is given, or a simulated one; 1 = not possible.
+
+    Parameters
+    ----------
+    paths
+        files of one take (default: a simulated one)
+    reference
+        angles.parquet to hold the angles against (default: themselves)
+    table_top
+        take in which sensors left the table
+    side
+        leg that squats (default: all with sensors)
+    measures
+        lengths in m (docs/science/squat.md)
+    from_standing
+        compare angles from standing
+    out
+        write every figure into a file
+    seed
+        of the simulated take
+    """
     from sagittal.server.report.view.sensitivity import (
         sensitivity_csv,
         summarise_sensitivity,

@@ -9,13 +9,29 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import closing
-from pathlib import Path
 
+from sagittal.server.commands.options import DataDir, Whole
 from sagittal.server.settings import Settings, SettingsError, load_settings
 
 
-def serve(data_dir: Path | None, host: str | None, port: int | None, workers: int | None) -> int:
-    """Serve until SIGTERM or Ctrl-C; 1 when the folder is in use or belongs to a newer version."""
+def serve(
+    *,
+    host: str | None = None,
+    port: Whole | None = None,
+    workers: Whole | None = None,
+    data_dir: DataDir = None,
+) -> int:
+    """Serve until SIGTERM or Ctrl-C; 1 when the folder is in use or belongs to a newer version.
+
+    Parameters
+    ----------
+    host
+        address to listen on (default 127.0.0.1)
+    port
+        port to listen on (default 8000)
+    workers
+        worker processes (default 1)
+    """
     from sagittal.server.auth import one_time
     from sagittal.server.nodes.passage import read_key
     from sagittal.server.storage.db import Database

@@ -10,6 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from sagittal.server.commands.options import Seed
 from sagittal.server.storage import fs
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ ACTIVITY: Final = "activity"
 """The script of hours of daily life."""
 
 
-def simulate(out: Path, script: str, seed: int, hours: float = 24.0) -> int:
+def simulate(*, out: Path, script: str = "comfortable", seed: Seed = 1, hours: float = 24.0) -> int:
     """Write `recording.parquet` and `truth/` into `out`; 2 = no such script.
 
     Truth of a walk: angles, events, strides; of squats, of swings and bows: angles, phases; of a chest:
@@ -30,7 +31,12 @@ def simulate(out: Path, script: str, seed: int, hours: float = 24.0) -> int:
 
     Parameters
     ----------
-    hours : of the script "activity".
+    out
+        folder for recording and truth
+    script
+        comfortable, fast_with_turns, hemiparetic, squats, postures, activity … (docs/science/simulation.md)
+    hours
+        of daily life, --script activity (default 24)
     """
     from sagittal.core.formats import write_recording
     from sagittal.core.simulate import MOVEMENTS, SCRIPTS, Simulation, simulate_movement, simulate_scenario

@@ -4,27 +4,42 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from sagittal.core.errors import SagittalError
+from sagittal.server.commands.options import Manifest, Take
 from sagittal.server.storage import fs
+
+Span = Annotated[tuple[float, float], Parameter(metavar="FROM TO")]
+"""A part of a recording, s."""
 
 
 def stairs(
-    paths: Sequence[Path],
-    manifest: Path | None,
-    level: tuple[float, float],
-    up: tuple[float, float],
-    down: tuple[float, float],
-    out: Path,
+    paths: Take,
+    /,
+    *,
+    level: Span,
+    up: Span,
+    down: Span,
+    out: Annotated[Path, Parameter(metavar="JSON")],
+    manifest: Manifest = None,
 ) -> int:
     """Measure the limits on walks of one recording and write them into `out`.
 
     Parameters
     ----------
-    level, up, down : when each was walked, s from the recording's first sample.
+    level
+        when they walked on the level, s from the first sample
+    up
+        when they walked upstairs, s from the first sample
+    down
+        when they walked downstairs, s from the first sample
+    out
+        file for `analyse --config`
 
     Returns
     -------

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from sagittal.core.errors import SagittalError
+from sagittal.server.commands.options import Whole
 from sagittal.server.processes.compiling import OFFLINE, compile_filters_once
 from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.storage import fs
@@ -28,12 +29,19 @@ KEPT: Final = ("analysis.json", "strides.csv")
 _STATE: Final = "state.json"
 
 
-def study(folder: Path, out: Path, config: Path | None = None, jobs: int | None = None) -> int:
+def study(folder: Path, /, *, out: Path, config: Path | None = None, jobs: Whole | None = None) -> int:
     """Analyse every take of a folder; what is done already, with the same files and settings, is kept.
 
     Parameters
     ----------
-    config : JSON file with overrides of parameters by stage. jobs : takes at a time, None = one a processor.
+    folder
+        recordings in any layout, BIDS too
+    out
+        folder for the tables; run again, it goes on
+    config
+        JSON: parameters by stage, for every take
+    jobs
+        takes at a time (default: one per processor)
 
     Returns
     -------

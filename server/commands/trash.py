@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import sys
 from contextlib import closing
-from pathlib import Path
 
+from sagittal.server.commands.options import DataDir
 from sagittal.server.settings import load_settings
 
 
-def trash(data_dir: Path | None, restore: bool) -> int:
-    """List the trash, or put back what the database refers to; 1 when the database cannot be used."""
+def trash(*, restore: bool = False, data_dir: DataDir = None) -> int:
+    """List the trash, or put back what the database refers to; 1 when the database cannot be used.
+
+    Parameters
+    ----------
+    restore
+        put back those that the database refers to
+    """
     from sagittal.server.safekeeping import sweep
     from sagittal.server.storage.blob_opening import open_blobs
     from sagittal.server.storage.db import Database

@@ -5,17 +5,57 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
+from cyclopts import Parameter
+
+from sagittal.core.fusion.algorithms.schemes import Scheme
+from sagittal.server.commands.options import Seed, Whole
 from sagittal.server.storage import fs
 
 
-def tune(folder: Path, out: Path, resume: Path | None, **order: Any) -> int:
+def tune(
+    folder: Path,
+    /,
+    *,
+    algorithm: str,
+    validation: Annotated[tuple[str, ...], Parameter(name="--validate", metavar="NAME ...")],
+    out: Annotated[Path, Parameter(metavar="JSON")] = Path("tuned.json"),
+    resume: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    scheme: Scheme | None = None,
+    magnetometer: Annotated[bool | None, Parameter(negative="--no-magnetometer")] = None,
+    seed: Seed = 0,
+    particles: Whole | None = None,
+    iterations: Whole | None = None,
+    rounds: Whole | None = None,
+    random_rounds: Whole | None = None,
+) -> int:
     """Fit gains to the trials of a folder and write them to `out`; a checkpoint lies beside it meanwhile.
 
     Parameters
     ----------
-    resume : a checkpoint to go on from. order : see `TuningOrder`.
+    folder
+        recordings (docs/science/filters.md)
+    algorithm
+        of `sagittal bench fusion --list`
+    validation
+        recordings that only judge, without .npz
+    out
+        default tuned.json
+    resume
+        go on from the checkpoint of a stopped run
+    scheme
+        how gains follow the motion (default: as the algorithm's own)
+    magnetometer
+        default: where it can
+    particles
+        of the swarm (default: the thesis')
+    iterations
+        of the swarm (default: the thesis')
+    rounds
+        of the swarm (default: the thesis')
+    random_rounds
+        of the swarm (default: the thesis')
 
     Returns
     -------
@@ -33,7 +73,10 @@ def tune(folder: Path, out: Path, resume: Path | None, **order: Any) -> int:
         sys.stderr.flush()
 
     try:
-        tuner = prepare(list(list_source_files([folder])), TuningOrder(**order))
+        order = TuningOrder(
+            algorithm, validation, scheme, magnetometer, seed, particles, iterations, rounds, random_rounds
+        )
+        tuner = prepare(list(list_source_files([folder])), order)
         swarm = tuner.read_checkpoint(read_named_file(resume)) if resume else None
         fs.make_folder(out.parent)
         result = search(tuner, keep, swarm)

@@ -5,14 +5,21 @@ from __future__ import annotations
 import sys
 from contextlib import closing
 from getpass import getpass
-from pathlib import Path
+from typing import Literal
 
 from sqlalchemy import select
 
+from sagittal.server.commands.options import DataDir
 from sagittal.server.settings import load_settings
 
 
-def user(data_dir: Path | None, name: str, role: str) -> int:
+def user(
+    name: str,
+    /,
+    *,
+    role: Literal["admin", "clinician", "assistant", "viewer"] = "clinician",
+    data_dir: DataDir = None,
+) -> int:
     """Ask for a password and store its hash.
 
     An existing user keeps the role, gets the new password, and loses second factor and tokens.

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
-from pathlib import Path
 
+from sagittal.server.commands.options import DataDir
 from sagittal.server.log import start_log
 from sagittal.server.settings import load_settings
 
 
-def worker(data_dir: Path | None) -> int:
+def worker(*, data_dir: DataDir = None) -> int:
     """Work until SIGTERM or Ctrl-C; 1 when database or folder are not the server's."""
     from sagittal.server.safekeeping.custody import StrangersError
     from sagittal.server.storage import fs

@@ -13,8 +13,8 @@ from sagittal.server.viewer.body_parts import PartName
 from sagittal.server.viewer.colours import GHOST, TINTS, to_linear_rgb
 from sagittal.server.viewer.layout import MeshBatch
 from sagittal.server.viewer.room import ROOM
-from sagittal.server.viewer.sending import move_copies
 from sagittal.server.viewer.steps import Single
+from sagittal.server.viewer.viser_adapter import move_copies
 
 PALE: Final = 0.5
 """Opacity of another walk laid over the figure."""

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import viser
 
 from sagittal.server.storage import fs
 from sagittal.server.storage.compile_cache import VARIABLE
+from sagittal.server.viewer.viser_adapter import read_client
 
 log = logging.getLogger(__name__)
 
@@ -82,8 +82,7 @@ _packing = threading.Lock()
 @functools.cache
 def client_page() -> str:
     """Viser's client page from its wheel, without the control panel, which has no switch of its own."""
-    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
-    return _add_to_head(page, _BEGIN + _QUIET, _HIDE_PANEL)
+    return _add_to_head(read_client(), _BEGIN + _QUIET, _HIDE_PANEL)
 
 
 def silence(page: str) -> str:
@@ -94,8 +93,6 @@ def silence(page: str) -> str:
 def _add_to_head(page: str, first: str, last: str) -> str:
     start, opened, rest = page.partition("<head>")
     head, closed, body = rest.partition("</head>")
-    if not (opened and closed):
-        raise RuntimeError("viser's client page has no head; this version of viser is not supported.")
     return f"{start}{opened}{first}{head}{last}{closed}{body}"
 
 

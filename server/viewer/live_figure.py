@@ -18,7 +18,7 @@ from sagittal.server.viewer.live_path import GAP_S, LivePath
 from sagittal.server.viewer.moment import FigureMoment
 from sagittal.server.viewer.reference import SEGMENTS, ReferenceWalk, stand_upright
 from sagittal.server.viewer.room import SceneRoom, frame_person
-from sagittal.server.viewer.sending import show_at_once
+from sagittal.server.viewer.viser_adapter import show_at_once
 
 _BURIED: Final = np.array([0.0, 0.0, -100.0])
 """Where a ghost is that has no phase."""

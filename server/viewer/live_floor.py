@@ -17,8 +17,8 @@ from sagittal.core.frames import SIDES, Floats, Side
 from sagittal.server.viewer import shapes
 from sagittal.server.viewer.colours import TINTS, to_linear_rgb
 from sagittal.server.viewer.room import ROOM, Vector
-from sagittal.server.viewer.sending import draw_lines, move_copies
 from sagittal.server.viewer.steps import CLEAR_M, PIECE_M, REST_MPS, SAME_M, Single
+from sagittal.server.viewer.viser_adapter import draw_lines, move_copies
 
 TRAIL_S: Final = 6.0
 """Seconds of way that are shown."""

@@ -6,16 +6,13 @@ import asyncio
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
 
 import msgspec
 from starlette.websockets import WebSocket
 from websockets.asyncio.client import connect, unix_connect
 
 from sagittal.server.auth.sessions import CHECK_EVERY_S
-
-ALLOWED: Final = frozenset({"ViewerCameraMessage"})
-"""Types of messages a browser may send to viser; everything else, such as a request to share, is dropped."""
+from sagittal.server.viewer.viser_adapter import ALLOWED
 
 
 def find_subprotocols(ws: WebSocket) -> list[str]:

@@ -21,7 +21,7 @@ from sagittal.server.viewer.room import (
     frame_person,
     turn_about_vertical,
 )
-from sagittal.server.viewer.sending import show_at_once
+from sagittal.server.viewer.viser_adapter import show_at_once
 
 
 class ReplayFigure:

@@ -12,11 +12,10 @@ from typing import Final, Literal
 
 import numpy as np
 import viser
-from viser._messages import SetPositionMessage
 
 from sagittal.core.frames import Floats
 from sagittal.server.viewer.colours import BACKGROUND, FLOOR
-from sagittal.server.viewer.sending import gather_longer
+from sagittal.server.viewer.viser_adapter import gather_longer, move_node
 
 ROOM: Final = "/room"
 """Name of the node that everything hangs on."""
@@ -86,10 +85,7 @@ class SceneRoom:
         place = (-x, -y, 0.0)
         if place != self._place:
             self._place = place
-            inside = self._node._impl  # noqa: SLF001
-            # the public setter casts and compares first, which takes longer than to move a part
-            inside.position[:] = place
-            inside.api._queue_scene_message(SetPositionMessage(inside.name, place))  # noqa: SLF001
+            move_node(self._node, place)
 
     def look(self, shot: CameraShot) -> None:
         """Move the cameras of all who look, and of who comes later, to a shot."""

@@ -10,16 +10,13 @@ import contextlib
 import shutil
 import tempfile
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, Final
+from typing import Final
 
 import rich
 import viser
-import websockets.asyncio.server
-from viser._messages import ShareUrlRequest
-from viser.infra import _infra
 
 from sagittal.core.errors import EstimationError
+from sagittal.server.viewer.viser_adapter import forbid_sharing
 
 LONGEST_PATH_BYTES: Final = 100
 """A socket's path has at most 108 bytes on Linux, 104 elsewhere; viser waits for ever for a longer one."""
@@ -44,8 +41,7 @@ def start_scene_server() -> viser.ViserServer:
         folder.rmdir()
         raise _no_place("its path is too long")
     server = viser.ViserServer(host=str(path), port=0, verbose=False)
-    # a client could ask for a public tunnel through a third party; the proxy drops the request, this one too
-    server._websock_server.unregister_handler(ShareUrlRequest)  # noqa: SLF001
+    forbid_sharing(server)
     return server
 
 
@@ -68,19 +64,3 @@ def _no_place(why: str) -> EstimationError:
         f"The server cannot keep 3D views in its folder for temporary files ({why}); "
         "an administrator can set TMPDIR to another.",
     )
-
-
-def _serve(handler: Any, host: str, port: int, **options: Any) -> Any:
-    """Listen as viser asks to, on a Unix socket if the host is a path."""
-    if host.startswith("/"):
-        return websockets.asyncio.server.unix_serve(handler, host, **options)
-    return websockets.asyncio.server.serve(handler, host, port, **options)
-
-
-# viser has no way to say where it listens but host and port: we give its own module, and no other, a `serve`
-# that knows paths (tests/server/viewer/test_viser_contract.py tells when a new version needs another)
-_infra.websockets = SimpleNamespace(
-    asyncio=SimpleNamespace(server=SimpleNamespace(serve=_serve)),
-    datastructures=websockets.datastructures,
-    exceptions=websockets.exceptions,
-)

@@ -78,7 +78,6 @@ UNMIRRORED: Final = frozenset(
         "tests/server/viewer/test_browser.py",
         "tests/server/viewer/test_door.py",
         "tests/server/viewer/test_live_browser.py",
-        "tests/server/viewer/test_viser_contract.py",
     }
 )
 """Tests of several modules of a room, or of a part of one."""

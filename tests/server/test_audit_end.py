@@ -40,7 +40,7 @@ def cut(settings: Settings, kept: int) -> Database:
 
 
 def test_a_whole_log_is_well(settings: Settings, capsys: pytest.CaptureFixture[str]) -> None:
-    assert check(settings.data_dir) == 0
+    assert check(data_dir=settings.data_dir) == 0
     assert capsys.readouterr().out == "All is well.\n"
 
 
@@ -49,16 +49,16 @@ def test_a_head_kept_elsewhere_tells_what_no_file_of_the_folder_can(
 ) -> None:
     head = tmp_path / "elsewhere.json"
     head.write_bytes(settings.mark.read_bytes())
-    assert check(settings.data_dir, head) == 0
+    assert check(data_dir=settings.data_dir, head=head) == 0
     with closing(cut(settings, 3)) as db:
         with db.write() as c:
             c.exec_driver_sql("UPDATE sqlite_sequence SET seq = 3 WHERE name = 'audit'")
         set_mark(db, settings.mark)
     capsys.readouterr()
-    assert check(settings.data_dir) == 0  # whoever may write all files has hidden it
-    assert check(settings.data_dir, head) == 1
+    assert check(data_dir=settings.data_dir) == 0  # whoever may write all files has hidden it
+    assert check(data_dir=settings.data_dir, head=head) == 1
     assert "The audit log ends at row 3, but had reached row 6" in capsys.readouterr().out
-    assert check(settings.data_dir, tmp_path / "lost.json") == 1
+    assert check(data_dir=settings.data_dir, head=tmp_path / "lost.json") == 1
 
 
 @pytest.mark.parametrize("kept", [0, 3, ROWS - 1])
@@ -67,7 +67,7 @@ def test_a_cut_end_is_noticed_without_the_mark(
 ) -> None:
     settings.mark.unlink()
     cut(settings, kept).close()
-    assert check(settings.data_dir) == 1
+    assert check(data_dir=settings.data_dir) == 1
     said = capsys.readouterr().out
     assert f"audit: audit rows {kept + 1} to {ROWS}, the newest, have been removed" in said
 
@@ -78,7 +78,7 @@ def test_a_cut_end_is_noticed_by_the_mark_when_the_tables_own_number_was_set_bac
 ) -> None:
     with closing(cut(settings, kept)) as db, db.write() as c:
         c.exec_driver_sql("UPDATE sqlite_sequence SET seq = ? WHERE name = 'audit'", (kept,))
-    assert check(settings.data_dir) == 1
+    assert check(data_dir=settings.data_dir) == 1
     said = capsys.readouterr().out
     assert f"audit: The audit log ends at row {kept}, but had reached row {ROWS}" in said
 
@@ -89,5 +89,5 @@ def test_an_end_that_was_written_anew_is_noticed(
     with closing(cut(settings, 3)) as db, db.write() as c:
         for i in range(ROWS):
             patients.create(c, None, code=f"N-{i}")
-    assert check(settings.data_dir) == 1
+    assert check(data_dir=settings.data_dir) == 1
     assert f"audit: Audit row {ROWS} is not the one that was here before" in capsys.readouterr().out

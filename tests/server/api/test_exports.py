@@ -133,12 +133,12 @@ async def test_what_cannot_be_exported_is_refused(clinic: Clinic) -> None:
 def test_the_command_line_writes_the_same_from_a_folder(tmp_path: Any, capsys: Any) -> None:
     for name, content in analysed.files().items():
         (tmp_path / name).write_bytes(content)
-    assert export(tmp_path, "csv", None, "p1") == 0
-    assert export(tmp_path, "opensim", None, "p1") == 0
+    assert export(tmp_path, kind="csv", code="p1") == 0
+    assert export(tmp_path, kind="opensim", code="p1") == 0
     names = zipfile.ZipFile(tmp_path / "export-csv.zip").namelist()
     assert "strides_long.csv" in names
     assert zipfile.ZipFile(tmp_path / "export-opensim.zip").namelist() != names
-    assert export(tmp_path / "nowhere", "csv", None, "p1") == 1
+    assert export(tmp_path / "nowhere", kind="csv", code="p1") == 1
     assert "holds no analysis.json" in capsys.readouterr().err
     words = ["export", str(tmp_path), "--as", "csv", "--out", str(tmp_path / "analysis.json" / "x.zip")]
     assert main(words) == 1

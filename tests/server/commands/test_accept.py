@@ -23,7 +23,7 @@ def test_a_database_that_nobody_doubts_is_left_as_it_is(
     clinic: Clinic, capsys: pytest.CaptureFixture[str]
 ) -> None:
     before = actions(clinic)
-    assert accept(clinic.folder) == 0
+    assert accept(data_dir=clinic.folder) == 0
     assert capsys.readouterr().out == "There was no doubt about this database; nothing is changed.\n"
     assert actions(clinic) == before
 
@@ -35,7 +35,7 @@ def test_a_database_that_has_lost_rows_is_the_right_one_from_then_on(
     known = clinic.settings.mark.read_text()
     rows = len(actions(clinic))
     clinic.settings.mark.write_text(known.replace(f": {rows}", f": {rows + 7}"))
-    assert accept(clinic.folder) == 0
+    assert accept(data_dir=clinic.folder) == 0
     said = capsys.readouterr().out
     assert f"ends at row {rows}, but had reached row {rows + 7}" in said
     assert (
@@ -47,7 +47,7 @@ def test_a_database_that_has_lost_rows_is_the_right_one_from_then_on(
 
 
 def test_an_empty_folder_gets_no_database(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert accept(tmp_path) == 1
+    assert accept(data_dir=tmp_path) == 1
     assert capsys.readouterr().err == f"There is no database in {tmp_path}; give the folder with --data.\n"
     assert list(tmp_path.iterdir()) == []
 
@@ -61,7 +61,7 @@ def test_files_without_their_database_can_be_given_up_for_a_new_beginning(
         path.unlink()
     with pytest.raises(custody.StrangersError):
         custody.refuse_strangers(clinic.settings)
-    assert accept(clinic.folder) == 0
+    assert accept(data_dir=clinic.folder) == 0
     assert "knows no patient, but 1 stored files and 0 live logs are there." in capsys.readouterr().out
     custody.refuse_strangers(clinic.settings)
     assert clinic.settings.database.exists()

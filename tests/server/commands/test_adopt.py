@@ -29,14 +29,14 @@ def stray(clinic: Clinic) -> str:
 def test_a_take_without_a_session_or_a_session_without_a_take_is_refused(
     clinic: Clinic, capsys: pytest.CaptureFixture[str], take: str | None, session: str | None
 ) -> None:
-    assert adopt(clinic.folder, take, session) == 2
+    assert adopt(take, session=session, data_dir=clinic.folder) == 2
     assert capsys.readouterr().err.startswith("Give both a take and --session")
 
 
 def test_strays_are_listed_with_how_to_give_them_away(
     clinic: Clinic, stray: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert adopt(clinic.folder, None, None) == 0
+    assert adopt(None, session=None, data_dir=clinic.folder) == 0
     first, second = capsys.readouterr().out.splitlines()
     assert first.startswith(f"{stray}  ")
     assert "3 sensors, 20 batches" in first
@@ -44,7 +44,7 @@ def test_strays_are_listed_with_how_to_give_them_away(
 
 
 def test_without_a_stray_that_is_said(clinic: Clinic, capsys: pytest.CaptureFixture[str]) -> None:
-    assert adopt(clinic.folder, None, None) == 0
+    assert adopt(None, session=None, data_dir=clinic.folder) == 0
     assert capsys.readouterr().out == "The database knows every live recording.\n"
 
 
@@ -53,7 +53,7 @@ def test_a_stray_becomes_the_recording_of_the_session_and_is_analysed(
     clinic: Clinic, stray: str, address: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     session = clinic.session.id
-    assert adopt(clinic.folder, stray, address.format(session)) == 0
+    assert adopt(stray, session=address.format(session), data_dir=clinic.folder) == 0
     assert f"newest recording of /sessions/{session} now" in capsys.readouterr().out
     with clinic.db.read() as c:
         made = recordings.require_current(c, session)
@@ -65,6 +65,6 @@ def test_a_stray_becomes_the_recording_of_the_session_and_is_analysed(
 def test_a_session_that_is_not_there_leaves_the_log(
     clinic: Clinic, stray: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert adopt(clinic.folder, stray, "c" * 32) == 1
+    assert adopt(stray, session="c" * 32, data_dir=clinic.folder) == 1
     assert "no session" in capsys.readouterr().err
     assert live_recordings.log_path(clinic.settings.live, stray).exists()

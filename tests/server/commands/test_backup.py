@@ -22,7 +22,7 @@ def test_a_backup_is_said_with_its_size_and_the_end_of_the_audit_log(
     with clinic.db.read() as c:
         head = read_newest(c)
     assert head is not None
-    assert backup(clinic.folder, disk, None, prune=False) == 0
+    assert backup(disk, prune=False, data_dir=clinic.folder) == 0
     (made,) = list_backups(disk)
     said = capsys.readouterr().out
     assert said.startswith(f"{made.path}: ")
@@ -33,12 +33,12 @@ def test_a_key_of_names_that_is_not_in_it_is_told(
     clinic: Clinic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     identities.make_key(clinic.db, clinic.settings.identity_key_file)
-    assert backup(clinic.folder, tmp_path / "plain.tar", None, prune=False) == 0
+    assert backup(tmp_path / "plain.tar", prune=False, data_dir=clinic.folder) == 0
     assert f"The key of patients' names, {clinic.settings.identity_key_file}, is not in it" in (
         capsys.readouterr().out
     )
     make_key(tmp_path / "clinic.key")
-    assert backup(clinic.folder, tmp_path / "safe.tar", tmp_path / "clinic.key", prune=False) == 0
+    assert backup(tmp_path / "safe.tar", key=tmp_path / "clinic.key", data_dir=clinic.folder) == 0
     assert "is not in it" not in capsys.readouterr().out
 
 
@@ -50,10 +50,10 @@ def test_old_backups_go_when_that_is_asked_for_and_nothing_else(
     other.parent.mkdir()
     for path in (*old, other):
         path.touch()
-    assert backup(clinic.folder, other.parent, None, prune=False) == 0
+    assert backup(other.parent, prune=False, data_dir=clinic.folder) == 0
     assert all(path.exists() for path in old)
     capsys.readouterr()
-    assert backup(clinic.folder, other.parent / "now.tar", None, prune=True) == 0
+    assert backup(other.parent / "now.tar", prune=True, data_dir=clinic.folder) == 0
     assert f"removed {old[0]}\n" in capsys.readouterr().out
     assert not old[0].exists()
     assert other.exists()
@@ -64,7 +64,7 @@ def test_a_damaged_file_is_named_and_the_rest_is_kept(
 ) -> None:
     (one,) = clinic.blobs.files()
     clinic.blobs.find_path(one).write_bytes(b"signalz")
-    assert backup(clinic.folder, tmp_path / "made.tar", None, prune=False) == 1
+    assert backup(tmp_path / "made.tar", prune=False, data_dir=clinic.folder) == 1
     said = capsys.readouterr()
     assert said.err == f"patient {one.space}: {one.name[:12]}… is gone or damaged; see `sagittal check`\n"
     assert (tmp_path / "made.tar").exists()
@@ -73,6 +73,6 @@ def test_a_damaged_file_is_named_and_the_rest_is_kept(
 def test_without_a_usable_key_nothing_is_made(
     clinic: Clinic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert backup(clinic.folder, tmp_path / "made.tar", tmp_path / "none.key", prune=False) == 1
+    assert backup(tmp_path / "made.tar", key=tmp_path / "none.key", data_dir=clinic.folder) == 1
     assert "none.key" in capsys.readouterr().err
     assert not (tmp_path / "made.tar").exists()

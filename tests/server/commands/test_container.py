@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import io
 import shlex
 import socket
@@ -10,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sagittal.server.main import _parser, main
+from sagittal.server.main import COMMANDS, main
 from sagittal.server.storage.compile_cache import VARIABLE
 from tests.test_packaging import last
 
@@ -47,12 +46,7 @@ ARGUMENTS = {
 """What each command is called with: enough to read its settings, and little to do."""
 
 
-def list_commands() -> list[str]:
-    (commands,) = (a for a in _parser()._actions if isinstance(a, argparse._SubParsersAction))
-    return list(commands.choices)
-
-
-@pytest.mark.parametrize("command", list_commands())
+@pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_runs_in_a_bare_container(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

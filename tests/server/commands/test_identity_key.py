@@ -15,7 +15,7 @@ def keep_name(clinic: Clinic) -> None:
 
 
 def ask(clinic: Clinic, what: str, really: bool = False, without_key: bool = False) -> int:
-    return identity_key(clinic.folder, what, really, without_key)
+    return identity_key(what, really=really, without_key=without_key, data_dir=clinic.folder)
 
 
 def test_a_key_is_made_once(clinic: Clinic, capsys: pytest.CaptureFixture[str]) -> None:

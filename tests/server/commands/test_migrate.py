@@ -11,7 +11,7 @@ from tests.faults.clinic import Clinic
 def test_a_current_database_is_left_without_a_backup(
     clinic: Clinic, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert migrate(clinic.folder) == 0
+    assert migrate(data_dir=clinic.folder) == 0
     assert capsys.readouterr().out == "The database is current.\n"
     assert not clinic.settings.backups.exists()
 
@@ -19,7 +19,7 @@ def test_a_current_database_is_left_without_a_backup(
 def test_a_database_of_a_newer_version_is_refused(clinic: Clinic, capsys: pytest.CaptureFixture[str]) -> None:
     with clinic.db.write() as c:
         c.exec_driver_sql("UPDATE alembic_version SET version_num = 'of_tomorrow'")
-    assert migrate(clinic.folder) == 1
+    assert migrate(data_dir=clinic.folder) == 1
     said = capsys.readouterr()
     assert said.out == ""
     assert "of_tomorrow" in said.err

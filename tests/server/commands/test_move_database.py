@@ -20,14 +20,14 @@ def named(monkeypatch: pytest.MonkeyPatch, clinic: Clinic) -> None:
 
 
 def test_it_needs_the_name_of_the_other_database(clinic: Clinic, capsys: pytest.CaptureFixture[str]) -> None:
-    assert move_database(clinic.folder) == 1
+    assert move_database(data_dir=clinic.folder) == 1
     assert capsys.readouterr().err.startswith("Set SAGITTAL_DATABASE_URL to the empty PostgreSQL database")
     assert clinic.settings.database.exists()
 
 
 @pytest.mark.usefixtures("named")
 def test_a_folder_without_a_database_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert move_database(tmp_path) == 1
+    assert move_database(data_dir=tmp_path) == 1
     assert capsys.readouterr().err == (
         f"There is no {tmp_path / 'sagittal.db'}; give the folder with --data.\n"
     )
@@ -40,7 +40,7 @@ def test_an_old_file_that_lies_aside_is_not_overwritten(
     aside = clinic.settings.backups / "before-postgresql.db"
     aside.parent.mkdir()
     aside.write_bytes(b"of an earlier move")
-    assert move_database(clinic.folder) == 1
+    assert move_database(data_dir=clinic.folder) == 1
     assert capsys.readouterr().err == f"{aside} exists already; put it elsewhere first.\n"
     assert aside.read_bytes() == b"of an earlier move"
 
@@ -51,6 +51,6 @@ def test_nothing_is_moved_under_a_running_server_or_worker(
     clinic: Clinic, whose: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with fs.Lock(getattr(clinic.settings, whose), "the server with pid 7"):
-        assert move_database(clinic.folder) == 1
+        assert move_database(data_dir=clinic.folder) == 1
     assert capsys.readouterr().err == f"{clinic.folder} is in use by the server with pid 7; stop it first.\n"
     assert clinic.settings.database.exists()

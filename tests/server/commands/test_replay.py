@@ -30,13 +30,13 @@ NOBODY = "http://127.0.0.1:9"
 def test_an_option_out_of_range_is_named_before_anything_is_read(
     options: dict[str, Any], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert replay([Path("none")], NOBODY, "ABCDEF", **options) == 1
+    assert replay([Path("none")], to=NOBODY, code="ABCDEF", **options) == 1
     assert capsys.readouterr().err == f"Not replayed (bad_option): {said}\n"
 
 
 def test_the_ends_of_the_ranges_are_allowed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "walk.txt").write_text("no recording")
-    assert replay([tmp_path / "walk.txt"], NOBODY, "ABCDEF", speed=0.0, drop=0.0, jitter=0.0) == 1
+    assert replay([tmp_path / "walk.txt"], to=NOBODY, code="ABCDEF", speed=0.0, drop=0.0, jitter=0.0) == 1
     said = capsys.readouterr().err
     assert said.startswith("Not replayed (")
     assert "bad_option" not in said

@@ -20,12 +20,12 @@ def test_a_backup_is_tried_and_then_put_into_an_empty_folder(
 ) -> None:
     made = make_backup(clinic.db, clinic.settings, tmp_path / "made.tar", None)
     home = tmp_path / "again"
-    assert restore(home, made.path, None, None, test=True) == 0
+    assert restore(made.path, data_dir=home, test=True) == 0
     tried = capsys.readouterr().out
     assert tried.startswith("It could be restored: the clinic of ")
     assert not (home / "sagittal.db").exists()
     # the trial leaves nothing in whose way the restore would be
-    assert restore(home, made.path, None, None, test=False) == 0
+    assert restore(made.path, data_dir=home, test=False) == 0
     assert capsys.readouterr().out == tried.replace("It could be restored", f"Restored into {home}")
     assert "1 patients, 1 visits, 1 files; every hash" in tried
     with closing(Database(home / "sagittal.db")) as db, db.read() as c:
@@ -36,7 +36,7 @@ def test_a_folder_that_holds_a_clinic_is_refused(
     clinic: Clinic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     made = make_backup(clinic.db, clinic.settings, tmp_path / "made.tar", None)
-    assert restore(clinic.folder, made.path, None, None, test=False) == 1
+    assert restore(made.path, data_dir=clinic.folder, test=False) == 1
     said = capsys.readouterr()
     assert said.out == ""
     assert "is not empty" in said.err
@@ -49,7 +49,7 @@ def test_a_folder_that_holds_a_backup_is_refused(
     kept = tmp_path / "again" / "backups" / "sagittal-20260314T031500Z.tar"
     kept.parent.mkdir(parents=True)
     kept.touch()
-    assert restore(tmp_path / "again", made.path, None, None, test=False) == 1
+    assert restore(made.path, data_dir=tmp_path / "again", test=False) == 1
     assert "is not empty (backups)" in capsys.readouterr().err
 
 
@@ -59,7 +59,7 @@ def test_files_that_were_gone_already_are_told(
     (one,) = clinic.blobs.files()
     clinic.blobs.find_path(one).unlink()
     made = make_backup(clinic.db, clinic.settings, tmp_path / "made.tar", None)
-    assert restore(tmp_path / "again", made.path, None, None, test=True) == 0
+    assert restore(made.path, data_dir=tmp_path / "again", test=True) == 0
     assert "1 files were gone when the backup was made; see `sagittal check`.\n" in capsys.readouterr().out
 
 
@@ -70,7 +70,7 @@ def test_who_restores_without_the_key_of_names_is_told_where_it_has_to_be(
     with clinic.db.write() as c:
         identities.change(c, clinic.settings.identity_key_file, None, clinic.patient.id, {"name": "Erika"})
     plain = make_backup(clinic.db, clinic.settings, tmp_path / "plain.tar", None).path
-    assert restore(tmp_path / "one", plain, None, None, test=False) == 0
+    assert restore(plain, data_dir=tmp_path / "one", test=False) == 0
     place = tmp_path / "one" / "identity.key"
     assert f"was not in the backup. It has to be at {place};" in capsys.readouterr().out
 

@@ -29,7 +29,7 @@ def _rows(file: Path) -> list[dict[str, str]]:
 def test_every_kind_of_script_writes_its_recording_and_its_truth(
     tmp_path: Path, script: str, truth: set[str], protocol: str
 ) -> None:
-    assert simulate(tmp_path, script, 3) == 0
+    assert simulate(out=tmp_path, script=script, seed=3) == 0
     assert {f.name for f in (tmp_path / "truth").iterdir()} == truth
     told = json.loads((tmp_path / "truth" / "truth.json").read_bytes())
     assert (told["script"], told["seed"]) == (script, 3)
@@ -39,7 +39,7 @@ def test_every_kind_of_script_writes_its_recording_and_its_truth(
 
 
 def test_five_rises_are_five_rises(tmp_path: Path) -> None:
-    simulate(tmp_path, "chair_rises", 1)
+    simulate(out=tmp_path, script="chair_rises", seed=1)
     kinds = [row["kind"] for row in _rows(tmp_path / "truth" / "phases.csv")]
     assert kinds.count("sit_to_stand") == kinds.count("stand_to_sit") == 5
     pitch = [float(row["trunk_pitch_deg"]) for row in _rows(tmp_path / "truth" / "trunk.csv")]
@@ -49,7 +49,7 @@ def test_five_rises_are_five_rises(tmp_path: Path) -> None:
 def test_an_unknown_script_is_answered_with_all_names(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert simulate(tmp_path, "moonwalk", 1) == 2
+    assert simulate(out=tmp_path, script="moonwalk", seed=1) == 2
     said = capsys.readouterr().err
     assert all(name in said for name in (*SCRIPTS, *MOVEMENTS))
     assert not any(tmp_path.iterdir())

@@ -42,9 +42,9 @@ def test_own_limits_find_the_stairs_that_the_common_ones_miss(tmp_path: Path) ->
     file.write_bytes(write_recording(made.recording))
     walks = {p.kind: (p.start_s, p.end_s) for p in made.truth.phases}
     own = tmp_path / "own.json"
-    assert stairs([file], None, walks["walk"], walks["stairs_up"], walks["stairs_down"], own) == 0
-    analyse([file], None, tmp_path / "common")
-    analyse([file], None, tmp_path / "own", config=own)
+    assert stairs([file], level=walks["walk"], up=walks["stairs_up"], down=walks["stairs_down"], out=own) == 0
+    analyse([file], out=tmp_path / "common")
+    analyse([file], out=tmp_path / "own", config=own)
     true = sum(walks["stairs_down"][0] <= t <= walks["stairs_down"][1] for t in made.truth.steps_s)
     assert steps_down(tmp_path / "common") <= 0.2 * true
     assert steps_down(tmp_path / "own") >= 0.7 * true
@@ -54,5 +54,6 @@ def test_too_few_steps_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[st
     made = simulate_day(WALKED[:3], 1.7, 3, RecordingSetup(rate_hz=50.0))
     file = tmp_path / "walk.parquet"
     file.write_bytes(write_recording(made.recording))
-    assert stairs([file], None, (10.0, 50.0), (0.0, 5.0), (0.0, 5.0), tmp_path / "own.json") == 1
+    none = (0.0, 5.0)
+    assert stairs([file], level=(10.0, 50.0), up=none, down=none, out=tmp_path / "own.json") == 1
     assert "walk_too_short" in capsys.readouterr().err

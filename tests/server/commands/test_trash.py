@@ -29,7 +29,7 @@ def test_the_trash_is_listed_with_the_day_on_which_each_file_goes(
     clinic: Clinic, capsys: pytest.CaptureFixture[str]
 ) -> None:
     one = discard(clinic)
-    assert trash(clinic.folder, restore=False) == 0
+    assert trash(restore=False, data_dir=clinic.folder) == 0
     place = clinic.settings.trash
     assert capsys.readouterr().out == (
         f"2026-03-14 03:15Z, until 2026-04-13: 7 bytes, {place}/20260314T031500Z/{one.space}/{one.name}\n"
@@ -38,7 +38,7 @@ def test_the_trash_is_listed_with_the_day_on_which_each_file_goes(
 
 
 def test_an_empty_trash_is_said(clinic: Clinic, capsys: pytest.CaptureFixture[str]) -> None:
-    assert trash(clinic.folder, restore=False) == 0
+    assert trash(restore=False, data_dir=clinic.folder) == 0
     assert capsys.readouterr().out == f"0 files in {clinic.settings.trash}\n"
 
 
@@ -49,16 +49,16 @@ def test_files_of_a_lost_database_are_listed_without_it(
     clinic.db.close()
     for path in clinic.folder.glob("sagittal.db*"):
         path.unlink()
-    assert trash(clinic.folder, restore=False) == 0
+    assert trash(restore=False, data_dir=clinic.folder) == 0
     assert "1 files in" in capsys.readouterr().out
-    assert trash(clinic.folder, restore=True) == 1
+    assert trash(restore=True, data_dir=clinic.folder) == 1
     assert "There is no database in" in capsys.readouterr().err
 
 
 def test_what_the_database_knows_is_put_back(clinic: Clinic, capsys: pytest.CaptureFixture[str]) -> None:
     one = discard(clinic)
     assert list(clinic.blobs.files()) == []
-    assert trash(clinic.folder, restore=True) == 0
+    assert trash(restore=True, data_dir=clinic.folder) == 0
     said = capsys.readouterr().out
     assert said == f"1 files that the database refers to are back in {clinic.settings.blobs}\n"
     assert clinic.blobs.read(one.space, one.name) == b"signals"
@@ -67,6 +67,6 @@ def test_what_the_database_knows_is_put_back(clinic: Clinic, capsys: pytest.Capt
 def test_a_folder_that_was_never_a_clinic_stays_as_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert trash(tmp_path, restore=False) == 1
+    assert trash(restore=False, data_dir=tmp_path) == 1
     assert "There is no database in" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -28,7 +28,7 @@ def test_a_folder_that_somebody_moves_is_left_to_them(
     clinic: Clinic, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with fs.Lock(clinic.settings.workers_lock, "a move of stored files"):
-        assert worker(clinic.folder) == 1
+        assert worker(data_dir=clinic.folder) == 1
     assert capsys.readouterr().err.endswith(
         f"{clinic.folder} is in use by a move of stored files; start this worker after it.\n"
     )
@@ -37,11 +37,11 @@ def test_a_folder_that_somebody_moves_is_left_to_them(
 def test_a_database_of_a_newer_version_is_refused(clinic: Clinic, capsys: pytest.CaptureFixture[str]) -> None:
     with clinic.db.write() as c:
         c.exec_driver_sql("UPDATE alembic_version SET version_num = 'of_tomorrow'")
-    assert worker(clinic.folder) == 1
+    assert worker(data_dir=clinic.folder) == 1
     assert "of_tomorrow" in capsys.readouterr().err
 
 
 def test_what_a_worker_writes_nobody_else_may_read(clinic: Clinic) -> None:
     with fs.Lock(clinic.settings.workers_lock, "a move of stored files"):
-        worker(clinic.folder)
+        worker(data_dir=clinic.folder)
     assert os.umask(0o022) == 0o077

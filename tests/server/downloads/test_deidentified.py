@@ -54,7 +54,7 @@ def _fill(clinic: Clinic) -> tuple[str, list[str]]:
 
 def _write(clinic: Clinic, out: Path, key: Path, **options: object) -> int:
     given = {"patients": (), "signals": False, "without_consent": False, "who": None, **options}
-    return research(clinic.settings.data_dir, out, key, **given)  # type: ignore[arg-type]
+    return research(out, data_dir=clinic.settings.data_dir, key=key, **given)  # type: ignore[arg-type]
 
 
 def _read(path: Path) -> dict[str, bytes]:

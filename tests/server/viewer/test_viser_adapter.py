@@ -9,6 +9,7 @@ from contextlib import aclosing
 from operator import attrgetter
 from pathlib import Path
 from queue import Queue
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,11 +18,12 @@ from viser import _messages
 from viser._messages import SceneNodeUpdateMessage
 from viser.infra import _infra
 
-from sagittal.server.viewer import pipe
+from sagittal.server.viewer import viser_adapter
 from sagittal.server.viewer.batches import DrawnBatch
 from sagittal.server.viewer.client import client_page, unpack_page
 from sagittal.server.viewer.motion import ReplayMotion, prepare_motion
-from sagittal.server.viewer.sending import (
+from sagittal.server.viewer.views import FigureViews
+from sagittal.server.viewer.viser_adapter import (
     WINDOW_S,
     ArraysChanged,
     draw_lines,
@@ -29,7 +31,6 @@ from sagittal.server.viewer.sending import (
     move_copies,
     show_at_once,
 )
-from sagittal.server.viewer.views import FigureViews
 from tests.server import walk
 
 
@@ -62,7 +63,7 @@ def test_the_client_can_be_unpacked() -> None:
 
 
 def test_message_types_keep_their_names() -> None:
-    for name in pipe.ALLOWED | {"ShareUrlRequest"}:
+    for name in viser_adapter.ALLOWED | {"ShareUrlRequest"}:
         assert isinstance(getattr(_messages, name), type)
 
 
@@ -189,3 +190,38 @@ def test_a_picture_that_took_longer_than_viser_gathers_is_sent_when_it_ends() ->
         taking.cancel()
     finally:
         server.stop()
+
+
+@pytest.mark.parametrize(("home", "name"), [(_messages, "ViewerCameraMessage"), (_infra, "websockets")])
+def test_only_a_version_that_lacks_what_is_used_is_refused_and_in_a_sentence(
+    monkeypatch: pytest.MonkeyPatch, home: Any, name: str
+) -> None:
+    viser_adapter.require_known_viser()  # as it is installed
+    monkeypatch.delattr(home, name)
+    with pytest.raises(
+        viser_adapter.UnknownViserError, match=f"is not supported: .* has no {name}"
+    ) as refused:
+        viser_adapter.require_known_viser()
+    assert viser.__version__ in refused.value.message
+
+
+@pytest.mark.parametrize("page", [None, "<html><body>another client</body></html>"])
+def test_a_client_page_that_is_not_known_is_refused_in_a_sentence(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, page: str | None
+) -> None:
+    build = tmp_path / "client" / "build"
+    build.mkdir(parents=True)
+    if page is not None:
+        (build / "index.html").write_text(page)
+    monkeypatch.setattr(viser, "__file__", str(tmp_path / "__init__.py"))
+    with pytest.raises(viser_adapter.UnknownViserError, match="is not supported: its client page"):
+        viser_adapter.require_known_viser()
+
+
+def test_no_other_module_reads_what_is_private_to_viser() -> None:
+    private = re.compile(
+        r"viser\._|viser\.infra|\._impl\b|\._websock_server|\._queue_scene_message|client/build"
+    )
+    folder = Path(viser_adapter.__file__).parents[1]
+    readers = {path.name for path in folder.rglob("*.py") if private.search(path.read_text("utf-8"))}
+    assert readers == {"viser_adapter.py"}

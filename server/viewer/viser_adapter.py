@@ -1,20 +1,59 @@
-"""How pictures of a figure go through viser: a node is moved by one message, a picture wakes it once.
+"""All that we know of viser's insides: no other module reads its private names or its client's build.
 
-All that we know of viser's insides to send less than its public setters do; tests/server/viewer/
-test_viser_contract.py holds it.
+Pictures of a figure go through it with less than its public setters send: a node is moved by one message, a
+picture wakes it once. It listens on Unix sockets. tests/server/viewer/test_viser_adapter.py holds it, and
+`require_known_viser` says at the start of the server when an installed version has moved what is used here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Final
 
 import numpy as np
 import viser
-from viser._messages import EntityLifecycle, SceneNodeUpdateMessage
+import websockets.asyncio.server
 
+from sagittal.core.errors import SagittalError
 from sagittal.server.viewer.steps import Single
+
+
+class UnknownViserError(SagittalError):
+    """The installed viser is none that this version of Sagittal knows; the message says what is missing."""
+
+    def __init__(self, missing: str) -> None:
+        super().__init__(
+            "unknown_viser",
+            f"viser {viser.__version__} is not supported: {missing}. Install the version that "
+            "requirements.lock names.",
+        )
+
+
+try:
+    from viser import _messages
+    from viser._messages import (
+        EntityLifecycle,
+        SceneNodeUpdateMessage,
+        SetPositionMessage,
+        ShareUrlRequest,
+    )
+    from viser.infra import _infra
+except ImportError as error:
+    raise UnknownViserError(f"it has no {error.name or error}") from error
+
+ALLOWED: Final = frozenset({"ViewerCameraMessage"})
+"""Types of messages a browser may send to viser; everything else, such as a request to share, is dropped."""
+_USED: Final = {
+    _messages: sorted(ALLOWED),
+    _infra: ["websockets"],
+    _infra.WebsockServer: ["get_message_buffer", "unregister_handler"],
+    viser.SceneApi: ["_queue_scene_message"],
+    SceneNodeUpdateMessage: ["redundancy_key", "entity_state_key", "as_serializable_dict"],
+}
+"""What is used, by what has it."""
 
 WINDOW_S: Final = 0.1
 """How long viser gathers what nobody asked to be sent at once: longer than a picture is shown, so that its
@@ -101,3 +140,57 @@ def show_at_once(server: viser.ViserServer) -> Iterator[None]:
 def _wake(buffer: Any) -> None:
     buffer.message_event.set()
     buffer.flush_event.set()
+
+
+def move_node(handle: viser.SceneNodeHandle, place: tuple[float, float, float]) -> None:
+    """Move a node; the public setter casts and compares first, which takes longer than to move a part."""
+    inside = handle._impl  # noqa: SLF001
+    inside.position[:] = place
+    inside.api._queue_scene_message(SetPositionMessage(inside.name, place))  # noqa: SLF001
+
+
+def forbid_sharing(server: viser.ViserServer) -> None:
+    """Let no client ask for a public tunnel through a third party; the proxy drops the request, too."""
+    server._websock_server.unregister_handler(ShareUrlRequest)  # noqa: SLF001
+
+
+def read_client() -> str:
+    """Viser's client page, as its wheel has it.
+
+    Raises
+    ------
+    UnknownViserError
+        it is not there, or has no head to which anything could be added.
+    """
+    try:
+        page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
+    except OSError:
+        raise UnknownViserError("its client page is not where it was") from None
+    if not page.partition("<head>")[2].partition("</head>")[1]:
+        raise UnknownViserError("its client page has no head")
+    return page
+
+
+def require_known_viser() -> None:
+    """Raise UnknownViserError where the installed viser lacks what is used here."""
+    for home, names in _USED.items():
+        for name in names:
+            if not hasattr(home, name):
+                raise UnknownViserError(f"{home.__name__} has no {name}")
+    read_client()
+
+
+def _serve(handler: Any, host: str, port: int, **options: Any) -> Any:
+    """Listen as viser asks to, on a Unix socket if the host is a path."""
+    if host.startswith("/"):
+        return websockets.asyncio.server.unix_serve(handler, host, **options)
+    return websockets.asyncio.server.serve(handler, host, port, **options)
+
+
+# viser has no way to say where it listens but host and port: we give its own module, and no other, a `serve`
+# that knows paths
+_infra.websockets = SimpleNamespace(
+    asyncio=SimpleNamespace(server=SimpleNamespace(serve=_serve)),
+    datastructures=websockets.datastructures,
+    exceptions=websockets.exceptions,
+)
