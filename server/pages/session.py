@@ -19,7 +19,7 @@ from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.clinic.patients import Patient
 from sagittal.server.clinic.sessions import Session
-from sagittal.server.context import Config, Db, Id, Reviewed
+from sagittal.server.context import Config, Db, Id, Reviewed, state_of
 from sagittal.server.pages import daily
 from sagittal.server.pages.charts import (
     COLUMNS,
@@ -166,7 +166,7 @@ def _show_report(
     if template == CURVES and (elsewhere := lead_to_days(context)):
         return elsewhere
     if template == VALUES:
-        request.app.state.trail.record_watched(who, "numbers.opened", "session", sid)
+        state_of(request).trail.record_watched(who, "numbers.opened", "session", sid)
     else:
         record_opening(request, who, "session", sid)
     shown = choose_template(template, context)
