@@ -1,6 +1,7 @@
 """What endpoints take from the running application, as typed dependencies.
 
-The dependencies are asynchronous: for each that is not, FastAPI takes a thread; on a busy machine a page waits for all in turn.
+The dependencies are asynchronous: for each that is not, FastAPI takes a thread, and on a busy machine a page
+waits for all of them in turn.
 """
 
 from __future__ import annotations

@@ -43,11 +43,11 @@ from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.clinic.patients import Patient
+from sagittal.server.context import State, state_of
 from sagittal.server.http.carrying import carry_messages
 from sagittal.server.http.compression import accepts
 from sagittal.server.http.headers import KEPT
 from sagittal.server.http.problems import Problem, as_problem
-from sagittal.server.context import State, state_of
 from sagittal.server.report.files.bundle import read_poses
 from sagittal.server.report.view.no_figure import explain_no_figure
 from sagittal.server.results import analyses, comparisons, edit_log
