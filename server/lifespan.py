@@ -9,7 +9,7 @@ import logging
 import os
 import signal
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from functools import partial
 from typing import cast
 
@@ -100,7 +100,10 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     await asyncio.to_thread(state.nodes.start)
     state.hub = Hub(settings, db, state.reviewed, state.queue, state.nodes)
     await state.hub.start()
-    parts = {"workers": partial(_say_workers, state), "estimators": partial(_say_estimators, state)}
+    parts: dict[str, Callable[[], str]] = {
+        "workers": partial(_say_workers, state),
+        "estimators": partial(_say_estimators, state),
+    }
     if settings.node_name:
         parts["node"] = state.nodes.explain_silence
     state.readiness = Readiness(settings, db, state.blobs, parts=parts)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -79,10 +78,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
     if params["reference"] is not None:
         *files, last = files
         reference = read_orientation_table(last.read(), last.name)
-    manifest = json.dumps(params["manifest"], ensure_ascii=False).encode()
-    take = analysing.analyse_files(
-        files, manifest, params["config"], lambda _, share: attempt.progress("analysis", ANALYSED * share)
-    )
+    take = analysing.analyse_again(files, params, attempt, ANALYSED)
     measured, edits = take.measured, [read_edit(e) for e in params["edits"]]
     if edits and take.tracks is not None:
         measured = measure_gait(take.tracks, edits)

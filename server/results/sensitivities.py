@@ -6,7 +6,6 @@ The results are files of the analysis that was looked at, named by the job; so t
 from __future__ import annotations
 
 import datetime as dt
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -97,10 +96,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
     if settings["reference"] is not None:
         *files, last = files
         reference = read_reference(last.read(), last.name, from_standing=settings["from_standing"])
-    manifest = json.dumps(params["manifest"], ensure_ascii=False).encode()
-    take = analysing.analyse_files(
-        files, manifest, params["config"], lambda _, share: attempt.progress("analysis", ANALYSED * share)
-    )
+    take = analysing.analyse_again(files, params, attempt, ANALYSED)
     if take.calibrated is None or take.legs is None:
         why = "" if take.problem is None else f" {take.problem.message}"
         raise EstimationError("no_squats", f"The legs of this take were not followed.{why}")

@@ -40,8 +40,7 @@ def _publish_inspection(
 
 
 def _analyse(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
-    manifest = json.dumps(params["manifest"], ensure_ascii=False).encode()
-    return analysing.run(files, manifest, params["config"], attempt.progress)
+    return analysing.run(files, analysing.dump_manifest(params), params["config"], attempt.progress)
 
 
 def _publish_analysis(
