@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query
@@ -116,7 +115,7 @@ def _trend(trend: Trend) -> dict[str, Any]:
         "name": trend.name,
         "title": trend.term.label,
         "unit": trend.term.unit,
-        "norm": None if trend.norm is None else asdict(trend.norm),
+        "norm": trend.norm,
         "lines": [_line(line) for line in trend.lines],
     }
 
@@ -127,7 +126,7 @@ def _line(line: TrendSeries) -> dict[str, Any]:
         "side": line.side,
         "mdc": line.mdc,
         "mcid": line.mcid,
-        "points": [asdict(p) for p in line.points],
+        "points": line.points,
         "base": line.base,
         "latest": line.latest,
         "words": None if change is None else change_words(change).verdict,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from sqlalchemy import Connection, insert, select
@@ -163,7 +163,7 @@ def _collect_params(
         ],
         "analysis_id": found.id,
         "edits": [e.to_json() for e in edits.edits],
-        "visit": _describe_visit(patient, AnalysedSession(session, found, edits)).to_json(),
+        "visit": asdict(_describe_visit(patient, AnalysedSession(session, found, edits))),
     }
     params: dict[str, dict[str, Any]] = {kind.name: {**shared, "kind": kind.name} for kind in wanted}
     handed_on = [kind.name for kind in wanted if kind.hands_on_signed]
