@@ -335,7 +335,7 @@ def _stride_row(s: Stride) -> StrideRow:
     return StrideRow(s.side, s.start_s, s.tc_s, s.end_s, s.excluded_reason is None, why)
 
 
-def _profile(bundle: Bundle, curves: CycleCurves, age: float | None, norms: Norms) -> ProfileView:
+def _profile(bundle: Bundle, curves: CycleCurves, age: float | None, norms: Norms) -> ProfileView | None:
     """Scores against all adults of this age, and against those at this speed where there are any."""
     matched = adult_reference_at_speed(age, norms.speed)
     at_speed = None if matched is None else _scores(bundle, curves, age, matched)
