@@ -28,6 +28,7 @@ def create_app(settings: Settings) -> FastAPI:
     from fastapi import FastAPI
     from starlette.middleware import Middleware
 
+    from sagittal.server.context import State
     from sagittal.server.http import problems
     from sagittal.server.http.body_limit import BodyLimit
     from sagittal.server.http.compression import Compression
@@ -65,8 +66,7 @@ def create_app(settings: Settings) -> FastAPI:
             *([Middleware(Forwarding)] if settings.node_name else []),
         ],
     )
-    app.state.settings = settings
-    app.state.metrics = metrics
+    app.state = State({"settings": settings, "metrics": metrics})
     problems.install(app)
     return app
 

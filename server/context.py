@@ -1,14 +1,17 @@
 """What endpoints take from the running application, as typed dependencies.
 
-Asynchronous: for each that is not, FastAPI takes a thread; on a busy machine a page waits for all in turn.
+The dependencies are asynchronous: for each that is not, FastAPI takes a thread, and on a busy machine a page
+waits for all of them in turn.
 """
 
 from __future__ import annotations
 
 import datetime as dt
-from typing import Annotated, Literal, cast
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, cast
 
 from fastapi import Depends, Path, Query
+from starlette import datastructures
 from starlette.requests import HTTPConnection
 
 from sagittal.core.frames import Protocol
@@ -19,68 +22,66 @@ from sagittal.server.jobs.feed import JobFeed
 from sagittal.server.jobs.queue import JobQueue
 from sagittal.server.live.hub import Hub
 from sagittal.server.live_takes.films import FilmIntake
+from sagittal.server.metrics import RequestMetrics
+from sagittal.server.nodes.registry import Nodes
+from sagittal.server.processes.supervisor import Workers
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings
 from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.readiness import Readiness
 from sagittal.server.trail import AuditTrail
 
 
-async def _settings(connection: HTTPConnection) -> Settings:
-    return cast("Settings", connection.app.state.settings)
+class State(datastructures.State):
+    """What the web process has open, as `app.state`: given by `create_app`, filled by the lifespan.
+
+    Rooms below this one take single parts of it from `app.state` and say their type themselves.
+    """
+
+    settings: Settings
+    metrics: RequestMetrics
+    db: Database
+    blobs: BlobStore
+    reviewed: ReviewedAnalyses
+    logins: Logins
+    trail: AuditTrail
+    throttle: Throttle
+    queue: JobQueue
+    feed: JobFeed
+    films: FilmIntake
+    nodes: Nodes
+    hub: Hub
+    readiness: Readiness
+    workers: Workers
+    """Only where `sagittal serve` started them."""
 
 
-async def _db(connection: HTTPConnection) -> Database:
-    return cast("Database", connection.app.state.db)
+def state_of(connection: HTTPConnection) -> State:
+    """Return what the application of a request has open."""
+    return cast("State", connection.app.state)
 
 
-async def _blobs(connection: HTTPConnection) -> BlobStore:
-    return cast("BlobStore", connection.app.state.blobs)
+def _part(choose: Callable[[State], object]) -> Any:
+    """A dependency that takes one part of the state."""
+
+    async def take(connection: HTTPConnection) -> object:
+        return choose(state_of(connection))
+
+    return Depends(take)
 
 
-async def _reviewed(connection: HTTPConnection) -> ReviewedAnalyses:
-    return cast("ReviewedAnalyses", connection.app.state.reviewed)
-
-
-async def _logins(connection: HTTPConnection) -> Logins:
-    return cast("Logins", connection.app.state.logins)
-
-
-async def _trail(connection: HTTPConnection) -> AuditTrail:
-    return cast("AuditTrail", connection.app.state.trail)
-
-
-async def _throttle(connection: HTTPConnection) -> Throttle:
-    return cast("Throttle", connection.app.state.throttle)
-
-
-async def _queue(connection: HTTPConnection) -> JobQueue:
-    return cast("JobQueue", connection.app.state.queue)
-
-
-async def _feed(connection: HTTPConnection) -> JobFeed:
-    return cast("JobFeed", connection.app.state.feed)
-
-
-async def _hub(connection: HTTPConnection) -> Hub:
-    return cast("Hub", connection.app.state.hub)
-
-
-async def _films(connection: HTTPConnection) -> FilmIntake:
-    return cast("FilmIntake", connection.app.state.films)
-
-
-Config = Annotated[Settings, Depends(_settings)]
-Db = Annotated[Database, Depends(_db)]
-Blobs = Annotated[BlobStore, Depends(_blobs)]
-Reviewed = Annotated[ReviewedAnalyses, Depends(_reviewed)]
-Queue = Annotated[JobQueue, Depends(_queue)]
-Feed = Annotated[JobFeed, Depends(_feed)]
-LiveHub = Annotated[Hub, Depends(_hub)]
-Films = Annotated[FilmIntake, Depends(_films)]
-OpenTrail = Annotated[AuditTrail, Depends(_trail)]
-OpenLogins = Annotated[Logins, Depends(_logins)]
-Failures = Annotated[Throttle, Depends(_throttle)]
+Config = Annotated[Settings, _part(lambda state: state.settings)]
+Db = Annotated[Database, _part(lambda state: state.db)]
+Blobs = Annotated[BlobStore, _part(lambda state: state.blobs)]
+Reviewed = Annotated[ReviewedAnalyses, _part(lambda state: state.reviewed)]
+Queue = Annotated[JobQueue, _part(lambda state: state.queue)]
+Feed = Annotated[JobFeed, _part(lambda state: state.feed)]
+LiveHub = Annotated[Hub, _part(lambda state: state.hub)]
+Films = Annotated[FilmIntake, _part(lambda state: state.films)]
+OpenTrail = Annotated[AuditTrail, _part(lambda state: state.trail)]
+OpenLogins = Annotated[Logins, _part(lambda state: state.logins)]
+Failures = Annotated[Throttle, _part(lambda state: state.throttle)]
 
 HEX_ID = r"^[0-9a-f]{32}$"
 """How an identifier looks."""

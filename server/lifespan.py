@@ -9,13 +9,15 @@ import logging
 import os
 import signal
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from functools import partial
+from typing import cast
 
 from fastapi import FastAPI
 
 from sagittal.server.auth.sessions import Logins
 from sagittal.server.auth.throttle import SharedFailures, Throttle
+from sagittal.server.context import State
 from sagittal.server.jobs.feed import JobFeed
 from sagittal.server.jobs.opening import open_queue
 from sagittal.server.live.hub import Hub
@@ -57,16 +59,16 @@ def _end_at_once() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def _say_workers(app: FastAPI) -> str:
+def _say_workers(state: State) -> str:
     """Whether the worker processes that `sagittal serve` started live; others tell nobody."""
-    workers: Workers | None = getattr(app.state, "workers", None)
+    workers: Workers | None = getattr(state, "workers", None)
     if workers is None or workers.healthy:
         return "ok"
-    return f"{len(workers.pids)} of {app.state.settings.workers} worker processes run; see the server's log."
+    return f"{len(workers.pids)} of {state.settings.workers} worker processes run; see the server's log."
 
 
-def _say_estimators(app: FastAPI) -> str:
-    living, wanted = len(app.state.hub.pool.pids), app.state.settings.live_workers
+def _say_estimators(state: State) -> str:
+    living, wanted = len(state.hub.pool.pids), state.settings.live_workers
     if living >= wanted:
         return "ok"
     return f"{living} of {wanted} estimator processes run; see the server's log."
@@ -75,42 +77,46 @@ def _say_estimators(app: FastAPI) -> str:
 @contextlib.asynccontextmanager
 async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     """Open database, files, queue and live takes of `app.state.settings` while the block runs."""
-    settings: Settings = app.state.settings
+    state = cast("State", app.state)
+    settings = state.settings
     refuse_strangers(settings)
     upgrade(settings.database_source, backups=settings.backups)
     db = Database(settings.database_source)
-    app.state.db = db
-    app.state.blobs = open_blobs(settings)
-    app.state.reviewed = ReviewedAnalyses(app.state.blobs)
-    await asyncio.to_thread(_look_after, db, app.state.blobs, settings)
-    app.state.trail = AuditTrail(db)
-    app.state.queue = open_queue(db, settings.lease_s)
-    app.state.feed = JobFeed(db)
-    app.state.throttle = Throttle(time.time, SharedFailures(db)) if settings.node_name else Throttle()
-    app.state.logins = Logins(
+    state.db = db
+    state.blobs = open_blobs(settings)
+    state.reviewed = ReviewedAnalyses(state.blobs)
+    await asyncio.to_thread(_look_after, db, state.blobs, settings)
+    state.trail = AuditTrail(db)
+    state.queue = open_queue(db, settings.lease_s)
+    state.feed = JobFeed(db)
+    state.throttle = Throttle(time.time, SharedFailures(db)) if settings.node_name else Throttle()
+    state.logins = Logins(
         db, dt.timedelta(minutes=settings.idle_minutes), dt.timedelta(hours=settings.absolute_hours)
     )
     keeper = MarkKeeper(db, settings.mark)
     keeper.start()
-    app.state.films = FilmIntake(settings, db, app.state.blobs)
-    app.state.nodes = Nodes(settings, db, _end_at_once)
-    await asyncio.to_thread(app.state.nodes.start)
-    app.state.hub = Hub(settings, db, app.state.reviewed, app.state.queue, app.state.nodes)
-    await app.state.hub.start()
-    parts = {"workers": partial(_say_workers, app), "estimators": partial(_say_estimators, app)}
+    state.films = FilmIntake(settings, db, state.blobs)
+    state.nodes = Nodes(settings, db, _end_at_once)
+    await asyncio.to_thread(state.nodes.start)
+    state.hub = Hub(settings, db, state.reviewed, state.queue, state.nodes)
+    await state.hub.start()
+    parts: dict[str, Callable[[], str]] = {
+        "workers": partial(_say_workers, state),
+        "estimators": partial(_say_estimators, state),
+    }
     if settings.node_name:
-        parts["node"] = app.state.nodes.explain_silence
-    app.state.readiness = Readiness(settings, db, app.state.blobs, parts=parts)
-    figures = StateCollector(settings, db, app.state.readiness.checks, app.state.nodes)
-    app.state.metrics.registry.register(figures)
+        parts["node"] = state.nodes.explain_silence
+    state.readiness = Readiness(settings, db, state.blobs, parts=parts)
+    figures = StateCollector(settings, db, state.readiness.checks, state.nodes)
+    state.metrics.registry.register(figures)
     try:
-        async with app.state.trail.run():
+        async with state.trail.run():
             yield
     finally:
-        app.state.metrics.registry.unregister(figures)
-        await app.state.hub.stop()
-        app.state.films.close()
-        app.state.feed.close()
-        await asyncio.to_thread(app.state.nodes.stop)
+        state.metrics.registry.unregister(figures)
+        await state.hub.stop()
+        state.films.close()
+        state.feed.close()
+        await asyncio.to_thread(state.nodes.stop)
         await asyncio.to_thread(keeper.stop)
         db.close()

@@ -148,11 +148,7 @@ class AuditTrail:
 
     def flush(self) -> bool:
         """Write the rows that wait; whether none waits any more. Raises SQLAlchemyError but for a refusal."""
-        try:
-            self._write()
-        except Exception as error:
-            if refusal_of(error) is None:
-                raise
+        self._is_refused()
         return not self._waiting
 
     @contextlib.asynccontextmanager
@@ -181,17 +177,27 @@ class AuditTrail:
             self._write()
         self._waiting.append(row)
         try:
-            self._write()
-        except Exception as error:
-            if refusal_of(error) is None:
-                with self._turn, contextlib.suppress(ValueError):
-                    self._waiting.remove(row)
-                raise
+            is_refused = self._is_refused()
+        except Exception:
+            with self._turn, contextlib.suppress(ValueError):
+                self._waiting.remove(row)
+            raise
+        if is_refused:
             name = row.actor.name if row.actor else None
             log.warning(
                 "an audit row waits for room on the disk: %s %s %s by %s",
                 row.action, row.resource, row.resource_id, name,
             )  # fmt: skip
+
+    def _is_refused(self) -> bool:
+        """Write the rows that wait; whether the disk refused them. Raises what is no refusal."""
+        try:
+            self._write()
+        except Exception as error:
+            if refusal_of(error) is None:
+                raise
+            return True
+        return False
 
     def _write(self) -> None:
         """Write all rows in order; what was not committed goes on waiting."""

@@ -137,6 +137,7 @@ class FootContactState:
     ) -> FootContactState:
         """State before the first sample at `rate_hz`."""
         # numba is slow to import and only needed here
+        from sagittal.core.events.contact_moments_kernel import ContactRule
         from sagittal.core.events.foot_contact_kernel import (
             BOTTOM,
             COUNTERS,
@@ -145,7 +146,6 @@ class FootContactState:
             OPEN_TOP,
             PITCHED,
             SUMS,
-            ContactRule,
         )
 
         params = params or FootContactParams()

@@ -188,15 +188,6 @@ class NewApiToken(ApiToken):
 
 
 @dataclass(frozen=True)
-class SecondFactorSetUp:
-    """What an authenticator needs, shown this once: the secret, its otpauth address, a picture of that."""
-
-    secret: str
-    address: str
-    picture: str
-
-
-@dataclass(frozen=True)
 class RecoveryCodes:
     """Codes for when the telephone is lost, one a line; shown this once, each works once."""
 

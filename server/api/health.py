@@ -8,7 +8,7 @@ from sagittal.server.api import schemas
 from sagittal.server.api.documents import PUBLIC
 from sagittal.server.auth.access import require
 from sagittal.server.auth.roles import Action
-from sagittal.server.storage.readiness import Readiness
+from sagittal.server.context import state_of
 
 router = APIRouter(prefix="/health", tags=["health"], dependencies=[])
 _DOOR = [require(Action.CHECK_HEALTH)]
@@ -31,8 +31,7 @@ def live() -> schemas.HealthAnswer:
 )
 def ready(request: Request, response: Response) -> schemas.HealthAnswer:
     """Check that database and folder can be written, the schema is ours, there is room, processes live."""
-    readiness: Readiness = request.app.state.readiness
-    checks = dict(readiness.checks())
+    checks = dict(state_of(request).readiness.checks())
     healthy = all(state == "ok" for state in checks.values())
     response.status_code = 200 if healthy else 503
     return schemas.HealthAnswer(status="ok" if healthy else "failing", checks=checks)

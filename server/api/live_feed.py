@@ -22,11 +22,10 @@ from sagittal.server.auth.access import find_end, require, wait_for_end
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.clinic import sessions
-from sagittal.server.context import Id
+from sagittal.server.context import Id, state_of
 from sagittal.server.live.hub import MIND_S, Hub
 from sagittal.server.live.room import BrowserQueue
 from sagittal.server.nodes.pins import Pin, find_owner
-from sagittal.server.nodes.registry import Nodes
 
 router = APIRouter(include_in_schema=False)
 
@@ -37,14 +36,14 @@ GONE = 4404
 @router.websocket("/sessions/{sid}/live/feed")
 async def feed(ws: WebSocket, sid: Id, who: Annotated[Identity, require(Action.RUN_LIVE)]) -> None:
     """Tell a browser what happens."""
-    hub: Hub = ws.app.state.hub
-    db = ws.app.state.db
+    state = state_of(ws)
+    hub, db = state.hub, state.db
     await ws.accept()
 
     def look() -> bytes:
         with db.read() as c:
             sessions.get(c, sid)
-        ws.app.state.trail.record_watched(who, "live.watched", "session", sid)
+        state.trail.record_watched(who, "live.watched", "session", sid)
         return msgspec.json.encode(hub.standing(sid))
 
     try:
@@ -84,13 +83,14 @@ async def _down(ws: WebSocket, viewer: BrowserQueue) -> None:
 
 async def _until_moved(ws: WebSocket, sid: str) -> None:
     """Return when another web server has the session's take: the browser then comes back and is led there."""
-    nodes: Nodes = ws.app.state.nodes
+    state = state_of(ws)
+    nodes = state.nodes
     while True:
         await asyncio.sleep(MIND_S)
         if not nodes.is_one_of_several:
             continue
         with contextlib.suppress(SQLAlchemyError):
-            owner = await asyncio.to_thread(find_owner, ws.app.state.db, nodes, Pin("session", sid))
+            owner = await asyncio.to_thread(find_owner, state.db, nodes, Pin("session", sid))
             if owner is not None and owner.node is not None:
                 return
 
@@ -104,5 +104,5 @@ def _find_end(ws: WebSocket, hub: Hub, sid: str, who: Identity) -> str | None:
     """Why the feed must end; a running live view counts as activity."""
     take = hub.take_of(sid)
     if take is not None and take.tablet is not None:
-        ws.app.state.logins.touch(who.login_id)
+        state_of(ws).logins.touch(who.login_id)
     return find_end(ws)

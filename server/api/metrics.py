@@ -7,7 +7,7 @@ from prometheus_client import CONTENT_TYPE_LATEST
 
 from sagittal.server.auth.access import require
 from sagittal.server.auth.roles import Action
-from sagittal.server.metrics import RequestMetrics
+from sagittal.server.context import state_of
 
 router = APIRouter(include_in_schema=False)
 
@@ -15,5 +15,4 @@ router = APIRouter(include_in_schema=False)
 @router.get("/metrics", dependencies=[require(Action.READ_SYSTEM)])
 def read_metrics(request: Request) -> Response:
     """Everything in the text format of Prometheus."""
-    metrics: RequestMetrics = request.app.state.metrics
-    return Response(metrics.render(), media_type=CONTENT_TYPE_LATEST)
+    return Response(state_of(request).metrics.render(), media_type=CONTENT_TYPE_LATEST)

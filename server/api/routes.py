@@ -10,6 +10,7 @@ from starlette.types import Scope
 
 from sagittal.server.api import (
     analyses,
+    api_tokens,
     archives,
     audit_log,
     care_teams,
@@ -20,7 +21,7 @@ from sagittal.server.api import (
     exports,
     files,
     films,
-    filters,
+    filter_runs,
     health,
     identities,
     jobs,
@@ -33,7 +34,7 @@ from sagittal.server.api import (
     programmes,
     reports,
     reviews,
-    second_factors,
+    second_factor,
     security_keys,
     sensitivities,
     sessions,
@@ -41,7 +42,6 @@ from sagittal.server.api import (
     signed_reports,
     studies,
     tables,
-    tokens,
     trends,
     tunings,
     uploads,
@@ -71,8 +71,8 @@ def build_api() -> APIRouter:
     api = ApiRouter(prefix="/api/v1")
     for part in (
         sign_in,
-        tokens,
-        second_factors,
+        api_tokens,
+        second_factor,
         security_keys,
         patients,
         notes,
@@ -93,7 +93,7 @@ def build_api() -> APIRouter:
         tunings,
         estimators,
         films,
-        filters,
+        filter_runs,
         reports,
         signed_reports,
         archives,
@@ -108,7 +108,7 @@ def build_api() -> APIRouter:
         tablet,
     ):
         api.include_router(part.router)
-    api.include_router(filters.references)
+    api.include_router(filter_runs.references)
 
     @api.get("/openapi.json", include_in_schema=False)
     def document(request: Request, who: Annotated[Identity, require(Action.READ_API)]) -> dict[str, Any]:

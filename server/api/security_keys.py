@@ -5,17 +5,17 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Request
-from sqlalchemy import Connection
 
 from sagittal.server import audit
 from sagittal.server.api import account_schemas, schemas
 from sagittal.server.api.documents import refusals
-from sagittal.server.auth import accounts, second_factor, security_keys
+from sagittal.server.api.proofs import Proving
+from sagittal.server.auth import second_factor, security_keys
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.auth.security_keys import site_of
-from sagittal.server.context import Config, Db, Failures, Id, OpenTrail, address_of
+from sagittal.server.context import Config, Db, Id, OpenTrail
 from sagittal.server.http.json_body import StrictJsonRoute
 from sagittal.server.http.problems import Problem
 
@@ -35,19 +35,11 @@ def list_keys(db: Db, who: Self) -> list[account_schemas.SecurityKey]:
     "/security-keys/options", response_model=account_schemas.KeyOptions, responses=refusals(409, 429)
 )
 def begin(
-    body: account_schemas.BothProofs,
-    request: Request,
-    db: Db,
-    settings: Config,
-    trail: OpenTrail,
-    failures: Failures,
-    who: Self,
+    body: account_schemas.BothProofs, request: Request, settings: Config, proof: Proving
 ) -> account_schemas.KeyOptions:
     """What the browser needs to set up a key; it is answered within five minutes."""
-    accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
-    site = site_of(request, behind_tls=settings.behind_tls)
-    with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
-        _require_code(c, settings, who, body.code)
+    site, who = site_of(request, behind_tls=settings.behind_tls), proof.who
+    with proof.write(body.password, body.code) as c:
         return account_schemas.KeyOptions(security_keys.begin_registration(c, site, who.user_id, who.name))
 
 
@@ -76,51 +68,23 @@ def add(
 
 @router.post("/security-keys/{key_id}/remove", status_code=204, responses=refusals(404, 429))
 def remove(
-    key_id: Id,
-    body: account_schemas.BothProofs,
-    request: Request,
-    db: Db,
-    settings: Config,
-    trail: OpenTrail,
-    failures: Failures,
-    who: Self,
+    key_id: Id, body: account_schemas.BothProofs, request: Request, settings: Config, proof: Proving
 ) -> None:
     """Forget a key; with the last one of this address the figures of the authenticator are taken again."""
-    accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
-    with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
-        _require_code(c, settings, who, body.code)
-        security_keys.remove(c, site_of(request, behind_tls=settings.behind_tls), who.user_id, key_id)
+    site, who = site_of(request, behind_tls=settings.behind_tls), proof.who
+    with proof.write(body.password, body.code) as c:
+        security_keys.remove(c, site, who.user_id, key_id)
         audit.record(c, who, "user.security_key_removed", "user", who.user_id, {"key": key_id})
 
 
 @router.put("/second-factor/keys-only", status_code=204, responses=refusals(409, 429))
 def choose_keys_only(
-    body: account_schemas.KeysOnly,
-    request: Request,
-    db: Db,
-    settings: Config,
-    trail: OpenTrail,
-    failures: Failures,
-    who: Self,
+    body: account_schemas.KeysOnly, request: Request, settings: Config, proof: Proving
 ) -> None:
     """Take security keys and recovery codes only, or the figures of the authenticator as well."""
-    accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
-    with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
-        _require_code(c, settings, who, body.code)
-        site = site_of(request, behind_tls=settings.behind_tls)
+    site, who = site_of(request, behind_tls=settings.behind_tls), proof.who
+    with proof.write(body.password, body.code) as c:
         if body.on and not security_keys.list_usable(c, site, who.user_id):
             raise Problem(409, "no_key", "Set up a security key for this address first.")
         second_factor.take_keys_only(c, who.user_id, body.on)
         audit.record(c, who, "user.keys_only" if body.on else "user.codes_again", "user", who.user_id)
-
-
-def _require_code(c: Connection, settings: Config, who: Identity, code: str) -> None:
-    """After the password: a code, which a browser left open does not have. Raises CodeWrong 403."""
-    if not second_factor.is_on(c, who.user_id):
-        return  # nor has the account a key
-    before = second_factor.count_recovery(c, who.user_id)
-    if not second_factor.use(c, settings.second_factor_key, who.user_id, code):
-        raise second_factor.CodeWrong(403)
-    left = second_factor.count_recovery(c, who.user_id)
-    if left < before:
-        audit.record(c, who, "user.recovery_code_used", "user", who.user_id, {"left": left})

@@ -18,6 +18,7 @@ from starlette.responses import JSONResponse, RedirectResponse
 from sagittal.server import audit
 from sagittal.server.api import account_schemas
 from sagittal.server.api.documents import PUBLIC, refusals
+from sagittal.server.api.proofs import Proving
 from sagittal.server.api.users import user_answer
 from sagittal.server.auth import accounts, one_time, second_factor
 from sagittal.server.auth.access import require
@@ -196,16 +197,13 @@ def read_account(who: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> accou
 @router.post("/account/password", status_code=204, responses=refusals(429))
 def change_password(
     body: account_schemas.PasswordChange,
-    request: Request,
     db: Db,
     logins: OpenLogins,
-    trail: OpenTrail,
-    failures: Failures,
-    who: Annotated[Identity, require(Action.USE_ACCOUNT)],
+    proof: Proving,
 ) -> None:
     """Change one's own password; all other sign-ins of this person end."""
-    # 403, not 401: the person is signed in and must not be sent to the sign-in page
-    accounts.check_password(db, failures, trail, who.name, body.current, address_of(request), status=403)
+    proof.check_password(body.current)
+    who = proof.who
     hashed = hash_password(body.password)
     with db.write() as c:
         accounts.change(c, who.user_id, {"password_hash": hashed})

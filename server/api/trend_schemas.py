@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from sagittal.core.change import Change
 from sagittal.core.subject.condition import Footwear, Orthosis, WalkingAid, WalkingPace
+from sagittal.server.report.history.trends import TrendPoint
 
 
 @dataclass(frozen=True)
@@ -43,23 +44,6 @@ class OtherWalksAnswer:
     condition: Condition
     count: int
     session_id: str
-
-
-@dataclass(frozen=True)
-class TrendPoint:
-    """A value at a visit (index into `visits`); `change` from the first assessment, null with feedback.
-
-    `estimated`: a model of the leg gives it, no two sensors measure it.
-    """
-
-    visit: int
-    value: float
-    sd: float | None
-    n: int
-    ci_low: float | None
-    ci_high: float | None
-    change: Change | None
-    estimated: bool
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Depends, Query
 from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
@@ -25,12 +24,8 @@ from sagittal.server.report.tables import trends_csv
 from sagittal.server.report.words.change_words import change_words
 from sagittal.server.results import histories
 from sagittal.server.results.histories import PatientHistory
-from sagittal.server.results.reviewed import ReviewedAnalyses
-from sagittal.server.storage.db import Database
-from sagittal.server.trail import AuditTrail
 
 router = APIRouter(prefix="/patients/{patient_id}", tags=["trends"])
-Reader = Annotated[Identity, require(Action.READ_RESULT)]
 Names = Annotated[
     list[Annotated[str, Query(max_length=64)]],
     Query(
@@ -54,19 +49,34 @@ _CSV: dict[int | str, dict[str, Any]] = {
 }
 
 
-@router.get("/trends", response_model=None, responses=_JSON)
-def read_trends(
+def _follow(
     patient_id: Id,
     db: Db,
     reviewed: Reviewed,
     trail: OpenTrail,
-    who: Reader,
+    who: Annotated[Identity, require(Action.READ_RESULT)],
     show: Names,
     protocol: Walked = None,
     like: Like = None,
-) -> Response:
+) -> tuple[PatientHistory, tuple[Trend, ...]]:
+    with db.read() as c:
+        patient = patients.get(c, patient_id)
+        done, plans = histories.read(c, patient)
+    trail.record_opened(who, "trends.opened", "patient", patient_id)
+    known = histories.read_history(reviewed, patient, done, plans, protocol, like)
+    there = names_in(known.visits)
+    wanted = [n for n in show if n in there] if show else there
+    return known, follow_figures(known.visits, wanted, known.norms, known.usual, known.patient.affected_side)
+
+
+Followed = Annotated[tuple[PatientHistory, tuple[Trend, ...]], Depends(_follow)]
+"""The patient's history and the figures that the address asks for; its reader is allowed and written down."""
+
+
+@router.get("/trends", response_model=None, responses=_JSON)
+def read_trends(followed: Followed) -> Response:
     """Values by visit with the norm, and the change since the first assessment against MDC and MCID."""
-    known, found = _opened(db, reviewed, trail, who, patient_id, show, protocol, like)
+    known, found = followed
     visits = [
         {
             "session_id": v.session_id,
@@ -90,39 +100,10 @@ def read_trends(
 
 
 @router.get("/trends.csv", response_class=Response, responses=_CSV)
-def read_trends_table(
-    patient_id: Id,
-    db: Db,
-    reviewed: Reviewed,
-    trail: OpenTrail,
-    who: Reader,
-    show: Names,
-    protocol: Walked = None,
-    like: Like = None,
-) -> Response:
+def read_trends_table(patient_id: Id, followed: Followed) -> Response:
     """The same as a table: one row per figure, side and visit."""
-    known, found = _opened(db, reviewed, trail, who, patient_id, show, protocol, like)
+    known, found = followed
     return attachment(trends_csv(known.visits, found), f"trends-{patient_id[:8]}.csv")
-
-
-def _opened(
-    db: Database,
-    reviewed: ReviewedAnalyses,
-    trail: AuditTrail,
-    who: Identity,
-    patient_id: str,
-    names: list[str],
-    protocol: str | None,
-    like: str | None,
-) -> tuple[PatientHistory, tuple[Trend, ...]]:
-    with db.read() as c:
-        patient = patients.get(c, patient_id)
-        done, plans = histories.read(c, patient)
-    trail.record_opened(who, "trends.opened", "patient", patient_id)
-    known = histories.read_history(reviewed, patient, done, plans, protocol, like)
-    there = names_in(known.visits)
-    wanted = [n for n in names if n in there] if names else there
-    return known, follow_figures(known.visits, wanted, known.norms, known.usual, known.patient.affected_side)
 
 
 def _condition(walked: WalkingCondition) -> dict[str, Any]:
@@ -134,7 +115,7 @@ def _trend(trend: Trend) -> dict[str, Any]:
         "name": trend.name,
         "title": trend.term.label,
         "unit": trend.term.unit,
-        "norm": None if trend.norm is None else asdict(trend.norm),
+        "norm": trend.norm,
         "lines": [_line(line) for line in trend.lines],
     }
 
@@ -145,7 +126,7 @@ def _line(line: TrendSeries) -> dict[str, Any]:
         "side": line.side,
         "mdc": line.mdc,
         "mcid": line.mcid,
-        "points": [asdict(p) for p in line.points],
+        "points": line.points,
         "base": line.base,
         "latest": line.latest,
         "words": None if change is None else change_words(change).verdict,

@@ -72,15 +72,15 @@ class KeyOfFactorsUnusable(Problem):
 
 
 @dataclass(frozen=True)
-class Enrolment:
-    """What an authenticator needs: the secret as text, as otpauth address, as picture (data address)."""
+class SecondFactorSetUp:
+    """What an authenticator needs, shown this once: the secret, its otpauth address, a picture of that."""
 
     secret: str
     address: str
     picture: str
 
 
-def begin(c: Connection, key_file: Path, user_id: str, name: str) -> Enrolment:
+def begin(c: Connection, key_file: Path, user_id: str, name: str) -> SecondFactorSetUp:
     """Make a secret, which counts from the first right code on.
 
     Raises
@@ -95,7 +95,7 @@ def begin(c: Connection, key_file: Path, user_id: str, name: str) -> Enrolment:
     sealed = pyrage.encrypt(secret.encode(), [_read_key(key_file).to_public()])
     c.execute(insert(second_factor).values(user_id=user_id, secret=sealed, recovery=[], last_step=0))
     address = pyotp.TOTP(secret, interval=STEP_S).provisioning_uri(name=name, issuer_name="Sagittal")
-    return Enrolment(secret, address, segno.make(address, error="m").png_data_uri(scale=5, border=4))
+    return SecondFactorSetUp(secret, address, segno.make(address, error="m").png_data_uri(scale=5, border=4))
 
 
 def confirm(c: Connection, key_file: Path, user_id: str, code: str, at_s: float | None = None) -> list[str]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from sqlalchemy import Connection, insert, select
@@ -21,6 +21,7 @@ from sagittal.server.errors import Conflict
 from sagittal.server.export import kinds
 from sagittal.server.export.content import SignedForm, VisitFacts, open_content
 from sagittal.server.export.kinds import EXPORTED, ExportKind, name_file
+from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import EXPORT, VIEW_COLUMNS, Claim, JobQueue, JobView, job_view
 from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.results import analyses, edit_log
@@ -104,8 +105,8 @@ def submit(
     return submit_for(c, queue, actor, found, EXPORT, "export.requested", params[kind])
 
 
-def run(files: Sequence[SourceFile], params: Mapping[str, Any]) -> dict[str, bytes]:
-    """Write an export; pure.
+def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
+    """Write an export; pure, and too short to say how far it is.
 
     Parameters
     ----------
@@ -124,7 +125,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any]) -> dict[str, byt
     return {params["kind"]: kinds.write_export(params["kind"], content)}
 
 
-def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob]) -> None:
+def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Mapping[str, Blob]) -> None:
     """Write the file of a result, in the transaction that marks its job done."""
     for kind, blob in stored.items():
         name = name_file(kinds.find_kind(kind), claim.job_id)
@@ -162,7 +163,7 @@ def _collect_params(
         ],
         "analysis_id": found.id,
         "edits": [e.to_json() for e in edits.edits],
-        "visit": _describe_visit(patient, AnalysedSession(session, found, edits)).to_json(),
+        "visit": asdict(_describe_visit(patient, AnalysedSession(session, found, edits))),
     }
     params: dict[str, dict[str, Any]] = {kind.name: {**shared, "kind": kind.name} for kind in wanted}
     handed_on = [kind.name for kind in wanted if kind.hands_on_signed]

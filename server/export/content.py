@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -53,10 +53,6 @@ class VisitFacts:
     affected_side: Side | None = None
     condition: str = ""
     version: str = ""
-
-    def to_json(self) -> dict[str, Any]:
-        """As parameters of a job."""
-        return asdict(self)
 
     @classmethod
     def of_json(cls, values: Mapping[str, Any]) -> Self:

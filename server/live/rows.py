@@ -5,14 +5,16 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Collection
 
+from sqlalchemy import Connection, update
+
 from sagittal.server import audit
-from sagittal.server.errors import NotFound
+from sagittal.server.errors import NodeAway, NotFound
 from sagittal.server.live.intake import TakeEnd
 from sagittal.server.live_takes import live
-from sagittal.server.live_takes.live_claims import claim_take
 from sagittal.server.live_takes.live_training import LiveTraining, training_of
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.live_tables import live_take
 
 
 class Rows:
@@ -77,3 +79,17 @@ class Rows:
             return live.end(
                 c, actor, take_id, state, count=end.count, sha256=end.sha256 or None, problem=end.problem
             )
+
+
+def claim_take(c: Connection, take_id: str, owner: live.TakeOwner) -> live.LiveTakeRecord:
+    """Note that this start of a web server has a take from now on; raises NotFound, NodeAway.
+
+    What a later start of it has claimed stays that one's.
+    """
+    this = live.get(c, take_id)
+    owner.require(this)
+    if owner.node is not None and this.node_run is not None and this.node_run > (owner.run or 0):
+        raise NodeAway(this.node)
+    mine = live_take.c.id == take_id
+    c.execute(update(live_take).where(mine).values(node=owner.node, node_run=owner.run))
+    return live.get(c, take_id)

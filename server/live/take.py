@@ -9,7 +9,7 @@ import asyncio
 import time
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Final, Protocol
 
 import msgspec
@@ -72,10 +72,6 @@ class TherapistMark:
 
     t_s: float | None
     value: str | None
-
-    def to_json(self) -> dict[str, Any]:
-        """The same as plain values for JSON."""
-        return {"t_s": self.t_s, "value": self.value}
 
 
 @dataclass
@@ -295,7 +291,7 @@ class ActiveTake:
             "count": self.recorder.next_seq,
             "elapsed_s": None if elapsed is None else round(elapsed, 1),
             "sensors": sensor_rows(self.recorder.hello, self.recorder.heard, self._battery, silent=silent),
-            "marks": [mark.to_json() for mark in self.steered.marks],
+            "marks": [asdict(mark) for mark in self.steered.marks],
             "ghost": self.steered.ghost,
             "stale": self.steered.stale,
             "stopping": self.steered.stopping,

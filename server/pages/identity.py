@@ -12,11 +12,10 @@ from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.clinic import identities, patients
-from sagittal.server.context import Config, Db, Id
+from sagittal.server.context import Config, Db, Id, state_of
 from sagittal.server.pages.shell import render_page
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
-from sagittal.server.trail import AuditTrail
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -33,8 +32,7 @@ def show_identity(
     with db.read() as c:
         patient = patients.get(c, pid)
         known = identities.get(c, settings.identity_key_file, pid)
-    trail: AuditTrail = request.app.state.trail
-    trail.record_opened(who, "identity.opened", "patient", pid)
+    state_of(request).trail.record_opened(who, "identity.opened", "patient", pid)
     return render_page(
         request, db, who, "identity.html", "patients",
         patient=patient, known=known, most=identities.MOST, oldest=identities.OLDEST,
@@ -60,6 +58,5 @@ def name_on_paper(
     if may and named:
         with db.read() as c:
             known = identities.get(c, settings.identity_key_file, patient_id)
-        trail: AuditTrail = request.app.state.trail
-        trail.record_opened(who, "identity.printed", "patient", patient_id)
+        state_of(request).trail.record_opened(who, "identity.printed", "patient", patient_id)
     return {"may_name": may, "person": known}

@@ -18,9 +18,10 @@ from sagittal.server.clinic import patients, sessions
 from sagittal.server.clinic.patients import Patient
 from sagittal.server.clinic.sessions import Session
 from sagittal.server.context import Db, Id
-from sagittal.server.pages.guided_test import view_guided_test
 from sagittal.server.pages.shell import record_opening, render_page
 from sagittal.server.pages.words import PROTOCOL_NAMES, SEGMENT_NAMES
+from sagittal.server.report.view.functional import MEANT, norm_words
+from sagittal.server.report.words.guided_words import HINTS, TOTAL, tell_person
 from sagittal.server.report.words.wording import VARIABLES, ZERO_WORDS, Variable
 from sagittal.server.results import prescriptions
 
@@ -130,4 +131,23 @@ def list_terms() -> dict[str, Any]:
             "is_length": e.is_length,
         }
         for e in CATALOGUE.values()
+    }
+
+
+def view_guided_test(session: Session, patient: Patient) -> dict[str, Any] | None:
+    """What the page knows of a guided test before it begins; None of other sessions."""
+    total = TOTAL.get(session.protocol)
+    if total is None:
+        return None
+    age = patient.find_age(session.performed_on)
+    return {
+        "title": PROTOCOL_NAMES[session.protocol],
+        "total": total,
+        "label": CATALOGUE[total].label,
+        "say": tell_person(session.protocol, "get_ready"),
+        "hint": HINTS[session.protocol],
+        "go": session.protocol.startswith("standing"),
+        "rises": session.protocol == "five_sit_to_stand",
+        "norm": norm_words(total, age, patient.sex),
+        "meant": MEANT[total],
     }

@@ -19,7 +19,7 @@ from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.clinic.patients import Patient
 from sagittal.server.clinic.sessions import Session
-from sagittal.server.context import Config, Db, Id, Reviewed
+from sagittal.server.context import Config, Db, Id, Reviewed, state_of
 from sagittal.server.pages import daily
 from sagittal.server.pages.charts import (
     COLUMNS,
@@ -82,11 +82,8 @@ SHOWN: Final = (
     "strides",
     "duration_s",
     "norm_note",
-    "norm_source",
     "has_sides",
-    "at_speed",
     "curve_notes",
-    "used",
     "replay",
     "condition",
     "profile",
@@ -166,7 +163,7 @@ def _show_report(
     if template == CURVES and (elsewhere := lead_to_days(context)):
         return elsewhere
     if template == VALUES:
-        request.app.state.trail.record_watched(who, "numbers.opened", "session", sid)
+        state_of(request).trail.record_watched(who, "numbers.opened", "session", sid)
     else:
         record_opening(request, who, "session", sid)
     shown = choose_template(template, context)
@@ -256,6 +253,7 @@ def _draw_report(
     score, bars = view_profile(reviewed, model, context, height) if overview or paper else (None, [])
     return {
         **{name: getattr(model, name) for name in SHOWN},
+        **view_strides(model),
         "daily": daily.draw_daily(model.daily),
         "estimator": model.estimator,
         "groups": select_groups(model, paper=paper),
@@ -288,8 +286,6 @@ def _draw_report(
         if 0 < total <= STRIP_STRIDES.get(page, 0)
         else "",
         "drawn": "some strides" if overview and max(model.used.values()) > GLANCE_STRIDES else "",
-        "stride_words": f"{used} of {total} used",
-        "empty_reason": explain_emptiness(model),
         "identity": _identity(patient, session, model.condition),
         "provenance_line": " · ".join(
             (
@@ -342,6 +338,17 @@ def _list_for_clock(model: ReportModel, variables: Sequence[str]) -> dict[str, A
         if v in curves
     }
     return {**model.replay, "strides": strides, "curves": whole}
+
+
+def view_strides(model: ReportModel) -> dict[str, Any]:
+    """What overview and timeline say of the strides: how many, beside which norms, and why there are none."""
+    return {
+        "used": model.used,
+        "norm_source": model.norm_source,
+        "at_speed": model.at_speed,
+        "stride_words": f"{sum(model.used.values())} of {len(model.strides)} used",
+        "empty_reason": explain_emptiness(model),
+    }
 
 
 def explain_emptiness(model: ReportModel) -> str:

@@ -8,10 +8,10 @@ from starlette.responses import Response
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.clinic import jobs
+from sagittal.server.context import state_of
 from sagittal.server.http.templates import render
 from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.storage.db import Database
-from sagittal.server.trail import AuditTrail
 
 NAVIGATION = (
     ("patients", "people", "Patients", "/patients", Action.READ_PATIENT),
@@ -30,14 +30,12 @@ FRAGMENT = "x-sagittal-fragment"
 
 def record_opening(request: Request, who: Identity, resource: str, resource_id: str) -> None:
     """Write down that somebody looked at it."""
-    trail: AuditTrail = request.app.state.trail
-    trail.record_opened(who, f"{resource}.opened", resource, resource_id)
+    state_of(request).trail.record_opened(who, f"{resource}.opened", resource, resource_id)
 
 
 def record_listing(request: Request, who: Identity, resource: str) -> None:
     """Write down that somebody looks at the list of all."""
-    trail: AuditTrail = request.app.state.trail
-    trail.record_watched(who, f"{resource}.listed", resource, None)
+    state_of(request).trail.record_watched(who, f"{resource}.listed", resource, None)
 
 
 def render_page(

@@ -16,7 +16,7 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.clinic import patients
 from sagittal.server.clinic.calendar_days import move_years
 from sagittal.server.clinic.patients import Patient
-from sagittal.server.context import Config, Db
+from sagittal.server.context import Config, Db, state_of
 from sagittal.server.nodes.registry import Nodes, WebNode
 from sagittal.server.pages.shell import render_page
 from sagittal.server.safekeeping import backup_schedule
@@ -42,13 +42,13 @@ def show_system(
     request: Request, db: Db, settings: Config, who: Annotated[Identity, require(Action.READ_SYSTEM)]
 ) -> Response:
     """How the parts are, how backups and restore tests went, how far the audit log has come."""
-    checks = request.app.state.readiness.checks()
+    checks = state_of(request).readiness.checks()
     with db.read() as c:
         head = read_newest(c)
         overdue = _list_overdue(c, settings.retention_years)
     parts = [(PART_WORDS[name], None if said == "ok" else said) for name, said in checks.items()]
     state = backup_schedule.read_state(settings)
-    nodes: Nodes = request.app.state.nodes
+    nodes = state_of(request).nodes
     upcoming = backup_schedule.next_time(settings, dt.datetime.now().astimezone())
     return render_page(
         request, db, who, "system.html", "system",

@@ -16,7 +16,7 @@ from sagittal.server.context import Db, Id, OpenTrail, Reviewed
 from sagittal.server.http.templates import render
 from sagittal.server.pages.charts import KEY_HEIGHT, draw_chart
 from sagittal.server.pages.report_rows import select_first
-from sagittal.server.pages.session import explain_emptiness
+from sagittal.server.pages.session import view_strides
 from sagittal.server.pages.session_context import lead_to_days, read_measured_context
 from sagittal.server.pages.shell import FRAGMENT, record_opening, render_page
 from sagittal.server.report.view.model import ReportModel
@@ -86,13 +86,8 @@ def read_model(
 
 def view_numbers(model: ReportModel) -> dict[str, Any]:
     """What of the report stands beside the timeline and changes with every edit."""
-    used = model.used
     return {
+        **view_strides(model),
         "first": select_first(model),
         "key_curve": draw_chart(model.key_curve, KEY_HEIGHT, x_unit=True),
-        "used": used,
-        "norm_source": model.norm_source,
-        "at_speed": model.at_speed,
-        "stride_words": f"{sum(used.values())} of {len(model.strides)} used",
-        "empty_reason": explain_emptiness(model),
     }

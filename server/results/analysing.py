@@ -9,6 +9,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
 from sagittal.core.signals.memory import give_memory_back
+from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.provenance import CODE_VERSION
 
 if TYPE_CHECKING:
@@ -79,6 +80,23 @@ def analyse_files(
     declared = parse_manifest(manifest) if manifest is not None else None
     # by no name of its own: `analyse` lets go of parts of it
     return analyse(read_recording(files, declared), chosen, tell, CODE_VERSION, resumable=resumable)
+
+
+def analyse_again(
+    files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt, share: float
+) -> TakeAnalysis:
+    """Analyse a take as the analysis that a job is about did; the stages are one, `share` of the job."""
+    return analyse_files(
+        files,
+        dump_manifest(params),
+        params["config"],
+        lambda _, done: attempt.progress("analysis", share * done),
+    )
+
+
+def dump_manifest(params: Mapping[str, Any]) -> bytes:
+    """The manifest of a job, as JSON text."""
+    return json.dumps(params["manifest"], ensure_ascii=False).encode()
 
 
 @cache

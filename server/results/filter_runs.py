@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from sqlalchemy import Connection, insert, select
 from sagittal.core.fusion.algorithms.choice import require_filters
 from sagittal.server import audit
 from sagittal.server.errors import NotFound
+from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import COMPARE_FILTERS, Claim, JobQueue, JobView
 from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.results import analyses, analysing, edit_log
@@ -32,7 +32,6 @@ from sagittal.server.uploads import reference_files
 
 if TYPE_CHECKING:
     from sagittal.core.formats.source import SourceFile
-    from sagittal.core.pipeline import Progress
 
 
 ANALYSED: Final = 0.4
@@ -56,8 +55,8 @@ class FilterRunRecord:
     files: Mapping[str, Blob]
 
 
-def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progress) -> dict[str, bytes]:
-    """Analyse a take as its analysis did, and run the filters on it; pure but for `progress` and the clock.
+def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
+    """Analyse a take as its analysis did, and run the filters on it; pure but for `attempt` and the clock.
 
     Parameters
     ----------
@@ -79,10 +78,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progre
     if params["reference"] is not None:
         *files, last = files
         reference = read_orientation_table(last.read(), last.name)
-    manifest = json.dumps(params["manifest"], ensure_ascii=False).encode()
-    take = analysing.analyse_files(
-        files, manifest, params["config"], lambda _, share: progress("analysis", ANALYSED * share)
-    )
+    take = analysing.analyse_again(files, params, attempt, ANALYSED)
     measured, edits = take.measured, [read_edit(e) for e in params["edits"]]
     if edits and take.tracks is not None:
         measured = measure_gait(take.tracks, edits)
@@ -91,7 +87,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progre
         take,
         Strides(()) if measured is None else measured.strides,
         FilterRequest(tuple(settings["filters"]), settings["magnetometer"]),
-        lambda stage, share: progress(stage, ANALYSED + (1.0 - ANALYSED) * share),
+        lambda stage, share: attempt.progress(stage, ANALYSED + (1.0 - ANALYSED) * share),
         time.perf_counter,
         reference,
     )
@@ -136,7 +132,7 @@ def submit(
     )
 
 
-def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob]) -> None:
+def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Mapping[str, Blob]) -> None:
     """Write the rows of a result, in the transaction that marks its job done."""
     params, run_id = claim.params, new_id()
     reference = params["reference"] or {}

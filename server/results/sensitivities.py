@@ -6,7 +6,6 @@ The results are files of the analysis that was looked at, named by the job; so t
 from __future__ import annotations
 
 import datetime as dt
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -17,6 +16,7 @@ from sagittal.core.errors import EstimationError, InputError
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import Conflict, NotFound
+from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import SENSITIVITY, Claim, JobQueue, JobView
 from sagittal.server.report.files.bundle import read_angles
 from sagittal.server.report.view.sensitivity import sensitivity_files, summarise_sensitivity
@@ -28,7 +28,6 @@ from sagittal.server.uploads import reference_files
 
 if TYPE_CHECKING:
     from sagittal.core.formats.source import SourceFile
-    from sagittal.core.pipeline import Progress
     from sagittal.core.squat.sensitivity import ReferenceAngles
 
 ANALYSED: Final = 0.3
@@ -78,8 +77,8 @@ def read_reference(content: bytes, name: str, *, from_standing: bool) -> Referen
     return ReferenceAngles(angles.t_s, known)
 
 
-def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progress) -> dict[str, bytes]:
-    """Analyse a take as its analysis did, and put every parameter off; pure but for `progress`.
+def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
+    """Analyse a take as its analysis did, and put every parameter off; pure but for `attempt`.
 
     Parameters
     ----------
@@ -97,10 +96,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progre
     if settings["reference"] is not None:
         *files, last = files
         reference = read_reference(last.read(), last.name, from_standing=settings["from_standing"])
-    manifest = json.dumps(params["manifest"], ensure_ascii=False).encode()
-    take = analysing.analyse_files(
-        files, manifest, params["config"], lambda _, share: progress("analysis", ANALYSED * share)
-    )
+    take = analysing.analyse_again(files, params, attempt, ANALYSED)
     if take.calibrated is None or take.legs is None:
         why = "" if take.problem is None else f" {take.problem.message}"
         raise EstimationError("no_squats", f"The legs of this take were not followed.{why}")
@@ -111,7 +107,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progre
         reference,
         from_standing=settings["from_standing"],
         params=take.config.squat.chain,
-        progress=lambda _, share: progress("parameters", ANALYSED + (1.0 - ANALYSED) * share),
+        progress=lambda _, share: attempt.progress("parameters", ANALYSED + (1.0 - ANALYSED) * share),
     )
     told = summarise_sensitivity(found, settings["reference"], from_standing=settings["from_standing"])
     return sensitivity_files(told, "sensitivity")
@@ -147,7 +143,7 @@ def submit(
     )
 
 
-def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob]) -> None:
+def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Mapping[str, Blob]) -> None:
     """Write the files of a result, in the transaction that marks its job done."""
     for name, blob in stored.items():
         row = {"name": _name(claim.job_id, name), "size": blob.size, "sha256": blob.sha256}

@@ -28,6 +28,7 @@ from sagittal.server.errors import Conflict, NotFound
 from sagittal.server.jobs.queue import TUNE, Claim, JobQueue, JobView, Priority
 from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.results.analyses import digest_json
+from sagittal.server.storage.blobs import Blob
 from sagittal.server.storage.tables import new_id, now, recording, tuning
 from sagittal.server.uploads import recordings
 
@@ -113,15 +114,19 @@ def search(tuner: GainTuner, keep: Keep, swarm: Swarm | None) -> TuningResult:
         return tuner.run(keep, swarm, pool.map)
 
 
-def run(files: Sequence[SourceFile], order: Mapping[str, Any], attempt: Attempt) -> bytes:
+def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
     """Tune, going on from what an earlier attempt of this version left; the result as JSON.
+
+    Parameters
+    ----------
+    params : of the job, its `order` as members of TuningOrder.
 
     Raises
     ------
     SagittalError : see `prepare`.
     """
     attempt.progress("reading", 0.0)
-    tuner = prepare(files, TuningOrder(**order))
+    tuner = prepare(files, TuningOrder(**params["order"]))
     swarm = None
     if attempt.checkpoint is not None:
         with contextlib.suppress(ParameterError):
@@ -131,7 +136,8 @@ def run(files: Sequence[SourceFile], order: Mapping[str, Any], attempt: Attempt)
         attempt.keep(content)
         attempt.progress("searching", share, message)
 
-    return json.dumps(search(tuner, keep, swarm).to_json(), ensure_ascii=False, allow_nan=False).encode()
+    found = search(tuner, keep, swarm).to_json()
+    return {RESULT: json.dumps(found, ensure_ascii=False, allow_nan=False).encode()}
 
 
 def submit(
@@ -162,7 +168,7 @@ def submit(
     return view
 
 
-def publish(c: Connection, claim: Claim, content: bytes) -> None:
+def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Mapping[str, Blob]) -> None:
     """Write the row of a result, in the transaction that marks its job done."""
     row = {
         "id": new_id(),
@@ -170,7 +176,7 @@ def publish(c: Connection, claim: Claim, content: bytes) -> None:
         "job_id": claim.job_id,
         "input_sha256": claim.params["input_sha256"],
         "code_version": CODE_VERSION,
-        "result": json.loads(content),
+        "result": json.loads(files[RESULT]),
         "created_at": now(),
     }
     c.execute(insert(tuning).values(row))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -79,9 +79,19 @@ def check(
         found.append(StorageDefect("audit", cut))
     trash = list(blobs.trash.files())
     waiting = {(one.space, one.name) for one in trash}
+    return [
+        *found,
+        *_check_files(blobs, [one for one in used if one not in known_missing], waiting),
+        *_check_live(db, settings),
+        *(f for one in trash for f in _check_discarded(blobs.trash, one)),
+    ]
+
+
+def _check_files(
+    blobs: BlobStore, used: Sequence[tuple[str, str]], waiting: Collection[tuple[str, str]]
+) -> Iterator[StorageDefect]:
+    """Open every file that is in use, by its hash; those that are `waiting` lie in the trash."""
     for space, sha256 in used:
-        if (space, sha256) in known_missing:
-            continue
         try:
             blobs.open(space, sha256).close()
         except StoreAway:
@@ -90,14 +100,9 @@ def check(
             text = f"patient {space}: {error.message}"
             if (space, sha256) in waiting:
                 text = f"patient {space}: {sha256[:12]}… lies in the trash; run `sagittal trash --restore`."
-            found.append(StorageDefect("files", text))
+            yield StorageDefect("files", text)
         except OSError as error:
-            found.append(StorageDefect("files", f"patient {space}, file {sha256[:12]}…: {error.strerror}"))
-    return [
-        *found,
-        *_check_live(db, settings),
-        *(f for one in trash for f in _check_discarded(blobs.trash, one)),
-    ]
+            yield StorageDefect("files", f"patient {space}, file {sha256[:12]}…: {error.strerror}")
 
 
 def _check_live(db: Database, settings: Settings) -> list[StorageDefect]:

@@ -26,7 +26,7 @@ from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.clinic import patients, sessions
-from sagittal.server.context import Db, Id, OpenTrail
+from sagittal.server.context import Db, Id, OpenTrail, state_of
 from sagittal.server.live.hub import Hub
 from sagittal.server.live_takes import live
 from sagittal.server.storage.db import Database
@@ -48,7 +48,7 @@ async def figure(
     dark: bool = False,
 ) -> JSONResponse:
     """Open the live figure of a session."""
-    hub: Hub = request.app.state.hub
+    hub = state_of(request).hub
     body, norm = await asyncio.to_thread(_person, db, sid, hub.owner)
     await asyncio.to_thread(trail.record_watched, who, "live.watched", "session", sid)
     views: FigureViews = request.app.state.views

@@ -43,11 +43,11 @@ from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.clinic.patients import Patient
+from sagittal.server.context import State, state_of
 from sagittal.server.http.carrying import carry_messages
 from sagittal.server.http.compression import accepts
 from sagittal.server.http.headers import KEPT
 from sagittal.server.http.problems import Problem, as_problem
-from sagittal.server.nodes.registry import Nodes
 from sagittal.server.report.files.bundle import read_poses
 from sagittal.server.report.view.no_figure import explain_no_figure
 from sagittal.server.results import analyses, comparisons, edit_log
@@ -93,7 +93,7 @@ Reader = Annotated[Identity, require(Action.READ_RESULT)]
 @contextlib.asynccontextmanager
 async def open_views(app: FastAPI) -> AsyncIterator[None]:
     """Keep the figures that are looked at in `app.state.views` while the block runs."""
-    nodes: Nodes = app.state.nodes
+    nodes = cast("State", app.state).nodes
     async with FigureViews(make_id=lambda: nodes.make_id_here(new_id)).run() as views:
         app.state.views = views
         yield
@@ -176,7 +176,7 @@ async def replay(
         await ws.send_json({"error": {"code": problem.code, "detail": problem.detail}})
         await ws.close(_GONE, problem.code)
         return
-    logins = ws.app.state.logins
+    logins = state_of(ws).logins
     name = view if view and _views(ws).find(view, who.login_id, who.role) is opened else opened.id
     with opened.keep_open():
         motion = opened.figure.motion
@@ -205,7 +205,8 @@ async def replay(
 async def _open(
     ws: WebSocket, sid: str, who: Identity, other: str | None, *, tab: str, **shown_first: Any
 ) -> FigureView[ReplayFigure]:
-    db, reviewed = ws.app.state.db, ws.app.state.reviewed
+    state = state_of(ws)
+    db, reviewed = state.db, state.reviewed
 
     def latest() -> tuple[AnalysedSession | None, AnalysedSession | None, Patient]:
         with db.read() as c:
@@ -228,7 +229,7 @@ async def _open(
     for seen in (this, before):
         if seen is not None:
             await asyncio.to_thread(
-                ws.app.state.trail.record_watched, who, "replay.opened", "session", seen.session.id
+                state.trail.record_watched, who, "replay.opened", "session", seen.session.id
             )
     if this is None:
         raise Problem(404, "no_poses", await asyncio.to_thread(why_nothing))

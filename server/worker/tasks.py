@@ -1,7 +1,8 @@
 """The kinds of job of this version.
 
 Look into a recording, analyse it, run filters on it, tune one, see how sure the angles of squats are, write
-a file for another program.
+a file for another program. The kinds that concern one room are its own `run` and `publish`; the two here
+join two rooms each.
 """
 
 from __future__ import annotations
@@ -39,8 +40,7 @@ def _publish_inspection(
 
 
 def _analyse(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
-    manifest = json.dumps(params["manifest"], ensure_ascii=False).encode()
-    return analysing.run(files, manifest, params["config"], attempt.progress)
+    return analysing.run(files, analysing.dump_manifest(params), params["config"], attempt.progress)
 
 
 def _publish_analysis(
@@ -49,50 +49,6 @@ def _publish_analysis(
     found = json.loads(files["analysis.json"])
     analyses.publish(c, claim, blobs, found["provenance"]["parameters_sha256"])
     devices.keep_checks(c, str(claim.recording_id), found["devices"])
-
-
-def _tune(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
-    return {tunings.RESULT: tunings.run(files, params["order"], attempt)}
-
-
-def _publish_tuning(
-    c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
-) -> None:
-    tunings.publish(c, claim, files[tunings.RESULT])
-
-
-def _compare_filters(
-    files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
-) -> dict[str, bytes]:
-    return filter_runs.run(files, params, attempt.progress)
-
-
-def _publish_filters(
-    c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
-) -> None:
-    filter_runs.publish(c, claim, blobs)
-
-
-def _analyse_sensitivity(
-    files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
-) -> dict[str, bytes]:
-    return sensitivities.run(files, params, attempt.progress)
-
-
-def _publish_sensitivity(
-    c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
-) -> None:
-    sensitivities.publish(c, claim, blobs)
-
-
-def _export(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
-    return exports.run(files, params)
-
-
-def _publish_export(
-    c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
-) -> None:
-    exports.publish(c, claim, blobs)
 
 
 def _warm() -> None:
@@ -114,7 +70,7 @@ def _warm() -> None:
 
 register(Task(recordings.INSPECT, _inspect, _publish_inspection, keeps_files=False))
 register(Task(recordings.ANALYSE, _analyse, _publish_analysis, keeps_files=True, warm=_warm))
-register(Task(TUNE, _tune, _publish_tuning, keeps_files=False))
-register(Task(COMPARE_FILTERS, _compare_filters, _publish_filters, keeps_files=True))
-register(Task(SENSITIVITY, _analyse_sensitivity, _publish_sensitivity, keeps_files=True))
-register(Task(EXPORT, _export, _publish_export, keeps_files=True))
+register(Task(TUNE, tunings.run, tunings.publish, keeps_files=False))
+register(Task(COMPARE_FILTERS, filter_runs.run, filter_runs.publish, keeps_files=True))
+register(Task(SENSITIVITY, sensitivities.run, sensitivities.publish, keeps_files=True))
+register(Task(EXPORT, exports.run, exports.publish, keeps_files=True))

@@ -16,6 +16,7 @@ RULES: Final[Mapping[str, Callable[[], list[str]]]] = {
     "only server/storage/fs.py writes files": architecture.find_writers,
     "public class names are unique": names.find_repeated_class_names,
     "function names begin with no participle": names.find_participle_functions,
+    "modules of the API have namesakes": names.find_unnamed_api,
     "sentences have at most 25 words": sentences.find_long_sentences,
     "references lead somewhere": references.find_broken_references,
     "nothing outside the repository is mentioned": references.find_outside_mentions,

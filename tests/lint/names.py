@@ -1,9 +1,10 @@
-"""Naming rules: public class names are unique, function names begin with no participle."""
+"""Naming rules: public class names are unique, function names begin with no participle, API has namesakes."""
 
 from __future__ import annotations
 
 import ast
 from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 from tests.data import ROOT
@@ -56,3 +57,42 @@ def find_participle_functions() -> list[str]:
         for path in list_files()
         for name in find_participles(path.read_text())
     ]
+
+
+ROOMS = (
+    ".", "auth", "clinic", "uploads", "results", "sharing", "live_takes", "downloads", "safekeeping", "pages"
+)  # fmt: skip
+"""Rooms of server in which what a module of server/api serves may be found."""
+
+NAMED_OTHERWISE: Mapping[str, str] = {
+    "account_schemas": "bodies and answers of sign_in, users, security_keys, second_factor and api_tokens",
+    "documents": "the OpenAPI document itself",
+    "downloads": "what all answers share that a browser saves as a file",
+    "estimators": "a list of core.estimators, which needs no service",
+    "feedback_schemas": "bodies and answers of prescriptions",
+    "files": "of a recording: uploads/recordings; its address says files",
+    "health": "asks storage/readiness",
+    "live_feed": "the socket of live/hub",
+    "live_schemas": "bodies and answers of live",
+    "proofs": "asks auth/accounts and auth/second_factor for all routes of one's own account",
+    "review_schemas": "bodies and answers of reviews",
+    "schemas": "bodies and answers that have no module of their own",
+    "trend_schemas": "answers of trends and comparisons",
+}
+"""Module of server/api → why no service and no page has its name."""
+
+
+def find_strangers(modules: Iterable[str], homes: Collection[str], known: Collection[str]) -> list[str]:
+    """Modules without a namesake that no exception names, and exceptions that are none any more."""
+    alone = {name for name in modules if name not in homes}
+    return [
+        *sorted(alone - set(known)),
+        *(f"remove the exception: {name}" for name in sorted(set(known) - alone)),
+    ]
+
+
+def find_unnamed_api() -> list[str]:
+    """Modules of server/api that are not found by name from the service or page that they belong to."""
+    server = ROOT / "server"
+    homes = {path.stem for room in ROOMS for path in (server / room).glob("*.py")}
+    return find_strangers((path.stem for path in (server / "api").glob("*.py")), homes, NAMED_OTHERWISE)

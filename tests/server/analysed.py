@@ -166,7 +166,7 @@ def compare(clinic: Clinic, patient_id: str, session_id: str) -> str:
     claim = state.queue.claim("test", [COMPARE_FILTERS])
     results = filter_run_files(comparison())
     stored = {name: state.blobs.put(patient_id, content) for name, content in results.items()}
-    assert state.queue.finish(claim, lambda c: filter_runs.publish(c, claim, stored))
+    assert state.queue.finish(claim, lambda c: filter_runs.publish(c, claim, {}, stored))
     with clinic.db.read() as c:
         return filter_runs.of_session(c, session_id)[0].id
 
@@ -186,5 +186,5 @@ def put_off(clinic: Clinic, patient_id: str, session_id: str) -> str:
         job_id = sensitivities.submit(c, state.queue, None, session_id).id
     claim = state.queue.claim("test", [SENSITIVITY])
     stored = {name: state.blobs.put(patient_id, content) for name, content in sensitivity().items()}
-    assert state.queue.finish(claim, lambda c: sensitivities.publish(c, claim, stored))
+    assert state.queue.finish(claim, lambda c: sensitivities.publish(c, claim, {}, stored))
     return job_id

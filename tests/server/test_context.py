@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import AsyncIterator, Mapping
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import httpx
 import pytest
@@ -54,6 +54,11 @@ async def test_every_part_is_the_one_of_this_name(app: FastAPI, client: httpx.As
     ask.__annotations__["part"] = PARTS[name]
     app.get("/")(ask)
     assert (await client.get("/")).json() == f"the {name}"
+
+
+def test_every_part_has_the_type_that_the_state_gives_it() -> None:
+    types = get_type_hints(context.State)
+    assert {name: get_args(part)[0] for name, part in PARTS.items()} == {name: types[name] for name in PARTS}
 
 
 @pytest.fixture

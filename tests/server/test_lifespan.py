@@ -12,6 +12,7 @@ from fastapi import FastAPI
 from sqlalchemy import select
 
 from sagittal.server.clinic import patients
+from sagittal.server.context import State
 from sagittal.server.lifespan import _say_estimators, _say_workers, run_installation
 from sagittal.server.metrics import RequestMetrics
 from sagittal.server.processes.supervisor import Workers
@@ -27,10 +28,9 @@ from tests.helpers.databases import write_database
 @pytest.fixture
 def app(tmp_path: Path) -> FastAPI:
     """An application without routes, on an empty clinic without estimators."""
-    made = FastAPI()
-    made.state.settings = Settings(data_dir=tmp_path, live_workers=0)
-    made.state.metrics = RequestMetrics()
-    write_database(made.state.settings.database)
+    made, settings = FastAPI(), Settings(data_dir=tmp_path, live_workers=0)
+    made.state = State({"settings": settings, "metrics": RequestMetrics()})
+    write_database(settings.database)
     return made
 
 
@@ -76,11 +76,12 @@ async def test_files_of_another_clinic_keep_it_from_starting(app: FastAPI) -> No
 
 
 def test_workers_that_nobody_started_are_no_fault_and_those_that_died_are_counted(app: FastAPI) -> None:
-    assert _say_workers(app) == "ok"
-    app.state.workers = Workers(settings_of(app))
-    wanted = settings_of(app).workers
+    state = State({"settings": settings_of(app)})
+    assert _say_workers(state) == "ok"
+    state.workers = Workers(state.settings)
+    wanted = state.settings.workers
     assert wanted > 0
-    assert _say_workers(app) == f"0 of {wanted} worker processes run; see the server's log."
+    assert _say_workers(state) == f"0 of {wanted} worker processes run; see the server's log."
 
 
 @pytest.mark.parametrize(
@@ -88,7 +89,6 @@ def test_workers_that_nobody_started_are_no_fault_and_those_that_died_are_counte
     [((1, 2), "ok"), ((1, 2, 3), "ok"), ((1,), "1 of 2 estimator processes run; see the server's log.")],
 )
 def test_estimators_that_died_are_counted(living: tuple[int, ...], said: str) -> None:
-    app = FastAPI()
-    app.state.settings = SimpleNamespace(live_workers=2)
-    app.state.hub = SimpleNamespace(pool=SimpleNamespace(pids=living))
-    assert _say_estimators(app) == said
+    hub = SimpleNamespace(pool=SimpleNamespace(pids=living))
+    state = State({"settings": SimpleNamespace(live_workers=2), "hub": hub})
+    assert _say_estimators(state) == said

@@ -13,7 +13,6 @@ from sagittal.core.body.health import find_worst_verdict
 from sagittal.core.body.model import LENGTHS
 from sagittal.core.frames import SEGMENTS, Floats, Side
 from sagittal.core.norms.controls import mean_curves
-from sagittal.core.norms.profile import ScoreSpread
 from sagittal.core.norms.scores import CurveMeans, Scores, score_curves
 from sagittal.core.parameters.kinematic import read_cycles
 from sagittal.core.parameters.result import CycleCurves, Parameter
@@ -152,11 +151,7 @@ def _summarise_curves(analysis: TakeAnalysis) -> dict[str, object]:
 def score_rows(found: Scores) -> list[dict[str, object]]:
     """Profiles and indices as JSON; what belongs to one curve is left out."""
     return [
-        {
-            name: reduce_to_plain(asdict(value) if isinstance(value, ScoreSpread) else value)
-            for name, value in vars(s).items()
-            if name != "variable"
-        }
+        {name: reduce_to_plain(value) for name, value in vars(s).items() if name != "variable"}
         for s in found.scores
         if s.variable is None
     ]

@@ -7,6 +7,7 @@ import io
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from functools import cache
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
@@ -32,7 +33,10 @@ PLAIN: Final = frozenset({str, int, bool, type(None)})
 
 
 def reduce_to_plain(value: object) -> object:
-    """Reduce mappings, sequences and numpy values to what JSON knows; non-finite numbers become null."""
+    """Reduce records, mappings, sequences and numpy values to JSON; non-finite numbers become null.
+
+    A record (dataclass) becomes an object with its fields in their order.
+    """
     kind = type(value)
     if kind is float:
         return value if math.isfinite(value) else None  # type: ignore[arg-type]
@@ -44,6 +48,8 @@ def reduce_to_plain(value: object) -> object:
         return reduce_to_plain(value.tolist())
     if isinstance(value, (list, tuple, set, frozenset)):
         return [reduce_to_plain(v) for v in value]
+    if is_dataclass(value):
+        return {f.name: reduce_to_plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, np.generic):
         return reduce_to_plain(value.item())
     if isinstance(value, float):

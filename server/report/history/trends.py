@@ -67,10 +67,10 @@ class AnalysedVisit:
 
 
 @dataclass(frozen=True)
-class TrendValue:
-    """A value at a visit; `change` = against the base, None for the base itself and with feedback.
+class TrendPoint:
+    """A value at a visit (index into `visits`); `change` from the first assessment, null with feedback.
 
-    `estimated` : a model of the leg gives it; it is on no line with values that sensors measured.
+    `estimated`: a model of the leg gives it, no two sensors measure it.
     """
 
     visit: int
@@ -80,7 +80,7 @@ class TrendValue:
     ci_low: float | None
     ci_high: float | None
     change: Change | None
-    estimated: bool = False
+    estimated: bool
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class TrendSeries:
     """
 
     side: Side | None
-    points: tuple[TrendValue, ...]
+    points: tuple[TrendPoint, ...]
     base: int | None
     latest: int | None
     mdc: float | None
@@ -231,7 +231,7 @@ def _line(
         return parameter_changes([first], [p], affected, at)[0]
 
     points = [
-        TrendValue(i, value, p.sd, p.n, p.ci_low, p.ci_high, change(k), p.estimated)
+        TrendPoint(i, value, p.sd, p.n, p.ci_low, p.ci_high, change(k), p.estimated)
         for k, (i, p, value) in enumerate(measured)
     ]
     latest = assessed[-1] if base is not None and assessed[-1] > base else None
@@ -240,7 +240,7 @@ def _line(
 
 
 def _limits(
-    first: Parameter, points: Sequence[TrendValue], latest: int | None, affected: Side | None
+    first: Parameter, points: Sequence[TrendPoint], latest: int | None, affected: Side | None
 ) -> tuple[float | None, float | None]:
     """What the last assessment is judged by; before there is one, what it will be."""
     change = None if latest is None else points[latest].change

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from html import escape
 from typing import Final
 
@@ -57,9 +57,9 @@ class ParameterStrides:
     def to_json(self) -> dict[str, object]:
         """The same as plain values for JSON."""
         content = {
-            "parameter": asdict(self.row),
+            "parameter": self.row,
             "definition": self.definition,
-            "strides": [asdict(s) for s in self.strides],
+            "strides": self.strides,
         }
         result = reduce_to_plain(content)
         return result if isinstance(result, dict) else {}

@@ -8,7 +8,7 @@ from __future__ import annotations
 import datetime as dt
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -207,15 +207,13 @@ class DailyLifeView:
     lean_reason: str | None
 
     def to_json(self) -> dict[str, object]:
-        """Plain values; spans, steps and inclination lie in files of their own."""
+        """What of it goes into the report's JSON; spans, steps and inclination lie in files of their own."""
         return {
             "segment": self.found.segment,
             "started_at": None if self.found.started_at is None else self.found.started_at.isoformat(),
-            "days": [
-                {**asdict(d), "date": None if d.date is None else d.date.isoformat()} for d in self.found.days
-            ],
-            "bouts": [asdict(b) for b in self.bins],
-            "inclination": [asdict(row) for row in self.leans],
+            "days": self.found.days,
+            "bouts": self.bins,
+            "inclination": self.leans,
             "sub_threshold": len(self.found.sub_threshold),
         }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Final
 
 from sagittal.core.change.limits import Limb
@@ -97,12 +97,12 @@ class FeedbackView:
                 "parameter": self.content.parameter,
                 "unit": self.term.unit,
                 "side": self.content.side,
-                "rows": [asdict(r) for r in self.rows],
-                "probes": [asdict(p) for p in self.probes],
+                "rows": self.rows,
+                "probes": self.probes,
                 "levels": [{"n": n, "t_s": t, "level": level} for n, t, level in self.levels],
-                "effects": [asdict(e) for e in self.effects],
-                "retention": None if self.retention is None else asdict(self.retention),
-                "notes": list(self.notes),
+                "effects": self.effects,
+                "retention": self.retention,
+                "notes": self.notes,
                 "strides": [
                     {**m.cue.to_json(), "value": m.value, "live_value": m.cue.value, "in_zone": m.inside}
                     for m in self.split.strides

@@ -125,10 +125,6 @@ class FunctionalView:
             f"{stretch(''.join(shapes))}</svg>"
         )
 
-    def to_json(self) -> dict[str, object]:
-        """Plain values."""
-        return {**vars(self), "segments": [vars(s) for s in self.segments]}
-
     def compare_with(self, before: Sequence[Parameter]) -> FunctionalView:
         """The same with the figure of an earlier visit."""
         value = next((p.mean for p in before if p.name == self.name), None)

@@ -13,26 +13,27 @@ from typing import Final, Literal
 import numpy as np
 
 from sagittal.core.errors import Notice
+from sagittal.core.events.result import Stride
 from sagittal.core.flags import Flag, judge_flags
-from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.frames import SIDES, Side
 from sagittal.core.norms.adults import adult_reference_at_speed
 from sagittal.core.norms.controls import ControlGroup
-from sagittal.core.norms.kinematics import NormBand
 from sagittal.core.norms.lookup import Norms, look_up_norms
 from sagittal.core.norms.profile import CurveReference
 from sagittal.core.norms.scores import Scores, score_curves
 from sagittal.core.parameters import cycle_curves
 from sagittal.core.parameters.anatomical_zero import anatomical_variables
 from sagittal.core.parameters.catalogue import require_entries
-from sagittal.core.parameters.result import CycleCurves
+from sagittal.core.parameters.result import CycleCurves, Parameter
 from sagittal.core.parameters.uncertainty import mark_estimated
-from sagittal.server.report.charts.panels import CurvePanel, SideCurve, curve_panels
+from sagittal.server.report.charts.panels import CurvePanel, curve_panels
 from sagittal.server.report.files.bundle import Bundle
 from sagittal.server.report.files.columns import reduce_to_plain
 from sagittal.server.report.view.daily_life import DailyLifeView, daily_life_view
 from sagittal.server.report.view.functional import TEST_NORM_NOTE, FunctionalView, functional_view
 from sagittal.server.report.view.headline import Headline, find_standouts, say_badge
 from sagittal.server.report.view.level import choose_zero, level_rows
+from sagittal.server.report.view.model_json import panel_json, profile_json, round_curve
 from sagittal.server.report.view.notes import curve_notes, norm_note
 from sagittal.server.report.view.profile import ProfileView, profile_view
 from sagittal.server.report.view.quality_box import QualityBox, quality_box
@@ -226,25 +227,25 @@ class ReportModel:
         result = reduce_to_plain(
             {
                 "problem": self.problem,
-                "quality": asdict(self.quality),
-                "warnings": [asdict(w) for w in self.warnings],
-                "key_numbers": [asdict(k) for k in self.kpis],
-                "parameters": [asdict(row) for _, rows in self.groups for row in rows],
-                "curves": [_panel_json(p) for p in self.panels],
-                "strides": [asdict(s) for s in self.strides],
+                "quality": self.quality,
+                "warnings": self.warnings,
+                "key_numbers": self.kpis,
+                "parameters": [row for _, rows in self.groups for row in rows],
+                "curves": [panel_json(p) for p in self.panels],
+                "strides": self.strides,
                 "duration_s": self.duration_s,
                 "norm_note": self.norm_note,
                 "curve_notes": self.curve_notes,
                 "angle_zero": self.angle_zero,
                 "zero_offset_deg": self.zero_offset_deg,
-                "estimator": None if self.estimator is None else asdict(self.estimator),
-                "profile": None if self.profile is None else _profile_json(self.profile),
-                "limits": None if self.limits is None else asdict(self.limits),
-                "since": None if self.since is None else asdict(self.since),
+                "estimator": self.estimator,
+                "profile": None if self.profile is None else profile_json(self.profile),
+                "limits": self.limits,
+                "since": self.since,
                 "condition": self.condition,
                 "squats": None if self.squats is None else self.squats.to_json(),
-                "functional": None if self.functional is None else self.functional.to_json(),
-                "headline": None if self.headline is None else asdict(self.headline),
+                "functional": self.functional,
+                "headline": self.headline,
                 "daily": None if self.daily is None else self.daily.to_json(),
                 "provenance": self.provenance,
             }
@@ -280,9 +281,7 @@ def report_model(
     if own is not None:
         compared = {name: v for name, v in norms.values.items() if v.comparable or name not in own.values}
         norms = replace(norms, values={**own.values, **compared})
-    marked = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
-    marked = tuple(replace(p, estimated=True) if p.name.startswith(UNSURE_FIGURES) else p for p in marked)
-    rows = parameter_rows(marked, norms, affected)
+    rows = parameter_rows(_mark_unsure(bundle), norms, affected)
     curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
     panels = curve_panels(bundle, curves, norms, own)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
@@ -298,25 +297,10 @@ def report_model(
         problem=None if stopped is None else speak_places(stopped),
         quality=quality,
         warnings=tuple(_warning(n) for n in bundle.warnings),
-        kpis=tuple(
-            _key_number(r)
-            for name in KEY_NUMBERS
-            for r in rows
-            if r.name == name and r.reason is None and not r.low_confidence
-        )[:SHOWN_LARGE],
+        kpis=_key_numbers(rows),
         groups=group_rows(rows),
         panels=panels,
-        strides=tuple(
-            StrideRow(
-                s.side,
-                s.start_s,
-                s.tc_s,
-                s.end_s,
-                s.excluded_reason is None,
-                None if s.excluded_reason is None else explain_exclusion(s.excluded_reason),
-            )
-            for s in bundle.strides.strides
-        ),
+        strides=tuple(_stride_row(s) for s in bundle.strides.strides),
         duration_s=_duration(bundle),
         norm_note=TEST_NORM_NOTE
         if by_trunk
@@ -336,15 +320,26 @@ def report_model(
         if bundle.repetitions is not None or bundle.activity is not None or by_trunk
         else _headline(bundle, quality, choose_zero(rows, _list_anatomical(panels)), norms, flags),
         daily=daily_life_view(bundle.activity),
-        profile=None
-        if curves is None
-        else profile_view(
-            _scores(bundle, curves, age),
-            None
-            if (matched := adult_reference_at_speed(age, norms.speed)) is None
-            else _scores(bundle, curves, age, matched),
-        ),
+        profile=None if curves is None else _profile(bundle, curves, age, norms),
     )
+
+
+def _mark_unsure(bundle: Bundle) -> tuple[Parameter, ...]:
+    """The parameters; those that a model of the leg gives, or that squats give unsurely, say so."""
+    marked = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
+    return tuple(replace(p, estimated=True) if p.name.startswith(UNSURE_FIGURES) else p for p in marked)
+
+
+def _stride_row(s: Stride) -> StrideRow:
+    why = None if s.excluded_reason is None else explain_exclusion(s.excluded_reason)
+    return StrideRow(s.side, s.start_s, s.tc_s, s.end_s, s.excluded_reason is None, why)
+
+
+def _profile(bundle: Bundle, curves: CycleCurves, age: float | None, norms: Norms) -> ProfileView | None:
+    """Scores against all adults of this age, and against those at this speed where there are any."""
+    matched = adult_reference_at_speed(age, norms.speed)
+    at_speed = None if matched is None else _scores(bundle, curves, age, matched)
+    return profile_view(_scores(bundle, curves, age), at_speed)
 
 
 def _list_anatomical(panels: Sequence[CurvePanel]) -> set[str]:
@@ -392,13 +387,6 @@ def _headline(
     return Headline(badge, standouts, looked_at=looked_at)
 
 
-def round_curve(values: Floats | None) -> list[float | None] | None:
-    """A curve for the wire, to 0.01°; None where it has no value."""
-    if values is None:
-        return None
-    return [x if np.isfinite(x) else None for x in np.round(values, 2).tolist()]
-
-
 def _duration(bundle: Bundle) -> float:
     if bundle.angles is not None and len(bundle.angles.t_s):
         return float(bundle.angles.t_s[-1])
@@ -423,6 +411,12 @@ def _warning(n: Notice) -> ReportWarning:
         sensor=n.sensor,
         t_s=n.t_s,
     )
+
+
+def _key_numbers(rows: Sequence[ParameterRow]) -> tuple[KeyNumber, ...]:
+    """The first of KEY_NUMBERS that were measured well enough."""
+    found = (r for name in KEY_NUMBERS for r in rows if r.name == name)
+    return tuple(_key_number(r) for r in found if r.reason is None and not r.low_confidence)[:SHOWN_LARGE]
 
 
 def _key_number(row: ParameterRow) -> KeyNumber:
@@ -451,49 +445,3 @@ def _plus_minus(row: ParameterRow) -> str:
     if len(set(found)) == 1:
         return found[0]
     return f"± {' | '.join(x.removeprefix('± ') or '–' for x in found)}"
-
-
-def _profile_json(profile: ProfileView) -> dict[str, object]:
-    rows = [{k: v for k, v in asdict(row).items() if k != "svg"} for row in profile.rows]
-    return {"rows": rows, "index": profile.index, "note": profile.note, "at_speed": profile.at_speed}
-
-
-def _panel_json(p: CurvePanel) -> dict[str, object]:
-    v = p.variable
-    return {
-        "variable": v.name,
-        "title": p.title,
-        "plane": v.plane,
-        "zero": p.zero,
-        "low_confidence": p.low_confidence,
-        "reason": p.reason,
-        "y_range_deg": v.y_range,
-        "up": v.up,
-        "down": v.down,
-        "norm": _band_json(p.norm),
-        "comfortable": _band_json(p.comfortable),
-        "norm_note": p.norm_note,
-        "sides": {side: _side_json(c) for side, c in p.sides.items()},
-    }
-
-
-def _band_json(band: NormBand | None) -> dict[str, object] | None:
-    if band is None:
-        return None
-    return {
-        "mean_deg": round_curve(band.mean_deg),
-        "sd_deg": round_curve(band.sd_deg),
-        "n": band.n,
-        "group": band.group,
-        "source": band.source,
-    }
-
-
-def _side_json(c: SideCurve) -> dict[str, object]:
-    return {
-        "n": c.n,
-        "mean_deg": round_curve(c.mean_deg),
-        "sd_deg": round_curve(c.sd_deg),
-        "foot_off_pct": c.foot_off_pct,
-        "foot_off_sd": c.foot_off_sd,
-    }

@@ -109,12 +109,12 @@ class SquatView:
         return f"Bends with the foot off the floor are no squats: {' and '.join(legs)}."
 
     def to_json(self) -> dict[str, object]:
-        """Plain values; curves lie in angles.parquet, every figure in repetitions.csv."""
+        """What the report's JSON has of it; curves lie in angles.parquet, figures in repetitions.csv."""
         return {
             "sides": self.sides,
             "used": self.used,
             "bends_with_lifted_foot": self.lifted,
-            "repetitions": [vars(row) for row in self.rows],
+            "repetitions": self.rows,
         }
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from sagittal.core.events import contact_moments_kernel as moments
 from sagittal.core.events import foot_contact_kernel as kernel
+from sagittal.core.events.contact_moments_kernel import ContactRule
 from sagittal.core.events.foot_contact import FootContactParams, FootContactState
 from sagittal.core.events.foot_contact_kernel import (
     COUNTERS,
@@ -17,7 +18,6 @@ from sagittal.core.events.foot_contact_kernel import (
     TOLD,
     TOP,
     WAY,
-    ContactRule,
 )
 from sagittal.core.frames import Floats
 from sagittal.core.rotation import about

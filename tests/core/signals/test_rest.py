@@ -115,7 +115,7 @@ def test_a_walk_with_a_biased_gyroscope_is_the_walk(segment: str, deg_s: float) 
     assert plain.strides
     assert biased.strides
     edges = [[(s.start_s, s.end_s) for s in x.strides] for x in (plain.strides, biased.strides)]
-    assert np.abs(np.subtract(*edges)).max() < 0.005
+    assert np.abs(np.array(edges[0]) - np.array(edges[1])).max() < 0.005
     assert {n.code for n in biased.notices} == {n.code for n in plain.notices}
 
 

@@ -152,7 +152,7 @@ class Visits:
             first = c.execute(job.select().limit(1)).one()
             job_id = first.id
             claim = Claim(job_id, 1, "w", "tune", first.recording_id, None, {"input_sha256": "0" * 64})
-            tunings.publish(c, claim, b"{}")
+            tunings.publish(c, claim, {tunings.RESULT: b"{}"}, {})
             tuning_id = c.execute(tuning.select()).one().id
         run = analysed.compare(clinic, patient, this)
         self.squats = squats

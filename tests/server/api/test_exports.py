@@ -13,6 +13,7 @@ import pytest
 from sagittal.core.formats.source import SourceFile
 from sagittal.server.commands.export import export
 from sagittal.server.downloads import exports
+from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import EXPORT
 from sagittal.server.main import main
 from sagittal.server.results import analyses
@@ -34,6 +35,9 @@ async def visit(clinic: Clinic, code: str) -> str:
     return session
 
 
+QUIET = Attempt(lambda stage, share, message=None: None, lambda content: None)
+
+
 def work(clinic: Clinic, session: str) -> None:
     """What a worker and its child do with the next job, in this process."""
     state = clinic.app.state
@@ -44,9 +48,9 @@ def work(clinic: Clinic, session: str) -> None:
         SourceFile(f["name"], f["size"], lambda f=f: state.blobs.read(space, f["sha256"]))  # type: ignore[misc]
         for f in claim.params["files"]
     ]
-    results = exports.run(files, claim.params)
+    results = exports.run(files, claim.params, QUIET)
     stored = {name: state.blobs.put(space, content) for name, content in results.items()}
-    assert state.queue.finish(claim, lambda c: exports.publish(c, claim, stored))
+    assert state.queue.finish(claim, lambda c: exports.publish(c, claim, results, stored))
 
 
 @pytest.mark.slow

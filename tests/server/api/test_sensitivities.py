@@ -16,6 +16,7 @@ from sagittal.core.simulate import RecordingSetup, Squats, SquatSimulation, simu
 from sagittal.core.simulate.mems import MEMS
 from sagittal.core.simulate.squat_chain import place_as_agreed
 from sagittal.server.clinic import sessions
+from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import SENSITIVITY
 from sagittal.server.report.files.exports import analysis_files, angles_parquet
 from sagittal.server.results import sensitivities
@@ -48,12 +49,16 @@ def work(clinic: Clinic, session: str, made: SquatSimulation, *others: SourceFil
     """What a worker and its child do with the next job, in this process; the stages that were told."""
     state, told = clinic.app.state, list[str]()
     claim = state.queue.claim("tester", [SENSITIVITY])
+
+    def say(stage: str, share: float, message: str | None = None) -> None:
+        told.append(stage)
+
     files = [SourceFile.of_bytes("recording.parquet", write_recording(made.recording)), *others]
-    results = sensitivities.run(files, claim.params, lambda stage, share: told.append(stage))
+    results = sensitivities.run(files, claim.params, Attempt(say, lambda content: None))
     with clinic.db.read() as c:
         patient = sessions.get(c, session).patient_id
     stored = {name: state.blobs.put(patient, content) for name, content in results.items()}
-    assert state.queue.finish(claim, lambda c: sensitivities.publish(c, claim, stored))
+    assert state.queue.finish(claim, lambda c: sensitivities.publish(c, claim, results, stored))
     return told
 
 

@@ -11,7 +11,7 @@ from sagittal.core.change import Change
 from sagittal.core.subject.condition import USUAL, WalkingCondition
 from sagittal.server.api import trend_schemas as schemas
 from sagittal.server.api.schemas import make_answer
-from sagittal.server.report.history.trends import TrendSeries, TrendValue
+from sagittal.server.report.history.trends import TrendSeries
 
 
 def names(kind: type[Any]) -> set[str]:
@@ -23,7 +23,6 @@ def names(kind: type[Any]) -> set[str]:
     [
         (schemas.Condition, WalkingCondition, {"words"}),
         (schemas.ChangeInWords, Change, {"words"}),
-        (schemas.TrendPoint, TrendValue, set()),
         (schemas.TrendLine, TrendSeries, {"words"}),
     ],
 )

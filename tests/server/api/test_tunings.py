@@ -45,13 +45,11 @@ def work(clinic: Clinic, job_id: str) -> list[tuple[str, float, str | None]]:
         said.append((stage, share, message))
 
     files = [SourceFile.of_bytes(name, content) for name, content in TRIALS.items()]
-    content = tunings.run(files, claim.params["order"], Attempt(say, kept.append))
+    content = tunings.run(files, claim.params, Attempt(say, kept.append))
     assert len(kept) == 6
-    assert tunings.run(files, claim.params["order"], Attempt(say, kept.append, kept[2])) == content
-    assert (
-        tunings.run(files, claim.params["order"], Attempt(say, kept.append, b"of another version")) == content
-    )
-    assert queue.finish(claim, lambda c: tunings.publish(c, claim, content))
+    assert tunings.run(files, claim.params, Attempt(say, kept.append, kept[2])) == content
+    assert tunings.run(files, claim.params, Attempt(say, kept.append, b"of another version")) == content
+    assert queue.finish(claim, lambda c: tunings.publish(c, claim, content, {}))
     return said
 
 

@@ -121,7 +121,7 @@ async def test_it_is_removed_by_oneself_an_administrator_or_the_console(
     assert (await sign_in(clinic, "assistant")).status_code == 401
     monkeypatch.setattr("sys.stdin", io.StringIO(f"{PASSWORD}\n"))
     tell_commands(monkeypatch, clinic.settings)
-    assert user_command.user(clinic.settings.data_dir, "assistant", "assistant") == 0
+    assert user_command.user("assistant", role="assistant", data_dir=clinic.settings.data_dir) == 0
     assert (await sign_in(clinic, "assistant")).status_code == 200
 
 

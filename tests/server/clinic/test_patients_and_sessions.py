@@ -100,7 +100,7 @@ class Clinic:
         claim = self.queue.claim("w", (COMPARE_FILTERS,))
         assert claim is not None
         stored = {"filters.json": self.blobs.put(claim.params["space"], content)}
-        assert self.queue.finish(claim, lambda c: filter_runs.publish(c, claim, stored))
+        assert self.queue.finish(claim, lambda c: filter_runs.publish(c, claim, {}, stored))
 
     def trail(self) -> list[str]:
         with self.db.read() as c:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import pytest
 
 from sagittal.server.clinic import identities
@@ -14,7 +16,12 @@ def keep_name(clinic: Clinic) -> None:
         identities.change(c, clinic.settings.identity_key_file, None, clinic.patient.id, {"name": "Erika"})
 
 
-def ask(clinic: Clinic, what: str, really: bool = False, without_key: bool = False) -> int:
+def ask(
+    clinic: Clinic,
+    what: Literal["make", "change", "discard"],
+    really: bool = False,
+    without_key: bool = False,
+) -> int:
     return identity_key(what, really=really, without_key=without_key, data_dir=clinic.folder)
 
 

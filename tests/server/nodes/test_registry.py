@@ -13,9 +13,8 @@ from sqlalchemy import update
 
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.errors import NodeAway
-from sagittal.server.live.rows import Rows
+from sagittal.server.live.rows import Rows, claim_take
 from sagittal.server.live_takes import live, live_recordings
-from sagittal.server.live_takes.live_claims import claim_take
 from sagittal.server.nodes.pins import Owner, Pin, find_owner, find_pin
 from sagittal.server.nodes.registry import FORGOTTEN, Nodes
 from sagittal.server.results.reviewed import ReviewedAnalyses

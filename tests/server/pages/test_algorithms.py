@@ -43,7 +43,7 @@ async def test_a_comparison_is_chosen_followed_and_shown_with_its_files(clinic: 
     claim = state.queue.claim("test", [COMPARE_FILTERS])
     files = filter_run_files(analysed.comparison())
     stored = {name: state.blobs.put(patient, content) for name, content in files.items()}
-    assert state.queue.finish(claim, lambda c: filter_runs.publish(c, claim, stored))
+    assert state.queue.finish(claim, lambda c: filter_runs.publish(c, claim, {}, stored))
     assert set(files) <= set(FILE_WORDS), "every file is said in words"
     with clinic.db.read() as c:
         (run,) = filter_runs.of_session(c, session)

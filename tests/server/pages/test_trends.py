@@ -12,7 +12,7 @@ from sagittal.server.clinic import patients, sessions
 from sagittal.server.clinic.programmes import PlannedVisit
 from sagittal.server.pages.trends import _column, _pick_side, _waiting, list_ahead, view_daily_trend
 from sagittal.server.report.history.daily_trend import PerformanceDay
-from sagittal.server.report.history.trends import Trend, TrendSeries, TrendValue
+from sagittal.server.report.history.trends import Trend, TrendPoint, TrendSeries
 from tests.helpers.clinic import Clinic
 from tests.server import analysed
 
@@ -23,7 +23,7 @@ DAY = dt.date(2026, 3, 1)
 def line(side: Any, *values: float, base: int | None = 0, estimated: tuple[bool, ...] = ()) -> TrendSeries:
     flags = estimated or (False,) * len(values)
     points = [
-        TrendValue(k, v, None, 9, None, None, None, e)
+        TrendPoint(k, v, None, 9, None, None, None, e)
         for k, (v, e) in enumerate(zip(values, flags, strict=True))
     ]
     return TrendSeries(side, tuple(points), base, None, None, None)

@@ -11,6 +11,7 @@ from sagittal.core.errors import FormatError
 from sagittal.server.errors import Conflict
 from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import BESIDE, COMPARE_FILTERS, EXPORT, SENSITIVITY, TUNE
+from sagittal.server.results import tunings
 from sagittal.server.settings import Settings
 from sagittal.server.storage.blob_source import open_source
 from sagittal.server.uploads import recordings
@@ -41,7 +42,7 @@ def test_every_kind_of_job_has_its_task_and_tables_alone_keep_no_files() -> None
     assert {kind for kind in known if TASKS[kind].keeps_files} == {
         recordings.ANALYSE, COMPARE_FILTERS, SENSITIVITY, EXPORT
     }  # fmt: skip
-    assert TASKS[TUNE].publish is tasks._publish_tuning
+    assert TASKS[TUNE].publish is tunings.publish
     assert all(TASKS[kind].kind == kind for kind in known)
 
 

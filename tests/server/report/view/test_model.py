@@ -383,10 +383,8 @@ def test_ten_minutes_are_reported_in_little_more_than_a_piece_of_plain_python(
 
 @pytest.mark.slow
 def test_reading_a_result_does_not_load_the_compiler() -> None:
-    code = (
-        "import sys; from sagittal.server.report import tables; "
-        "from sagittal.server.report.view import model; sys.exit('numba' in sys.modules)"
-    )
+    modules = "sagittal.server.report.tables, sagittal.server.report.view.model"
+    code = f"import sys, {modules}; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -53,7 +53,7 @@ async def test_a_comparison_is_asked_for_once_and_read_with_its_files(clinic: Cl
         state = clinic.app.state
         claim = state.queue.claim("test", [COMPARE_FILTERS])
         stored = {"filters.json": state.blobs.put(patient, b"{}")}
-        assert state.queue.finish(claim, lambda c: filter_runs.publish(c, claim, stored))
+        assert state.queue.finish(claim, lambda c: filter_runs.publish(c, claim, {}, stored))
         (run,) = (await client.get(here)).json()
         assert (run["analysis_id"], run["session_id"], run["job_id"]) == (done, session, first.json()["id"])
         assert [(f["name"], f["size"]) for f in run["files"]] == [("filters.json", 2)]

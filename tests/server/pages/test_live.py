@@ -12,7 +12,7 @@ from sagittal.core.frames import PROTOCOLS
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.server.clinic.patients import Patient
 from sagittal.server.clinic.sessions import Session
-from sagittal.server.pages.guided_test import view_guided_test
+from sagittal.server.pages.live import view_guided_test
 from sagittal.server.report.view.functional import norm_words
 from sagittal.server.report.words.guided_words import HINTS, TOTAL
 from sagittal.server.storage.tables import now

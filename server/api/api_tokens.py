@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter
 
 from sagittal.server import audit
 from sagittal.server.api.account_schemas import ApiToken, ApiTokenNew, NewApiToken
 from sagittal.server.api.documents import refusals
+from sagittal.server.api.proofs import Proving
 from sagittal.server.api.schemas import make_answer
-from sagittal.server.auth import accounts, api_tokens
+from sagittal.server.auth import api_tokens
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
-from sagittal.server.context import Db, Failures, Id, OpenTrail, address_of
+from sagittal.server.context import Db, Id
 from sagittal.server.http.json_body import StrictJsonRoute
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/account/tokens", tags=["account"])
@@ -29,16 +30,10 @@ def list_tokens(db: Db, who: Self) -> list[ApiToken]:
 
 
 @router.post("", status_code=201, response_model=NewApiToken, responses=refusals(409, 429))
-def make_token(
-    body: ApiTokenNew,
-    request: Request,
-    db: Db,
-    trail: OpenTrail,
-    failures: Failures,
-    who: Self,
-) -> NewApiToken:
+def make_token(body: ApiTokenNew, db: Db, proof: Proving) -> NewApiToken:
     """Make a token; the answer is the only one that shows it. Asks for one's password."""
-    accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
+    proof.check_password(body.password)
+    who = proof.who
     with db.write() as c:
         row, token = api_tokens.issue(c, who.user_id, body.name, set(body.scopes), body.days)
         detail = {"scopes": row.scopes, "days": body.days}

@@ -4,37 +4,31 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter
 
 from sagittal.server import audit
 from sagittal.server.api import account_schemas
 from sagittal.server.api.documents import refusals
+from sagittal.server.api.proofs import Proving
 from sagittal.server.auth import accounts, second_factor
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
-from sagittal.server.context import Config, Db, Failures, OpenTrail, address_of
+from sagittal.server.context import Config, Db, Failures
 from sagittal.server.http.json_body import StrictJsonRoute
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/account/second-factor", tags=["account"])
 Self = Annotated[Identity, require(Action.USE_ACCOUNT)]
 
 
-@router.post("", response_model=account_schemas.SecondFactorSetUp, responses=refusals(409, 429))
+@router.post("", response_model=second_factor.SecondFactorSetUp, responses=refusals(409, 429))
 def set_up(
-    body: account_schemas.PasswordProof,
-    request: Request,
-    db: Db,
-    settings: Config,
-    trail: OpenTrail,
-    failures: Failures,
-    who: Self,
-) -> account_schemas.SecondFactorSetUp:
+    body: account_schemas.PasswordProof, db: Db, settings: Config, proof: Proving
+) -> second_factor.SecondFactorSetUp:
     """Make a secret for an authenticator; it is asked for once a code has proved it (`confirm`)."""
-    accounts.check_password(db, failures, trail, who.name, body.password, address_of(request), status=403)
+    proof.check_password(body.password)
     with db.write() as c:
-        made = second_factor.begin(c, settings.second_factor_key, who.user_id, who.name)
-    return account_schemas.SecondFactorSetUp(made.secret, made.address, made.picture)
+        return second_factor.begin(c, settings.second_factor_key, proof.who.user_id, proof.who.name)
 
 
 @router.post("/confirm", response_model=account_schemas.RecoveryCodes, responses=refusals(429))

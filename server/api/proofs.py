@@ -1,0 +1,76 @@
+"""The password once more, and a code: asked of who is signed in before keys and tokens change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends, Request
+from sqlalchemy import Connection
+
+from sagittal.server import audit
+from sagittal.server.auth import accounts, second_factor
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.auth.throttle import Throttle
+from sagittal.server.context import Config, Db, Failures, OpenTrail, address_of
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database
+from sagittal.server.trail import AuditTrail
+
+
+@dataclass(frozen=True)
+class Proof:
+    """Who must prove it, and what the proof is checked and counted with."""
+
+    who: Identity
+    address: str
+    db: Database
+    settings: Settings
+    trail: AuditTrail
+    failures: Throttle
+
+    def check_password(self, password: str) -> None:
+        """Raise Problem 403 for a wrong one, 429 after too many."""
+        # 403, not 401: the person is signed in and must not be sent to the sign-in page
+        accounts.check_password(
+            self.db, self.failures, self.trail, self.who.name, password, self.address, status=403
+        )
+
+    @contextmanager
+    def write(self, password: str, code: str) -> Iterator[Connection]:
+        """Check both, a code where one is asked for, and open a transaction for what they allow."""
+        self.check_password(password)
+        with accounts.count_wrong_codes(self.failures, self.who.user_id), self.db.write() as c:
+            self._require_code(c, code)
+            yield c
+
+    def _require_code(self, c: Connection, code: str) -> None:
+        """After the password: a code, which a browser left open does not have. Raises CodeWrong 403."""
+        user_id = self.who.user_id
+        if not second_factor.is_on(c, user_id):
+            return  # nor has the account a key
+        before = second_factor.count_recovery(c, user_id)
+        if not second_factor.use(c, self.settings.second_factor_key, user_id, code):
+            raise second_factor.CodeWrong(403)
+        left = second_factor.count_recovery(c, user_id)
+        if left < before:
+            audit.record(c, self.who, "user.recovery_code_used", "user", user_id, {"left": left})
+
+
+async def _proof(
+    request: Request,
+    db: Db,
+    settings: Config,
+    trail: OpenTrail,
+    failures: Failures,
+    who: Annotated[Identity, require(Action.USE_ACCOUNT)],
+) -> Proof:
+    return Proof(who, address_of(request), db, settings, trail, failures)
+
+
+Proving = Annotated[Proof, Depends(_proof)]
+"""Of a route of one's own account; it declares the action too."""
