@@ -7,9 +7,9 @@ waits at the first statement, and finds it done.
 
 from alembic import context
 
-from sagittal.server.storage.columns import UserJson, UserString
 from sagittal.server.storage.db import engine_of
-from sagittal.server.storage.tables import Utc, metadata
+from sagittal.server.storage.schema.columns import UserJson, UserString
+from sagittal.server.storage.schema.tables import Utc, metadata
 
 
 def render(kind: str, item: object, _: object) -> str | bool:

@@ -20,7 +20,7 @@ from typing import Any, Protocol
 from sqlalchemy import Connection, Row, insert, select
 
 from sagittal.server.storage.db import highest_number
-from sagittal.server.storage.tables import audit, now
+from sagittal.server.storage.schema.tables import audit, now
 
 GENESIS = "0" * 64
 """What the first row follows."""

@@ -27,8 +27,8 @@ from sagittal.server.nodes.registry import Nodes
 from sagittal.server.processes.supervisor import Workers
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blobs import BlobStore
 from sagittal.server.storage.readiness import Readiness
 from sagittal.server.trail import AuditTrail
 

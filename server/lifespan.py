@@ -30,9 +30,9 @@ from sagittal.server.safekeeping import custody, erasure
 from sagittal.server.safekeeping.custody import refuse_strangers
 from sagittal.server.settings import Settings
 from sagittal.server.sharing import report_links
-from sagittal.server.storage.blob_opening import open_blobs
-from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_opening import open_blobs
+from sagittal.server.storage.files.blobs import BlobStore
 from sagittal.server.storage.high_water import MarkKeeper
 from sagittal.server.storage.migrate import upgrade
 from sagittal.server.storage.readiness import Readiness

@@ -19,8 +19,8 @@ from sagittal.server.safekeeping import backup_schedule
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.high_water import read_newest
-from sagittal.server.storage.live_tables import OPEN_TAKE_STATES, live_take
-from sagittal.server.storage.tables import JOB_STATES, job, now, session
+from sagittal.server.storage.schema.live_tables import OPEN_TAKE_STATES, live_take
+from sagittal.server.storage.schema.tables import JOB_STATES, job, now, session
 
 BUCKETS_S: Final = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 """Page requests are held to 0.3 s."""

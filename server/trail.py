@@ -26,7 +26,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from sagittal.server import audit
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.refusal import refusal_of
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 
 log = logging.getLogger(__name__)
 

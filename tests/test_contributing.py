@@ -18,10 +18,11 @@ from starlette.responses import Response
 
 from sagittal.core.errors import FormatError, Notice
 from sagittal.core.feedback import Prescription
-from sagittal.core.formats import SourceFile, read_recording, vendors
+from sagittal.core.formats import SourceFile, read_recording
 from sagittal.core.formats.draft import Draft
 from sagittal.core.formats.source_spec import SourceSpec
-from sagittal.core.formats.vendors import VendorFormat
+from sagittal.core.formats.vendors import registry as vendors
+from sagittal.core.formats.vendors.registry import VendorFormat
 from sagittal.core.parameters.catalogue import CATALOGUE, CurveFigure, ParameterEntry, errors
 from sagittal.core.parameters.catalogue.entry import ANKLE_AND_FOOT, DORSIFLEXION
 from sagittal.core.parameters.measure import Tracks, measure_gait
@@ -36,8 +37,8 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.context import Db
 from sagittal.server.http.templates import TEMPLATES
 from sagittal.server.pages import routes, shell
-from sagittal.server.pages.live import list_terms
-from sagittal.server.pages.prescription import group_trainable
+from sagittal.server.pages.live_takes.live import list_terms
+from sagittal.server.pages.results.prescription import group_trainable
 from sagittal.server.report.files.exports import analysis_files
 from tests.data import ROOT
 from tests.helpers.clinic import open_clinic

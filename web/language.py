@@ -420,7 +420,7 @@ SCRIPT_PLACES: Final = (
     "server/report/words/change_words.py",
     "server/report/words/guided_words.py",
     "server/report/words/wording.py",
-    "server/pages/session_context.py",
+    "server/pages/results/session_context.py",
     "server/pages/words.py",
     "tests/helpers/texts.py",
 )

@@ -6,9 +6,10 @@ import json
 from itertools import pairwise
 from typing import Final, Literal
 
-from sagittal.core.formats import live_reader, mapping_xml, parquet, text
+from sagittal.core.formats import live_reader, parquet, text
 from sagittal.core.formats.manifest import is_manifest
-from sagittal.core.formats.vendors import find_vendor
+from sagittal.core.formats.vendors import mapping_xml
+from sagittal.core.formats.vendors.registry import find_vendor
 
 Kind = Literal["vendor", "parquet", "live", "manifest", "mapping", "table", "known", "empty", "other"]
 """vendor = of `VENDOR_FORMATS`; known = a sensor format we recognise but do not read; other = neither signals

@@ -9,15 +9,16 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from sagittal.core.errors import ArchiveError, FormatError, InputError, ManifestError, Notice
-from sagittal.core.formats import _sniff, bids, cwa, live_reader, mapping_xml, parquet, table, text
+from sagittal.core.formats import _sniff, bids, live_reader, parquet, table, text
 from sagittal.core.formats.aliases import segment_named
 from sagittal.core.formats.archive import EPISODE_MANIFEST, ArchiveLimits, expand
-from sagittal.core.formats.device_motion import SIGN_ASSUMED
 from sagittal.core.formats.draft import Draft, finish
 from sagittal.core.formats.manifest import Manifest, parse_manifest
 from sagittal.core.formats.source import SourceFile, digest_file, sha256
 from sagittal.core.formats.source_spec import SourceSpec
-from sagittal.core.formats.vendors import find_vendor, list_formats
+from sagittal.core.formats.vendors import cwa, mapping_xml
+from sagittal.core.formats.vendors.device_motion import SIGN_ASSUMED
+from sagittal.core.formats.vendors.registry import find_vendor, list_formats
 from sagittal.core.frames import Segment
 from sagittal.core.plurals import plural
 from sagittal.core.signals.correction import AS_READ, SensorCorrection

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from sagittal.core.formats import _sniff, bids, live_reader, mapping_xml, parquet, text
+from sagittal.core.formats import _sniff, bids, live_reader, parquet, text
 from sagittal.core.formats.archive import is_gzip, is_zip
-from sagittal.core.formats.vendors import find_vendor
+from sagittal.core.formats.vendors import mapping_xml
+from sagittal.core.formats.vendors.registry import find_vendor
 
 MANIFEST: Final = "manifest.json"
 _HEAD: Final = 1 << 16

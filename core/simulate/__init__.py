@@ -7,6 +7,7 @@ from sagittal.core.simulate.functional import (
     SwingsAndBows,
     simulate_swings_and_bows,
 )
+from sagittal.core.simulate.gait.soft_tissue import SoftTissue
 from sagittal.core.simulate.magnetics import Dipole
 from sagittal.core.simulate.mems import SensorNoise
 from sagittal.core.simulate.movements import MOVEMENTS, Movement, simulate_movement
@@ -17,7 +18,6 @@ from sagittal.core.simulate.script import Arc, Pivot, Script, SingleSteps, Stand
 from sagittal.core.simulate.scripts import SCRIPTS, Scenario, simulate_scenario
 from sagittal.core.simulate.setup import Dropout, Lag, RecordingSetup
 from sagittal.core.simulate.simulation import Simulation, simulate
-from sagittal.core.simulate.soft_tissue import SoftTissue
 from sagittal.core.simulate.squat import Squats, SquatSimulation, SquatTruth, simulate_squats
 from sagittal.core.simulate.standing import Sway, SwaySimulation, SwayTruth, simulate_sway
 from sagittal.core.simulate.tables import angle_table, event_table, stride_table

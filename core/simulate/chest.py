@@ -19,14 +19,14 @@ import numpy as np
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Floats
 from sagittal.core.rotation import about, multiply, rotate
-from sagittal.core.simulate.chair import LEAN, LIFTING
+from sagittal.core.simulate.gait.chair import LEAN, LIFTING
+from sagittal.core.simulate.gait.stance import Q_NEUTRAL
 from sagittal.core.simulate.phases import Phase
 from sagittal.core.simulate.recorder import Draws, Recorded, oversampling, record
 from sagittal.core.simulate.sensors import Mount, SensorPath, draw_mounts
 from sagittal.core.simulate.setup import RecordingSetup
 from sagittal.core.simulate.shapes import bump, smoothstep
 from sagittal.core.simulate.spline import sign_continuous
-from sagittal.core.simulate.stance import Q_NEUTRAL
 from sagittal.core.simulate.walker import Walker
 
 Posture = Literal["stand", "sit", "lie", "walk", "lie_side", "stairs_up", "stairs_down", "bow"]

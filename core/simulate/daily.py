@@ -30,10 +30,10 @@ from sagittal.core.simulate.chest import (
     PostureHold,
     simulate_day,
 )
+from sagittal.core.simulate.gait.stance import Q_NEUTRAL
 from sagittal.core.simulate.phases import Phase
 from sagittal.core.simulate.scripts import ON_SKIN
 from sagittal.core.simulate.sensors import Mount, draw_mounts
-from sagittal.core.simulate.stance import Q_NEUTRAL
 from sagittal.core.simulate.walker import Walker
 
 NOISE: Final = 0.03

@@ -17,13 +17,13 @@ import numpy as np
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment, Side
 from sagittal.core.rotation import about, multiply, rotate
-from sagittal.core.simulate.human import BodyPath
+from sagittal.core.simulate.gait.human import BodyPath
+from sagittal.core.simulate.gait.stance import Q_NEUTRAL
 from sagittal.core.simulate.phases import Phase
 from sagittal.core.simulate.recorder import Draws, Recorded, oversampling, record
 from sagittal.core.simulate.sensors import PLACES, Mount, draw_mounts, place_sensor
 from sagittal.core.simulate.setup import RecordingSetup
 from sagittal.core.simulate.shapes import smoothstep
-from sagittal.core.simulate.stance import Q_NEUTRAL
 from sagittal.core.simulate.truth import joint_angles
 from sagittal.core.simulate.walker import SIGN, Anatomy, Walker
 

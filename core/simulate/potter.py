@@ -15,9 +15,9 @@ import numpy as np
 
 from sagittal.core.frames import GRAVITY, SIDES, Bools, Floats, Side
 from sagittal.core.rotation import about, conjugate, multiply, rotate
+from sagittal.core.simulate.gait.stance import Q_NEUTRAL
 from sagittal.core.simulate.shapes import bump, smoothstep
 from sagittal.core.simulate.spline import differentiate_pose
-from sagittal.core.simulate.stance import Q_NEUTRAL
 from sagittal.core.simulate.walker import SIGN
 
 LEG_M: Final = 0.92

@@ -10,12 +10,12 @@ from typing import Final
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Segment
+from sagittal.core.simulate.gait.soft_tissue import SoftTissue
 from sagittal.core.simulate.mems import MEMS
 from sagittal.core.simulate.patients import PATIENTS, QUICKLY, SLOWLY, SimulatedPatient
 from sagittal.core.simulate.script import Arc, Pivot, Script, SingleSteps, Stand, Straight, scale_script
 from sagittal.core.simulate.setup import Dropout, RecordingSetup
 from sagittal.core.simulate.simulation import Simulation, simulate
-from sagittal.core.simulate.soft_tissue import SoftTissue
 from sagittal.core.simulate.walker import Walker
 
 ON_SKIN: Final = RecordingSetup(tissue=SoftTissue(), impacts=True)

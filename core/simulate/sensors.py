@@ -14,10 +14,10 @@ import numpy as np
 
 from sagittal.core.frames import GRAVITY, Floats, Segment
 from sagittal.core.rotation import about, conjugate, exp, log, multiply, rotate
-from sagittal.core.simulate.human import BodyPath
-from sagittal.core.simulate.impacts import Impact, shake_sensor
+from sagittal.core.simulate.gait.human import BodyPath
+from sagittal.core.simulate.gait.impacts import Impact, shake_sensor
+from sagittal.core.simulate.gait.soft_tissue import SoftTissue, skin_motion
 from sagittal.core.simulate.magnetics import Dipole, field_at
-from sagittal.core.simulate.soft_tissue import SoftTissue, skin_motion
 from sagittal.core.simulate.spline import differentiate_pose, resample_pose, sign_continuous
 
 Sampling = Literal["instant", "increment"]

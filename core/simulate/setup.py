@@ -7,10 +7,10 @@ from math import pi
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import SEGMENTS, Segment
+from sagittal.core.simulate.gait.soft_tissue import SoftTissue
 from sagittal.core.simulate.magnetics import Dipole
 from sagittal.core.simulate.mems import ACC_RANGE, GYR_RANGE, MEMS, SensorNoise
 from sagittal.core.simulate.sensors import Sampling
-from sagittal.core.simulate.soft_tissue import SoftTissue
 
 
 @dataclass(frozen=True)

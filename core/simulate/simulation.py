@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sagittal.core.frames import Segment
-from sagittal.core.simulate.human import move
-from sagittal.core.simulate.impacts import draw_impacts
+from sagittal.core.simulate.gait.human import move
+from sagittal.core.simulate.gait.impacts import draw_impacts
 from sagittal.core.simulate.recorder import Draws, Recorded, oversampling, record
 from sagittal.core.simulate.script import Script, plan
 from sagittal.core.simulate.sensors import PLACES, draw_mounts, place_sensor

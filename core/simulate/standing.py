@@ -16,11 +16,11 @@ import numpy as np
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import GRAVITY, Segment
 from sagittal.core.rotation import about, multiply, rotate
+from sagittal.core.simulate.gait.stance import Q_NEUTRAL
 from sagittal.core.simulate.recorder import Draws, Recorded, oversampling, record
 from sagittal.core.simulate.sensors import Mount, SensorPath, draw_mounts
 from sagittal.core.simulate.setup import RecordingSetup
 from sagittal.core.simulate.spline import sign_continuous
-from sagittal.core.simulate.stance import Q_NEUTRAL
 from sagittal.core.simulate.walker import Walker
 
 HEIGHTS_M: Final[dict[Segment, float]] = {"pelvis": 0.95, "chest": 1.30}

@@ -14,11 +14,11 @@ import numpy as np
 from sagittal.core.body.model import BodyModel
 from sagittal.core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
 from sagittal.core.rotation import to_matrix
-from sagittal.core.simulate.human import Motion
+from sagittal.core.simulate.gait.human import Motion
+from sagittal.core.simulate.gait.timing import FootTiming
 from sagittal.core.simulate.mems import DrawnErrors
 from sagittal.core.simulate.script import Footprint
 from sagittal.core.simulate.sensors import Mount
-from sagittal.core.simulate.timing import FootTiming
 from sagittal.core.simulate.walker import SIGN
 
 LIFT_M = 0.005

@@ -18,10 +18,11 @@ from scipy.ndimage import uniform_filter1d
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Floats, Segment
 from sagittal.core.rotation import about, multiply, rotate
-from sagittal.core.simulate.chair import ChairChange, sit_and_rise
 from sagittal.core.simulate.chest import CHANGE_S, POSTURES
-from sagittal.core.simulate.human import Motion, move
-from sagittal.core.simulate.impacts import draw_impacts
+from sagittal.core.simulate.gait.chair import ChairChange, sit_and_rise
+from sagittal.core.simulate.gait.human import Motion, move
+from sagittal.core.simulate.gait.impacts import draw_impacts
+from sagittal.core.simulate.gait.stance import Q_NEUTRAL
 from sagittal.core.simulate.patients import PATIENTS
 from sagittal.core.simulate.phases import Phase
 from sagittal.core.simulate.recorder import Draws, Recorded, oversampling, record
@@ -29,7 +30,6 @@ from sagittal.core.simulate.script import Item, Pivot, Stand, Straight, plan
 from sagittal.core.simulate.sensors import PLACES, Mount, SensorPath, draw_mounts, place_sensor
 from sagittal.core.simulate.setup import RecordingSetup
 from sagittal.core.simulate.spline import sign_continuous
-from sagittal.core.simulate.stance import Q_NEUTRAL
 
 WALK_M: Final = 3.0
 """Way to the mark (Podsiadlo and Richardson 1991)."""

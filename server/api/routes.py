@@ -8,47 +8,35 @@ from fastapi import APIRouter, Request
 from starlette.routing import Match
 from starlette.types import Scope
 
-from sagittal.server.api import (
-    analyses,
-    api_tokens,
-    archives,
-    audit_log,
-    care_teams,
-    comparisons,
+from sagittal.server.api import audit_log, health, metrics
+from sagittal.server.api.account import api_tokens, second_factor, security_keys, sign_in, users
+from sagittal.server.api.clinic import (
     consents,
     devices,
-    estimators,
-    exports,
-    files,
-    films,
-    filter_runs,
-    health,
     identities,
     jobs,
-    live,
-    live_feed,
-    metrics,
     notes,
     patients,
-    prescriptions,
     programmes,
-    reports,
-    reviews,
-    second_factor,
-    security_keys,
-    sensitivities,
     sessions,
-    sign_in,
-    signed_reports,
-    studies,
-    tables,
-    trends,
-    tunings,
-    uploads,
-    users,
-    videos,
 )
 from sagittal.server.api.documents import openapi
+from sagittal.server.api.downloads import archives, exports, studies
+from sagittal.server.api.live_takes import films, live, live_feed
+from sagittal.server.api.results import (
+    analyses,
+    comparisons,
+    estimators,
+    filter_runs,
+    prescriptions,
+    reports,
+    reviews,
+    sensitivities,
+    trends,
+    tunings,
+)
+from sagittal.server.api.sharing import care_teams, signed_reports
+from sagittal.server.api.uploads import files, tables, uploads, videos
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action

@@ -17,7 +17,7 @@ from sagittal.server.report.view.behind import StrideValue
 from sagittal.server.results.tunings import MOST_OF_SWARM, Scheme
 from sagittal.server.sharing import report_links, signed_reports
 from sagittal.server.sharing.care_teams import REASON, EmergencyAccess, TeamMember
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 from sagittal.server.uploads.recordings import RecordedFile, RecordingState
 
 _HIDDEN = "\u00ad\u200b\u200e\u200f\u202a-\u202e\u2060-\u206f\ufeff"

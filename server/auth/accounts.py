@@ -18,7 +18,7 @@ from sagittal.server.auth.security_keys import Site
 from sagittal.server.auth.throttle import Throttle
 from sagittal.server.http.problems import Problem
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import new_id, now, user
+from sagittal.server.storage.schema.tables import new_id, now, user
 from sagittal.server.trail import AuditTrail
 
 

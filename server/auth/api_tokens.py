@@ -24,9 +24,9 @@ from sagittal.server.auth.sight import NOTHING, opens_parts
 from sagittal.server.auth.tokens import new_token, token_hash
 from sagittal.server.http.problems import Problem
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.person_tables import api_token
 from sagittal.server.storage.refusal import refusal_of
-from sagittal.server.storage.tables import new_id, now, user
+from sagittal.server.storage.schema.person_tables import api_token
+from sagittal.server.storage.schema.tables import new_id, now, user
 
 PREFIX: Final = "sgt_"
 """By it a token is known where one has leaked."""

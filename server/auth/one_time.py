@@ -10,7 +10,7 @@ from sqlalchemy import Connection, delete, func, insert, select, update
 
 from sagittal.server.auth.tokens import new_token, token_hash
 from sagittal.server.http.problems import Problem
-from sagittal.server.storage.tables import now, one_time_token, user
+from sagittal.server.storage.schema.tables import now, one_time_token, user
 
 LIFE = dt.timedelta(hours=24)
 

@@ -23,8 +23,8 @@ from sqlalchemy import Connection, delete, insert, select, update
 from sagittal.server.auth.tokens import token_hash
 from sagittal.server.http.problems import Problem
 from sagittal.server.storage.archive import BackupFileError, make_key, read_key
-from sagittal.server.storage.person_tables import second_factor, security_key, security_key_challenge
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.person_tables import second_factor, security_key, security_key_challenge
+from sagittal.server.storage.schema.tables import now
 
 log = logging.getLogger(__name__)
 

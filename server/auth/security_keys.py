@@ -25,8 +25,8 @@ from sagittal.server.auth import second_factor
 from sagittal.server.auth.tokens import token_hash
 from sagittal.server.http.hosts import host_name
 from sagittal.server.http.problems import Problem
-from sagittal.server.storage.person_tables import security_key, security_key_challenge
-from sagittal.server.storage.tables import new_id, now
+from sagittal.server.storage.schema.person_tables import security_key, security_key_challenge
+from sagittal.server.storage.schema.tables import new_id, now
 
 log = logging.getLogger(__name__)
 

@@ -16,7 +16,7 @@ from sagittal.server.auth.sight import NOTHING, opens_parts
 from sagittal.server.auth.tokens import new_token, token_hash
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.refusal import is_busy, refusal_of
-from sagittal.server.storage.tables import login_session, now, user
+from sagittal.server.storage.schema.tables import login_session, now, user
 
 TOUCH_EVERY = dt.timedelta(seconds=30)
 """Activity is written at most this often: each write costs one fsync."""

@@ -15,11 +15,11 @@ from sqlalchemy import ColumnElement, Connection, Row, Select, and_, exists, lit
 
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Role
-from sagittal.server.storage.care_tables import care_team_member, clinic_option, emergency_access
-from sagittal.server.storage.live_tables import live_take
-from sagittal.server.storage.person_tables import consent
-from sagittal.server.storage.report_tables import report_link, signed_report
-from sagittal.server.storage.tables import (
+from sagittal.server.storage.schema.care_tables import care_team_member, clinic_option, emergency_access
+from sagittal.server.storage.schema.live_tables import live_take
+from sagittal.server.storage.schema.person_tables import consent
+from sagittal.server.storage.schema.report_tables import report_link, signed_report
+from sagittal.server.storage.schema.tables import (
     analysis,
     file_upload,
     filter_run,

@@ -17,9 +17,9 @@ from sqlalchemy.exc import OperationalError
 
 from sagittal.server.http.problems import Problem
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.node_tables import failed_attempt
 from sagittal.server.storage.refusal import refusal_of
-from sagittal.server.storage.tables import new_id
+from sagittal.server.storage.schema.node_tables import failed_attempt
+from sagittal.server.storage.schema.tables import new_id
 
 WINDOW_S = 15 * 60.0
 MAX_PER_PAIR = 10

@@ -6,7 +6,7 @@ import datetime as dt
 from typing import Final
 
 from sagittal.server.errors import ServiceError
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 
 FIRST: Final = dt.date(1900, 1, 1)
 AHEAD: Final = dt.timedelta(days=3653)

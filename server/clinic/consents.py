@@ -14,8 +14,8 @@ from sqlalchemy import Connection, insert, select, update
 from sagittal.server import audit
 from sagittal.server.clinic import patients
 from sagittal.server.errors import Conflict, NotFound, ServiceError
-from sagittal.server.storage.person_tables import CONSENT_PURPOSES, consent
-from sagittal.server.storage.tables import new_id, now, user
+from sagittal.server.storage.schema.person_tables import CONSENT_PURPOSES, consent
+from sagittal.server.storage.schema.tables import new_id, now, user
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from sqlalchemy import Connection, Select, delete, func, insert, select
 from sagittal.core.quality.device_course import DeviceCourse, follow_device
 from sagittal.core.quality.devices import DeviceCheck
 from sagittal.server.errors import NotFound
-from sagittal.server.storage.tables import device_check, now, recording, session
+from sagittal.server.storage.schema.tables import device_check, now, recording, session
 
 LISTED: Final = 200
 """Devices of a list, and of what a tablet is told."""

@@ -30,8 +30,8 @@ from sagittal.server.storage.field_cipher import (
     read_keys,
     say_field,
 )
-from sagittal.server.storage.person_tables import identity_key, patient_identity
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.person_tables import identity_key, patient_identity
+from sagittal.server.storage.schema.tables import now
 from sagittal.web.user_text import UserText
 
 FIELDS: Final = ("name", "born_on", "record_number", "insurance_number", "contact")

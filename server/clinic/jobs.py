@@ -14,7 +14,7 @@ from sagittal.server.auth.sight import only_seen
 from sagittal.server.errors import NotFound
 from sagittal.server.jobs.queue import VIEW_COLUMNS, JobQueue, JobView
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import ACTIVE_STATES, job, patient, recording, session
+from sagittal.server.storage.schema.tables import ACTIVE_STATES, job, patient, recording, session
 
 
 @dataclass(frozen=True)

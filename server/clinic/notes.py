@@ -11,7 +11,7 @@ from sagittal.server import audit
 from sagittal.server.clinic import patients
 from sagittal.server.clinic.calendar_days import require_day
 from sagittal.server.errors import NotAllowed, NotFound, ServiceError
-from sagittal.server.storage.tables import new_id, now, patient_note, user
+from sagittal.server.storage.schema.tables import new_id, now, patient_note, user
 
 MOST_CHARACTERS = 10_000
 

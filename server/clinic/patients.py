@@ -19,8 +19,8 @@ from sagittal.server.auth.sight import TEAMS_ARE_ON, only_seen
 from sagittal.server.clinic import jobs
 from sagittal.server.errors import Conflict, NotFound, ServiceError
 from sagittal.server.jobs.queue import BESIDE
-from sagittal.server.storage.columns import make_all
-from sagittal.server.storage.tables import ACTIVE_STATES, job, new_id, now, patient, recording, session
+from sagittal.server.storage.schema.columns import make_all
+from sagittal.server.storage.schema.tables import ACTIVE_STATES, job, new_id, now, patient, recording, session
 
 if TYPE_CHECKING:
     from sagittal.server.clinic.sessions import Session

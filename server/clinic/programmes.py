@@ -15,7 +15,7 @@ from sagittal.server.clinic import patients, sessions
 from sagittal.server.clinic.calendar_days import require_day
 from sagittal.server.clinic.course import COURSES, SIX_WEEKS, VisitKind
 from sagittal.server.errors import Conflict, NotFound, ServiceError
-from sagittal.server.storage.tables import new_id, now, planned_visit, programme, session
+from sagittal.server.storage.schema.tables import new_id, now, planned_visit, programme, session
 
 VisitState = Literal["done", "missing", "next", "planned"]
 

@@ -23,8 +23,8 @@ from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.sight import only_seen
 from sagittal.server.errors import NotFound, ServiceError
 from sagittal.server.jobs.queue import BESIDE
-from sagittal.server.storage.columns import make_all
-from sagittal.server.storage.tables import (
+from sagittal.server.storage.schema.columns import make_all
+from sagittal.server.storage.schema.tables import (
     ACTIVE_STATES,
     analysis,
     job,

@@ -12,8 +12,8 @@ from sagittal.server.settings import load_settings
 def accept(*, data_dir: DataDir = None) -> int:
     """Trust the database from now on; 1 when it cannot be used."""
     from sagittal.server.safekeeping import custody
-    from sagittal.server.storage.blob_opening import open_blobs
     from sagittal.server.storage.db import Database
+    from sagittal.server.storage.files.blob_opening import open_blobs
     from sagittal.server.storage.migrate import MigrationError, require_database, upgrade
 
     settings = load_settings({"data_dir": data_dir})

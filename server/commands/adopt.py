@@ -56,8 +56,8 @@ def _list(settings: Settings) -> int:
 def _adopt(settings: Settings, take: str, session: str) -> int:
     from sagittal.server.jobs.opening import open_queue
     from sagittal.server.live_takes import live_logs
-    from sagittal.server.storage.blob_opening import open_blobs
     from sagittal.server.storage.db import Database
+    from sagittal.server.storage.files.blob_opening import open_blobs
 
     with closing(Database(settings.database_source)) as db:
         queue = open_queue(db, settings.lease_s)

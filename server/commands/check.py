@@ -22,8 +22,8 @@ def check(*, head: Annotated[Path | None, Parameter(metavar="JSON")] = None, dat
         newest audit row as it was, kept elsewhere
     """
     from sagittal.server.safekeeping import checks
-    from sagittal.server.storage.blob_opening import open_blobs
     from sagittal.server.storage.db import Database
+    from sagittal.server.storage.files.blob_opening import open_blobs
     from sagittal.server.storage.migrate import MigrationError, require_current
 
     settings = load_settings({"data_dir": data_dir})

@@ -98,7 +98,7 @@ def _wait_for_live(database: Source, helper: subprocess.Popen[bytes]) -> bool:
 def _report(database: Source) -> None:
     """Say on the console what is being waited for, until every session is analysed."""
     from sagittal.server.demo.clinic import VISITS
-    from sagittal.server.storage.tables import job
+    from sagittal.server.storage.schema.tables import job
     from sagittal.server.uploads.recordings import ANALYSE
 
     began, told = time.monotonic(), ""

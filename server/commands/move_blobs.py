@@ -10,7 +10,8 @@ from sagittal.server.settings import load_settings
 
 def move_blobs(*, data_dir: DataDir = None) -> int:
     """Move stored files into SAGITTAL_BUCKET; 1 when that is not possible, or damaged ones stay."""
-    from sagittal.server.storage import blob_moving, fs
+    from sagittal.server.storage import fs
+    from sagittal.server.storage.files import blob_moving
 
     settings = load_settings({"data_dir": data_dir})
     if not settings.blobs.is_dir():

@@ -44,8 +44,8 @@ def research(
     from sagittal.core.errors import SagittalError
     from sagittal.server.downloads import deidentified
     from sagittal.server.storage import fs
-    from sagittal.server.storage.blob_opening import open_blobs
     from sagittal.server.storage.db import Database
+    from sagittal.server.storage.files.blob_opening import open_blobs
     from sagittal.server.storage.migrate import MigrationError, require_current
 
     settings = load_settings({"data_dir": data_dir})

@@ -69,8 +69,13 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
         refuse_wrong_clock,
     )
     from sagittal.server.storage import fs
-    from sagittal.server.storage.blob_opening import note_bucket, open_blobs, require_use, warn_of_leftovers
     from sagittal.server.storage.db import Database
+    from sagittal.server.storage.files.blob_opening import (
+        note_bucket,
+        open_blobs,
+        require_use,
+        warn_of_leftovers,
+    )
     from sagittal.server.storage.migrate import MigrationError, read_revision, upgrade
     from sagittal.server.web_server.build import build_server
     from sagittal.server.web_server.connection import ConnectionLimits

@@ -18,8 +18,8 @@ def trash(*, restore: bool = False, data_dir: DataDir = None) -> int:
         put back those that the database refers to
     """
     from sagittal.server.safekeeping import sweep
-    from sagittal.server.storage.blob_opening import open_blobs
     from sagittal.server.storage.db import Database
+    from sagittal.server.storage.files.blob_opening import open_blobs
     from sagittal.server.storage.migrate import MigrationError, require_current, require_database
 
     settings = load_settings({"data_dir": data_dir})

@@ -31,7 +31,7 @@ def user(
     from sagittal.server.http.problems import Problem
     from sagittal.server.storage.db import Database
     from sagittal.server.storage.migrate import MigrationError, exists, upgrade
-    from sagittal.server.storage.tables import user as table
+    from sagittal.server.storage.schema.tables import user as table
 
     settings = load_settings({"data_dir": data_dir})
     password = (

@@ -20,10 +20,10 @@ from sagittal.server.jobs.opening import open_queue
 from sagittal.server.results import analyses, prescriptions
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings, load_settings
-from sagittal.server.storage.blob_opening import open_blobs
-from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.files.blob_opening import open_blobs
+from sagittal.server.storage.files.blobs import BlobStore
+from sagittal.server.storage.schema.tables import now
 from sagittal.server.uploads import recordings
 
 if TYPE_CHECKING:

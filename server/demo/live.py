@@ -22,7 +22,7 @@ from sagittal.server.live.playback import DueBatch, cut, hello_of, pace_batches
 from sagittal.server.live_takes import live
 from sagittal.server.settings import Settings, load_settings
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 
 if TYPE_CHECKING:
     from sagittal.core.signals.recording import Recording

@@ -26,7 +26,7 @@ from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.results.analyses import AnalysisRecord
 from sagittal.server.results.edit_log import EditHistory
 from sagittal.server.sharing.signed_reports import SignedDocuments
-from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.files.blobs import BlobStore
 from sagittal.server.uploads.recordings import StoredRecording
 
 SCHEMA: Final = 1
@@ -93,7 +93,7 @@ def write_archive(
 def _settings(blobs: BlobStore, recording: StoredRecording, found: AnalysisRecord) -> Mapping[str, Any]:
     """What the analysis was computed with, also where it came in an archive among the recording's files."""
     from sagittal.server.results.analysing import choose_config  # slow imports
-    from sagittal.server.storage.blob_source import open_source
+    from sagittal.server.storage.files.blob_source import open_source
 
     files = [open_source(blobs, recording.patient_id, f.name, f.size, f.sha256) for f in recording.files]
     return choose_config(files, found.config)

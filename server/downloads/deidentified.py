@@ -39,8 +39,8 @@ from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.report.files.columns import SCHEMA, floats_of, parquet_file, write_csv
 from sagittal.server.results import analyses, edit_log
 from sagittal.server.storage import fs
-from sagittal.server.storage.blobs import BlobStore, IntegrityError
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blobs import BlobStore, IntegrityError
 
 MOST_SHIFT_DAYS: Final = 1461
 """Four years: neither the season nor the year of a visit is told."""

@@ -28,8 +28,8 @@ from sagittal.server.results import analyses, edit_log
 from sagittal.server.results.histories import AnalysedSession
 from sagittal.server.results.shown_take import make_key, submit_for
 from sagittal.server.sharing import signed_reports
-from sagittal.server.storage.blobs import Blob
-from sagittal.server.storage.tables import analysis_file, job
+from sagittal.server.storage.files.blobs import Blob
+from sagittal.server.storage.schema.tables import analysis_file, job
 
 if TYPE_CHECKING:
     from sagittal.core.formats.source import SourceFile

@@ -24,11 +24,11 @@ from sagittal.server.clinic import identities, patients
 from sagittal.server.export.zipping import ZipSink
 from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.storage.archive import PIECE
-from sagittal.server.storage.blobs import BlobStore, IntegrityError
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.field_cipher import KeyUnusable, ValueUnreadable
-from sagittal.server.storage.person_tables import patient_identity
-from sagittal.server.storage.tables import audit, metadata, now, patient, user
+from sagittal.server.storage.files.blobs import BlobStore, IntegrityError
+from sagittal.server.storage.schema.person_tables import patient_identity
+from sagittal.server.storage.schema.tables import audit, metadata, now, patient, user
 
 _INTO: Final = "w"
 """How a zip's own file is opened; on the disk nothing is."""

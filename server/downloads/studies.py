@@ -31,9 +31,9 @@ from sagittal.server.report.study_tables import StudyTables, StudyTake, write_st
 from sagittal.server.results import analyses, edit_log
 from sagittal.server.results.histories import AnalysedSession
 from sagittal.server.results.reviewed import ReviewedAnalyses
-from sagittal.server.storage.blobs import StoreAway
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.files.blobs import StoreAway
+from sagittal.server.storage.schema.tables import now
 from sagittal.server.uploads import recordings
 
 MOST_VISITS: Final = 300

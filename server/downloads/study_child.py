@@ -19,8 +19,8 @@ from sagittal.server.export.zipping import zip_files
 from sagittal.server.processes.child import enter_child
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blob_opening import open_blobs
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_opening import open_blobs
 from sagittal.web.user_text import encode_user_text
 
 

@@ -24,7 +24,7 @@ from sagittal.core.errors import SagittalError
 from sagittal.server.http.headers import add_security_headers
 from sagittal.server.http.templates import render
 from sagittal.server.log import request_id
-from sagittal.server.storage.blobs import IntegrityError, StoreAway
+from sagittal.server.storage.files.blobs import IntegrityError, StoreAway
 from sagittal.server.storage.refusal import is_busy, refusal_of
 
 log = logging.getLogger(__name__)

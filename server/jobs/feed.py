@@ -17,7 +17,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from sagittal.server.jobs.queue import VIEW_COLUMNS, JobView, job_view
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import job
+from sagittal.server.storage.schema.tables import job
 
 log = logging.getLogger(__name__)
 

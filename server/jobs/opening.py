@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from sagittal.server.jobs.table import TableQueue
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 
 
 def open_queue(db: Database, lease_s: float, clock: Callable[[], dt.datetime] = now) -> TableQueue:

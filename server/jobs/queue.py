@@ -18,7 +18,7 @@ from typing import Any, Final, Literal, Protocol
 
 from sqlalchemy import Connection, Row
 
-from sagittal.server.storage.tables import job
+from sagittal.server.storage.schema.tables import job
 
 Publish = Callable[[Connection], None]
 """Writes a result's rows; called inside the transaction that marks the job done."""

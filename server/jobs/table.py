@@ -24,7 +24,7 @@ from sagittal.server.jobs.queue import (
     job_view,
 )
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import ACTIVE_STATES, job, new_id, now
+from sagittal.server.storage.schema.tables import ACTIVE_STATES, job, new_id, now
 
 POLL_S = 0.2
 """Pause between two looks for work; a look is one read of an index."""

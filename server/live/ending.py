@@ -25,9 +25,9 @@ from sagittal.server.live.take import ActiveTake
 from sagittal.server.live_takes import live, live_recordings
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs
-from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.disk_log import DiskLog
+from sagittal.server.storage.files.blobs import BlobStore
 
 log = logging.getLogger(__name__)
 

@@ -17,8 +17,8 @@ from sagittal.core.feedback import Cue
 from sagittal.server.live_takes.live_training import note_feedback
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.disk_log import DiskLog
-from sagittal.server.storage.live_tables import live_event, live_take
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.live_tables import live_event, live_take
+from sagittal.server.storage.schema.tables import now
 
 log = logging.getLogger(__name__)
 

@@ -14,7 +14,7 @@ from sagittal.server.live_takes import live
 from sagittal.server.live_takes.live_training import LiveTraining, training_of
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.live_tables import live_take
+from sagittal.server.storage.schema.live_tables import live_take
 
 
 class Rows:

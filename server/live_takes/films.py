@@ -27,9 +27,9 @@ from sagittal.server.errors import Conflict, NotFound, ServiceError, TooLarge
 from sagittal.server.live_takes import live, live_recordings
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs, references, segments
-from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.files.blobs import BlobStore
+from sagittal.server.storage.schema.tables import now
 from sagittal.server.uploads import recordings, videos
 
 log = logging.getLogger(__name__)

@@ -25,8 +25,8 @@ from sagittal.server import audit
 from sagittal.server.auth.tokens import new_token, token_hash
 from sagittal.server.clinic import devices, sessions
 from sagittal.server.errors import Conflict, NodeAway, NotFound, ServiceError
-from sagittal.server.storage.live_tables import OPEN_TAKE_STATES, live_event, live_take
-from sagittal.server.storage.tables import new_id, now, patient, session, user
+from sagittal.server.storage.schema.live_tables import OPEN_TAKE_STATES, live_event, live_take
+from sagittal.server.storage.schema.tables import new_id, now, patient, session, user
 
 ALPHABET = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
 """Characters of a code: none that looks or sounds on a tablet like another (0 O, 1 I L)."""

@@ -23,9 +23,9 @@ from sagittal.server.jobs.queue import JobQueue
 from sagittal.server.live_takes import live_recordings
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs, segments
-from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.live_tables import live_take
+from sagittal.server.storage.files.blobs import BlobStore
+from sagittal.server.storage.schema.live_tables import live_take
 
 _ID = re.compile(r"[0-9a-f]{32}")
 

@@ -20,10 +20,10 @@ from sagittal.server.live_takes import live, live_training
 from sagittal.server.results import analyses
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs, references, segments
-from sagittal.server.storage.blobs import Blob, BlobStore
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.live_tables import OPEN_TAKE_STATES, live_take
-from sagittal.server.storage.tables import new_id, now, recording, recording_file, user
+from sagittal.server.storage.files.blobs import Blob, BlobStore
+from sagittal.server.storage.schema.live_tables import OPEN_TAKE_STATES, live_take
+from sagittal.server.storage.schema.tables import new_id, now, recording, recording_file, user
 from sagittal.server.uploads import recordings
 
 log = logging.getLogger(__name__)

@@ -19,8 +19,8 @@ from sagittal.server.live_takes import live
 from sagittal.server.results import analyses, prescriptions
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.live_tables import live_event, live_take
-from sagittal.server.storage.tables import session
+from sagittal.server.storage.schema.live_tables import live_event, live_take
+from sagittal.server.storage.schema.tables import session
 
 log = logging.getLogger(__name__)
 

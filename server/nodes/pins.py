@@ -18,7 +18,7 @@ from starlette.types import Scope
 
 from sagittal.server.nodes.registry import Nodes, WebNode
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.live_tables import OPEN_TAKE_STATES, live_take
+from sagittal.server.storage.schema.live_tables import OPEN_TAKE_STATES, live_take
 
 _ID = "([0-9a-f]{32})"
 _SESSION: Final = re.compile(

@@ -24,9 +24,9 @@ from sagittal.server.nodes.passage import read_key, write_line
 from sagittal.server.safekeeping.custody import StrangersError
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.live_tables import live_take
-from sagittal.server.storage.node_tables import web_node
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.live_tables import live_take
+from sagittal.server.storage.schema.node_tables import web_node
+from sagittal.server.storage.schema.tables import now
 
 FORGOTTEN: Final = dt.timedelta(days=30)
 """A server that was not heard of for so long is not listed any more."""

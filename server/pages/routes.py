@@ -4,37 +4,26 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from sagittal.server.pages import (
-    account,
+from sagittal.server.pages import audit_log, system, texts
+from sagittal.server.pages.account import account, sign_in, users
+from sagittal.server.pages.clinic import devices, identity, jobs, new_session, patients, programme
+from sagittal.server.pages.live_takes import capture, live
+from sagittal.server.pages.results import (
     algorithms,
-    audit_log,
     calibration,
-    capture,
     compare,
     data,
-    devices,
-    handouts,
-    identity,
-    jobs,
-    live,
-    new_session,
     parameter,
     patient,
-    patients,
     prescription,
-    programme,
-    report,
     sensitivity,
     session,
-    sign_in,
     study,
-    system,
-    texts,
     timeline,
     trends,
-    upload,
-    users,
 )
+from sagittal.server.pages.sharing import handouts, report
+from sagittal.server.pages.uploads import upload
 
 ROUTERS: tuple[APIRouter, ...] = (
     account.router,

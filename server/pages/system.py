@@ -22,7 +22,7 @@ from sagittal.server.pages.shell import render_page
 from sagittal.server.safekeeping import backup_schedule
 from sagittal.server.safekeeping.backup_schedule import BackupState, Outcome
 from sagittal.server.storage.high_water import read_newest
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

@@ -19,9 +19,9 @@ from sagittal.server.clinic import sessions
 from sagittal.server.errors import NotFound
 from sagittal.server.jobs.queue import Claim, JobQueue, JobView
 from sagittal.server.provenance import CODE_VERSION
-from sagittal.server.storage.blobs import Blob, BlobStore
-from sagittal.server.storage.columns import make_all
-from sagittal.server.storage.tables import (
+from sagittal.server.storage.files.blobs import Blob, BlobStore
+from sagittal.server.storage.schema.columns import make_all
+from sagittal.server.storage.schema.tables import (
     analysis,
     analysis_file,
     job,

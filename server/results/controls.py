@@ -15,8 +15,8 @@ from sagittal.server.clinic.patients import Patient
 from sagittal.server.clinic.sessions import Session
 from sagittal.server.results import analyses, edit_log
 from sagittal.server.results.reviewed import ReviewedAnalyses
-from sagittal.server.storage.tables import patient
-from sagittal.server.storage.tables import session as session_table
+from sagittal.server.storage.schema.tables import patient
+from sagittal.server.storage.schema.tables import session as session_table
 
 NEAR_MPS: Final = 0.2
 """Controls who walk within this of a person are their reference: speed matters more than age

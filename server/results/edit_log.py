@@ -14,8 +14,8 @@ from typing import Final
 from sqlalchemy import Connection, bindparam, select
 
 from sagittal.core.events.edits import Edit, read_edit
-from sagittal.server.storage.tables import edit as rows
-from sagittal.server.storage.tables import user
+from sagittal.server.storage.schema.tables import edit as rows
+from sagittal.server.storage.schema.tables import user
 
 UNDO: Final = "undo"
 """Kind of the row that takes the last live edit back."""

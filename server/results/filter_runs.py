@@ -18,8 +18,8 @@ from sagittal.server.jobs.queue import COMPARE_FILTERS, Claim, JobQueue, JobView
 from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.results import analyses, analysing, edit_log
 from sagittal.server.results.shown_take import submit_on_shown
-from sagittal.server.storage.blobs import Blob, BlobStore
-from sagittal.server.storage.tables import (
+from sagittal.server.storage.files.blobs import Blob, BlobStore
+from sagittal.server.storage.schema.tables import (
     analysis,
     filter_run,
     filter_run_file,

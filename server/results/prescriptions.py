@@ -26,8 +26,8 @@ from sagittal.server.errors import Conflict, NotFound, ServiceError
 from sagittal.server.results import targets
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.results.targets import AnalysedWalk
-from sagittal.server.storage.live_tables import live_event, live_take
-from sagittal.server.storage.tables import new_id, now, prescription, session, user
+from sagittal.server.storage.schema.live_tables import live_event, live_take
+from sagittal.server.storage.schema.tables import new_id, now, prescription, session, user
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from sqlalchemy import Connection
 from sagittal.core.formats.manifest import manifest_of
 from sagittal.server.results.analyses import AnalysisRecord, file_bytes
 from sagittal.server.results.analysing import REPAIRED
-from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.files.blobs import BlobStore
 from sagittal.server.uploads import recordings
 
 SETUP_KEYS: Final = ("sensors", "corrections", "mounting")

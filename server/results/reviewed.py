@@ -33,7 +33,7 @@ from sagittal.server.report.history.numbers import (
 from sagittal.server.report.words.wording import speak_places
 from sagittal.server.results import analyses
 from sagittal.server.results.edit_log import EditHistory
-from sagittal.server.storage.blobs import BlobStore, IntegrityError, StoreAway
+from sagittal.server.storage.files.blobs import BlobStore, IntegrityError, StoreAway
 
 _Value = TypeVar("_Value")
 

@@ -17,8 +17,8 @@ from sagittal.server.results import analyses
 from sagittal.server.results.edit_log import UNDO, EditHistory, edits_of
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import edit as rows
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import edit as rows
+from sagittal.server.storage.schema.tables import now
 
 ACTIONS: Final = {
     "move_event": "event.moved",

@@ -22,8 +22,8 @@ from sagittal.server.report.files.bundle import read_angles
 from sagittal.server.report.view.sensitivity import sensitivity_files, summarise_sensitivity
 from sagittal.server.results import analyses, analysing
 from sagittal.server.results.shown_take import submit_on_shown
-from sagittal.server.storage.blobs import Blob
-from sagittal.server.storage.tables import analysis_file, job, recording
+from sagittal.server.storage.files.blobs import Blob
+from sagittal.server.storage.schema.tables import analysis_file, job, recording
 from sagittal.server.uploads import reference_files
 
 if TYPE_CHECKING:

@@ -28,8 +28,8 @@ from sagittal.server.errors import Conflict, NotFound
 from sagittal.server.jobs.queue import TUNE, Claim, JobQueue, JobView, Priority
 from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.results.analyses import digest_json
-from sagittal.server.storage.blobs import Blob
-from sagittal.server.storage.tables import new_id, now, recording, tuning
+from sagittal.server.storage.files.blobs import Blob
+from sagittal.server.storage.schema.tables import new_id, now, recording, tuning
 from sagittal.server.uploads import recordings
 
 if TYPE_CHECKING:

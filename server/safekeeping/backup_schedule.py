@@ -24,7 +24,7 @@ from sagittal.server.storage import fs
 from sagittal.server.storage.archive import BackupFileError, ClinicKey, read_key
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.migrate import MigrationError, require_current
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 
 log = logging.getLogger(__name__)
 

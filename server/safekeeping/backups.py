@@ -31,13 +31,13 @@ from sagittal.server.safekeeping.tombstones import find_tombstones, keep_tombsto
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs
 from sagittal.server.storage.archive import ArchiveWriter, ClinicKey, write_archive
-from sagittal.server.storage.blob_opening import open_blobs
-from sagittal.server.storage.blobs import BlobStore, StoreAway
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_opening import open_blobs
+from sagittal.server.storage.files.blobs import BlobStore, StoreAway
 from sagittal.server.storage.high_water import HighWater, read_newest
 from sagittal.server.storage.migrate import copy_database, read_revision
 from sagittal.server.storage.references import list_referenced
-from sagittal.server.storage.tables import job, new_id, now, patient, session
+from sagittal.server.storage.schema.tables import job, new_id, now, patient, session
 
 log = logging.getLogger(__name__)
 

@@ -15,11 +15,11 @@ from sagittal.server.clinic import identities
 from sagittal.server.live_takes import live_logs
 from sagittal.server.safekeeping import custody
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blobs import BlobStore, StoreAway, digest_open
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blobs import BlobStore, StoreAway, digest_open
+from sagittal.server.storage.files.trash import Trash, TrashedFile
 from sagittal.server.storage.high_water import explain_lost_rows
 from sagittal.server.storage.references import list_referenced
-from sagittal.server.storage.trash import Trash, TrashedFile
 
 
 @dataclass(frozen=True)

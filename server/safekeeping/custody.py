@@ -19,13 +19,13 @@ from sqlalchemy.exc import DatabaseError
 from sagittal.server import audit
 from sagittal.server.safekeeping import erasure
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blob_opening import open_blobs
-from sagittal.server.storage.blobs import INCOMING, StoreAway
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_opening import open_blobs
+from sagittal.server.storage.files.blobs import INCOMING, StoreAway
 from sagittal.server.storage.high_water import explain_lost_rows, read_newest, set_mark
 from sagittal.server.storage.migrate import exists
-from sagittal.server.storage.tables import audit as audit_table
-from sagittal.server.storage.tables import patient
+from sagittal.server.storage.schema.tables import audit as audit_table
+from sagittal.server.storage.schema.tables import patient
 
 log = logging.getLogger(__name__)
 

@@ -26,14 +26,14 @@ from sagittal.server.errors import Conflict
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs
-from sagittal.server.storage.blobs import BlobStore, StoreAway
-from sagittal.server.storage.care_tables import care_team_member, emergency_access
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.live_tables import live_event, live_take
-from sagittal.server.storage.person_tables import consent, patient_identity
+from sagittal.server.storage.files.blobs import BlobStore, StoreAway
 from sagittal.server.storage.references import discard, list_referenced
-from sagittal.server.storage.report_tables import assessment, report_file, report_link, signed_report
-from sagittal.server.storage.tables import (
+from sagittal.server.storage.schema.care_tables import care_team_member, emergency_access
+from sagittal.server.storage.schema.live_tables import live_event, live_take
+from sagittal.server.storage.schema.person_tables import consent, patient_identity
+from sagittal.server.storage.schema.report_tables import assessment, report_file, report_link, signed_report
+from sagittal.server.storage.schema.tables import (
     analysis,
     analysis_file,
     device_check,
@@ -55,7 +55,7 @@ from sagittal.server.storage.tables import (
     session_video,
     tuning,
 )
-from sagittal.server.storage.tables import audit as audit_table
+from sagittal.server.storage.schema.tables import audit as audit_table
 
 log = logging.getLogger(__name__)
 

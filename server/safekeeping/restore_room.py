@@ -14,8 +14,8 @@ from typing import Final
 from sagittal.server.safekeeping.backups import IDENTITY_KEY, count_patients_and_sessions
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs
-from sagittal.server.storage.blob_bucket import BucketBlobs
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_bucket import BucketBlobs
 from sagittal.server.storage.high_water import read_newest
 from sagittal.server.storage.migrate import MigrationError, exists, require_current
 

@@ -47,17 +47,17 @@ from sagittal.server.settings import Settings
 from sagittal.server.sharing import care_teams
 from sagittal.server.storage import fs
 from sagittal.server.storage.archive import PIECE, ArchivedFile, ClinicKey, read_archive
-from sagittal.server.storage.blob_folder import FolderBlobs
-from sagittal.server.storage.blob_opening import write_note
-from sagittal.server.storage.blobs import BlobStore, StoreAway
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_folder import FolderBlobs
+from sagittal.server.storage.files.blob_opening import write_note
+from sagittal.server.storage.files.blobs import BlobStore, StoreAway
 from sagittal.server.storage.high_water import HighWater, read_newest, set_mark
-from sagittal.server.storage.live_tables import live_take
 from sagittal.server.storage.migrate import MigrationError, copy_database, upgrade
-from sagittal.server.storage.node_tables import failed_attempt, web_node
-from sagittal.server.storage.person_tables import api_token
-from sagittal.server.storage.report_tables import report_link
-from sagittal.server.storage.tables import login_session, now, one_time_token, patient, session
+from sagittal.server.storage.schema.live_tables import live_take
+from sagittal.server.storage.schema.node_tables import failed_attempt, web_node
+from sagittal.server.storage.schema.person_tables import api_token
+from sagittal.server.storage.schema.report_tables import report_link
+from sagittal.server.storage.schema.tables import login_session, now, one_time_token, patient, session
 
 RESTORED: Final = "backup.restored"
 _OURS: Final = re.compile(

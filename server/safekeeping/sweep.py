@@ -19,10 +19,10 @@ from sagittal.server.live_takes import films
 from sagittal.server.safekeeping import custody, erasure
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs
-from sagittal.server.storage.blobs import INCOMING, BlobStore
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blobs import INCOMING, BlobStore
 from sagittal.server.storage.references import list_referenced
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 from sagittal.server.uploads import uploads
 
 log = logging.getLogger(__name__)

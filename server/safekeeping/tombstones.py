@@ -16,7 +16,7 @@ from sqlalchemy import Connection, select
 from sagittal.core.formats.json_tree import read_json
 from sagittal.server.safekeeping.erasure import ERASED, SESSION_ERASED
 from sagittal.server.storage import fs
-from sagittal.server.storage.tables import audit
+from sagittal.server.storage.schema.tables import audit
 
 NAME: Final = "erased.json"
 

@@ -21,9 +21,9 @@ from sagittal.server.auth.sight import CARE_TEAMS, TEAMS_ARE_ON, is_emergency_op
 from sagittal.server.clinic import patients
 from sagittal.server.errors import Conflict, NotAllowed, NotFound, ServiceError
 from sagittal.server.sharing import report_links
-from sagittal.server.storage.care_tables import care_team_member, clinic_option, emergency_access
-from sagittal.server.storage.tables import audit as audit_table
-from sagittal.server.storage.tables import new_id, now, patient, session, user
+from sagittal.server.storage.schema.care_tables import care_team_member, clinic_option, emergency_access
+from sagittal.server.storage.schema.tables import audit as audit_table
+from sagittal.server.storage.schema.tables import new_id, now, patient, session, user
 
 EMERGENCY: Final = dt.timedelta(hours=4)
 """How long a patient stays open to who opened him or her in an emergency (our choice)."""

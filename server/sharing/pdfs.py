@@ -12,8 +12,8 @@ from sagittal.server.report.pdf import PdfMissing
 from sagittal.server.settings import Settings
 from sagittal.server.sharing import signed_reports
 from sagittal.server.sharing.paper_child import PaperReply
-from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blobs import BlobStore
 
 LONGEST_S: Final = 60.0
 """Longest one may take; a report takes some seconds."""

@@ -24,8 +24,8 @@ from sagittal.server.clinic import sessions
 from sagittal.server.errors import Conflict, NotFound, ServiceError
 from sagittal.server.sharing import signed_reports
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.report_tables import report_link, signed_report
-from sagittal.server.storage.tables import new_id, now, session, user
+from sagittal.server.storage.schema.report_tables import report_link, signed_report
+from sagittal.server.storage.schema.tables import new_id, now, session, user
 
 MOST_DAYS: Final = 90
 USUAL_DAYS: Final = 14

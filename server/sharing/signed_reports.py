@@ -18,9 +18,9 @@ from sagittal.server.clinic import sessions
 from sagittal.server.errors import Conflict, NotFound, ServiceError
 from sagittal.server.results.analyses import AnalysisRecord
 from sagittal.server.results.edit_log import EditHistory
-from sagittal.server.storage.blobs import Blob, BlobStore
-from sagittal.server.storage.report_tables import assessment, report_file, signed_report
-from sagittal.server.storage.tables import now, session
+from sagittal.server.storage.files.blobs import Blob, BlobStore
+from sagittal.server.storage.schema.report_tables import assessment, report_file, signed_report
+from sagittal.server.storage.schema.tables import now, session
 
 MOST_CHARACTERS: Final = 10_000
 """Of the reason to reopen a report."""

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from sqlalchemy import JSON, Connection, MetaData, Table, func, insert, select
 
-from sagittal.server.storage.columns import Json
 from sagittal.server.storage.db import highest_number, raise_number
+from sagittal.server.storage.schema.columns import Json
 
 _AT_ONCE = 500
 """Rows in memory."""

@@ -27,7 +27,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from sagittal.core.formats.json_tree import read_json
 from sagittal.server.storage import fs
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import audit
+from sagittal.server.storage.schema.tables import audit
 
 log = logging.getLogger(__name__)
 

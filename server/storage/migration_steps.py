@@ -6,7 +6,7 @@ from typing import Literal
 
 from alembic import op
 
-from sagittal.server.storage.append_only import write_triggers
+from sagittal.server.storage.schema.append_only import write_triggers
 
 
 def is_sqlite() -> bool:

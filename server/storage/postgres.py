@@ -22,7 +22,7 @@ from sqlalchemy.engine import ExceptionContext
 from sqlalchemy.exc import DBAPIError, InvalidatePoolError, OperationalError
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from sagittal.server.storage.columns import metadata
+from sagittal.server.storage.schema.columns import metadata
 from sagittal.server.storage.single import begin_with
 
 MAX_READERS = 45

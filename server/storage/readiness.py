@@ -11,8 +11,8 @@ from typing import ClassVar
 from sqlalchemy.exc import SQLAlchemyError
 
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blobs import BlobStore, StoreAway
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blobs import BlobStore, StoreAway
 from sagittal.server.storage.migrate import MigrationError, require_current
 from sagittal.server.storage.refusal import Refusal, refusal_of
 

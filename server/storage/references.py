@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 from sqlalchemy import Connection, select, union
 
-from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.report_tables import report_file, signed_report
-from sagittal.server.storage.tables import (
+from sagittal.server.storage.files.blobs import BlobStore
+from sagittal.server.storage.schema.report_tables import report_file, signed_report
+from sagittal.server.storage.schema.tables import (
     analysis,
     analysis_file,
     filter_run,

@@ -25,11 +25,19 @@ from sagittal.server.errors import Conflict, NotFound, ServiceError, TooLarge
 from sagittal.server.jobs.queue import TUNE, VIEW_COLUMNS, JobQueue, JobView, Priority, job_view
 from sagittal.server.provenance import CODE_VERSION
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blobs import Blob, BlobStore
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blobs import Blob, BlobStore
 from sagittal.server.storage.fs import SizeLimitError
 from sagittal.server.storage.refusal import Refusal
-from sagittal.server.storage.tables import job, new_id, now, patient, recording, recording_file, session
+from sagittal.server.storage.schema.tables import (
+    job,
+    new_id,
+    now,
+    patient,
+    recording,
+    recording_file,
+    session,
+)
 
 INSPECT = "inspect"
 ANALYSE = "analyse"

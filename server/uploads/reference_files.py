@@ -12,8 +12,8 @@ from sqlalchemy import Connection, delete, func, insert, select
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import NotFound, TooLarge
-from sagittal.server.storage.blobs import Blob, BlobStore
-from sagittal.server.storage.tables import now, reference_file
+from sagittal.server.storage.files.blobs import Blob, BlobStore
+from sagittal.server.storage.schema.tables import now, reference_file
 from sagittal.server.uploads.recordings import RecordedFile, receive
 
 MOST_FILES: Final = 20

@@ -22,8 +22,8 @@ from sqlalchemy import Connection, select
 from sagittal.core.errors import InputError
 from sagittal.server import audit
 from sagittal.server.errors import NotFound
-from sagittal.server.storage.blobs import BlobStore
-from sagittal.server.storage.tables import recording
+from sagittal.server.storage.files.blobs import BlobStore
+from sagittal.server.storage.schema.tables import recording
 from sagittal.server.uploads import recordings
 from sagittal.server.uploads.recordings import StoredRecording
 
@@ -161,7 +161,7 @@ def _check(file: SourceFile, source: Mapping[str, Any]) -> tuple[TableReading, .
 
 
 def _files(this: StoredRecording, blobs: BlobStore) -> Iterator[SourceFile]:
-    from sagittal.server.storage.blob_source import open_source  # slow import
+    from sagittal.server.storage.files.blob_source import open_source  # slow import
 
     for f in this.files:
         yield open_source(blobs, this.patient_id, f.name, f.size, f.sha256)

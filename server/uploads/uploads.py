@@ -19,9 +19,9 @@ from sagittal.server import audit
 from sagittal.server.errors import Conflict, NotFound, ServiceError, TooLarge
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs, references
-from sagittal.server.storage.blobs import Blob, BlobStore
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import file_upload, new_id, now
+from sagittal.server.storage.files.blobs import Blob, BlobStore
+from sagittal.server.storage.schema.tables import file_upload, new_id, now
 from sagittal.server.uploads import recordings
 from sagittal.server.uploads.recordings import RecordedFile
 

@@ -16,8 +16,8 @@ from sqlalchemy import Connection, delete, insert, select, update
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import NotFound, ServiceError
-from sagittal.server.storage.blobs import Blob, BlobStore
-from sagittal.server.storage.tables import now, session_video
+from sagittal.server.storage.files.blobs import Blob, BlobStore
+from sagittal.server.storage.schema.tables import now, session_video
 from sagittal.server.uploads.recordings import RecordedFile, receive
 
 BEGINS: Final = 12

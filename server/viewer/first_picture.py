@@ -19,7 +19,7 @@ from sagittal.server.viewer.colours import Tint
 from sagittal.server.viewer.few_poses import find_matrices
 from sagittal.server.viewer.motion import ReplayMotion
 from sagittal.server.viewer.outlines import find_front, split_surfaces, trace_edges
-from sagittal.server.viewer.replay_floor import CHUNK, RECENT_PRINTS
+from sagittal.server.viewer.replay.replay_floor import CHUNK, RECENT_PRINTS
 from sagittal.server.viewer.room import FOV_RAD, CameraShot, frame_person
 from sagittal.server.viewer.shapes import Mesh, make_footprint
 

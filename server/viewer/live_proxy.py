@@ -30,8 +30,8 @@ from sagittal.server.context import Db, Id, OpenTrail, state_of
 from sagittal.server.live.hub import Hub
 from sagittal.server.live_takes import live
 from sagittal.server.storage.db import Database
-from sagittal.server.viewer.live_figure import LiveFigure
-from sagittal.server.viewer.live_reference import LiveReference, NormAt
+from sagittal.server.viewer.live.live_figure import LiveFigure
+from sagittal.server.viewer.live.live_reference import LiveReference, NormAt
 from sagittal.server.viewer.live_watch import LiveWatch
 from sagittal.server.viewer.views import FigureView, FigureViews
 

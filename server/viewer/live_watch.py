@@ -16,9 +16,9 @@ import numpy as np
 
 from sagittal.core.frames import SIDES, SUFFIX, Segment, Side
 from sagittal.server.live.messages import STALE_S, FigurePose, Picture
-from sagittal.server.viewer.live_figure import LiveFigure
-from sagittal.server.viewer.live_reference import LiveReference, find_standing_angles
-from sagittal.server.viewer.moment import FigureMoment
+from sagittal.server.viewer.live.live_figure import LiveFigure
+from sagittal.server.viewer.live.live_reference import LiveReference, find_standing_angles
+from sagittal.server.viewer.live.moment import FigureMoment
 
 log = logging.getLogger(__name__)
 

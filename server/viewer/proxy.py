@@ -52,7 +52,7 @@ from sagittal.server.report.files.bundle import read_poses
 from sagittal.server.report.view.no_figure import explain_no_figure
 from sagittal.server.results import analyses, comparisons, edit_log
 from sagittal.server.results.histories import AnalysedSession
-from sagittal.server.storage.blobs import BlobStore
+from sagittal.server.storage.files.blobs import BlobStore
 from sagittal.server.viewer.client import client_page, client_version, find_packed_page
 from sagittal.server.viewer.ghost import match_ghost
 from sagittal.server.viewer.motion import GhostName, ReplayMotion, prepare_motion
@@ -62,8 +62,8 @@ from sagittal.server.viewer.pipe import (
     find_subprotocols,
     is_allowed,
 )
-from sagittal.server.viewer.replay_figure import ReplayFigure
-from sagittal.server.viewer.replay_reference import find_references
+from sagittal.server.viewer.replay.replay_figure import ReplayFigure
+from sagittal.server.viewer.replay.replay_reference import find_references
 from sagittal.server.viewer.room import VIEWS, ViewName
 from sagittal.server.viewer.views import FigureView, FigureViews, new_id
 

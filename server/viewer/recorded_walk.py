@@ -32,7 +32,7 @@ def record_walk(poses: Poses) -> bytes:
     # a worker that draws nothing does without viser
     from sagittal.server.viewer.client import silence
     from sagittal.server.viewer.motion import prepare_motion
-    from sagittal.server.viewer.replay_figure import ReplayFigure
+    from sagittal.server.viewer.replay.replay_figure import ReplayFigure
     from sagittal.server.viewer.scene_server import start_scene_server, stop_scene_server
 
     motion = prepare_motion(poses)

@@ -21,9 +21,9 @@ import viser
 
 from sagittal.core.errors import EstimationError
 from sagittal.server.auth.roles import Action, Role, is_permitted
-from sagittal.server.viewer.live_figure import LiveFigure
+from sagittal.server.viewer.live.live_figure import LiveFigure
 from sagittal.server.viewer.motion import ReplayMotion
-from sagittal.server.viewer.replay_figure import ReplayFigure
+from sagittal.server.viewer.replay.replay_figure import ReplayFigure
 from sagittal.server.viewer.scene_server import socket_of, start_scene_server, stop_scene_server
 
 IDLE_S = 30.0

@@ -12,9 +12,9 @@ from sagittal.core.formats.source import SourceFile
 from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.processes.channel import Channel
 from sagittal.server.processes.child import enter_child
-from sagittal.server.storage.blob_opening import open_blobs
-from sagittal.server.storage.blob_source import open_source
-from sagittal.server.storage.blobs import BlobStore, StoreAway
+from sagittal.server.storage.files.blob_opening import open_blobs
+from sagittal.server.storage.files.blob_source import open_source
+from sagittal.server.storage.files.blobs import BlobStore, StoreAway
 from sagittal.server.storage.refusal import refusal_of
 from sagittal.server.worker.messages import (
     Checkpoint,

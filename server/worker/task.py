@@ -11,7 +11,7 @@ from sqlalchemy import Connection
 
 from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import Claim
-from sagittal.server.storage.blobs import Blob
+from sagittal.server.storage.files.blobs import Blob
 
 if TYPE_CHECKING:
     from sagittal.core.formats.source import SourceFile

@@ -18,7 +18,7 @@ from sagittal.server.downloads import exports
 from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import COMPARE_FILTERS, EXPORT, SENSITIVITY, TUNE, Claim
 from sagittal.server.results import analyses, analysing, filter_runs, sensitivities, tunings
-from sagittal.server.storage.blobs import Blob
+from sagittal.server.storage.files.blobs import Blob
 from sagittal.server.uploads import recordings
 from sagittal.server.worker.task import Task, register
 

@@ -30,12 +30,12 @@ from sagittal.server.safekeeping import custody
 from sagittal.server.safekeeping.sweep import sweep
 from sagittal.server.settings import Settings, load_settings
 from sagittal.server.storage import fs, references
-from sagittal.server.storage.blob_opening import open_blobs, require_use
-from sagittal.server.storage.blobs import Blob, BlobStore, StoreAway
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_opening import open_blobs, require_use
+from sagittal.server.storage.files.blobs import Blob, BlobStore, StoreAway
 from sagittal.server.storage.migrate import await_current, require_current
 from sagittal.server.storage.refusal import is_busy
-from sagittal.server.storage.tables import new_id
+from sagittal.server.storage.schema.tables import new_id
 from sagittal.server.worker.messages import Checkpoint, ChildReady, Failure, Input, Order, Result, Stage
 from sagittal.server.worker.runner import Child, ChildDiedError
 from sagittal.server.worker.task import TASKS, Task, load

@@ -37,7 +37,7 @@ from sagittal.server.auth.roles import Role
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.field_cipher import make_keys
 from sagittal.server.storage.migrate import upgrade
-from sagittal.server.storage.tables import device_check, job
+from sagittal.server.storage.schema.tables import device_check, job
 from tests.browser import filling
 from tests.browser.console import Console
 from tests.data import ROOT

@@ -11,7 +11,7 @@ from sqlalchemy import delete
 
 from sagittal.server.auth.tokens import token_hash
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import login_session
+from sagittal.server.storage.schema.tables import login_session
 from tests.browser import filling
 from tests.browser.conftest import NAME, PASSWORD, Filled, Opener, RunningServer
 

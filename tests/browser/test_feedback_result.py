@@ -10,8 +10,8 @@ from playwright.sync_api import expect
 from sagittal.core.feedback import FeedbackEngine
 from sagittal.server.results import analyses, edit_log, prescriptions
 from sagittal.server.results.reviewed import ReviewedAnalyses
-from sagittal.server.storage.blob_folder import FolderBlobs
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_folder import FolderBlobs
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
 from tests.browser.design import all_faults

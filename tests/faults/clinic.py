@@ -16,10 +16,10 @@ from sagittal.server.jobs.opening import open_queue
 from sagittal.server.jobs.queue import JobView
 from sagittal.server.results import analyses
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blob_opening import open_blobs
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_opening import open_blobs
 from sagittal.server.storage.high_water import set_mark
-from sagittal.server.storage.tables import job
+from sagittal.server.storage.schema.tables import job
 from sagittal.server.uploads import recordings
 from tests.helpers.databases import write_database
 from tests.helpers.engines import choose_url

@@ -24,11 +24,11 @@ from sagittal.server.safekeeping.restoring import restore, try_restore
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs
 from sagittal.server.storage.archive import make_key, read_key
-from sagittal.server.storage.blob_folder import FolderBlobs
-from sagittal.server.storage.blobs import Blob
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_folder import FolderBlobs
+from sagittal.server.storage.files.blobs import Blob
 from sagittal.server.storage.migrate import exists
-from sagittal.server.storage.tables import now, recording_file
+from sagittal.server.storage.schema.tables import now, recording_file
 from sagittal.server.uploads import recordings
 from tests.data import ROOT
 from tests.faults.clinic import Clinic, find_room

@@ -20,7 +20,7 @@ from sagittal.server.storage import fs
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.migrate import MigrationError, upgrade
 from sagittal.server.storage.readiness import Readiness
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 from tests.faults.failing import FailingSystem
 from tests.faults.small_disk import full, mounted, on_small_disk, run
 from tests.helpers.clinic import PASSWORD, Clinic, open_clinic

@@ -23,9 +23,9 @@ from sagittal.server.safekeeping.sweep import sweep
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.trash import KEPT, FolderTrash
 from sagittal.server.storage.high_water import raise_mark
 from sagittal.server.storage.migrate import copy_database, exists, upgrade
-from sagittal.server.storage.trash import KEPT, FolderTrash
 from sagittal.server.uploads import recordings
 from sagittal.server.worker.task import load
 from sagittal.server.worker.worker import Worker

@@ -16,7 +16,7 @@ from sqlalchemy import func, select
 
 from sagittal.server.processes.supervisor import Workers
 from sagittal.server.storage.db import Source
-from sagittal.server.storage.tables import analysis, job
+from sagittal.server.storage.schema.tables import analysis, job
 from tests.faults.clinic import PATIENCE_S, Clinic
 
 WORKERS, JOBS, KILLS = 4, 60, 5

@@ -21,7 +21,7 @@ from sagittal.server.results import tunings
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.safekeeping import erasure
 from sagittal.server.storage.references import list_referenced
-from sagittal.server.storage.tables import job
+from sagittal.server.storage.schema.tables import job
 from sagittal.server.uploads import recordings
 from tests.core.fusion.algorithms.motion import trial_bytes
 from tests.faults.clinic import Clinic, until

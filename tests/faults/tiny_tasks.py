@@ -20,7 +20,7 @@ from sagittal.core.formats.source import SourceFile
 from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import Claim
 from sagittal.server.results import analyses
-from sagittal.server.storage.blobs import Blob
+from sagittal.server.storage.files.blobs import Blob
 from sagittal.server.worker.task import Task, register
 
 STAGES = ("first", "second", "third")

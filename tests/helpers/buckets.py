@@ -10,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
-from sagittal.server.storage import s3_bucket
+from sagittal.server.storage.files import s3_bucket
 
 _numbers = itertools.count(1)
 KEYS = {"AWS_ACCESS_KEY_ID": "clinic", "AWS_SECRET_ACCESS_KEY": "of the clinic", "AWS_REGION": "us-east-1"}

@@ -15,7 +15,7 @@ from websockets.asyncio.client import ClientConnection
 
 from sagittal.core.formats.live_log import PROTOCOL, Hello, hello_json
 from sagittal.server.clinic import patients, sessions
-from sagittal.server.storage.tables import new_id
+from sagittal.server.storage.schema.tables import new_id
 from tests.helpers.clinic import Clinic
 from tests.helpers.live_takes import HELLO
 

@@ -12,7 +12,7 @@ from sagittal.core.simulate import simulate_scenario
 from sagittal.server.live.follower import Follower
 from sagittal.server.live.messages import Command, FeedItem, FollowTake, Report
 from sagittal.server.live.playback import DueBatch, cut, hello_of
-from sagittal.server.storage.tables import new_id
+from sagittal.server.storage.schema.tables import new_id
 
 PER_BATCH = 5
 

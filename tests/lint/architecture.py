@@ -17,7 +17,7 @@ DATED = (
     "core/signals/sample_blocks.py",
     "core/activity/result.py",
     "core/activity/totals.py",
-    "core/formats/cwa.py",
+    "core/formats/vendors/cwa.py",
 )
 """They handle dates read from a device's file; none reads the clock."""
 COMPILER = "core/body/erkf/vector_lanes.py"

@@ -95,4 +95,5 @@ def find_unnamed_api() -> list[str]:
     """Modules of server/api that are not found by name from the service or page that they belong to."""
     server = ROOT / "server"
     homes = {path.stem for room in ROOMS for path in (server / room).glob("*.py")}
-    return find_strangers((path.stem for path in (server / "api").glob("*.py")), homes, NAMED_OTHERWISE)
+    homes |= {path.stem for path in (server / "pages").glob("*/*.py")} - {"__init__"}
+    return find_strangers((path.stem for path in (server / "api").rglob("*.py")), homes, NAMED_OTHERWISE)

@@ -12,12 +12,12 @@ from sqlalchemy import insert
 from sagittal.server.auth.tokens import token_hash
 from sagittal.server.clinic import identities, programmes
 from sagittal.server.results import prescriptions
-from sagittal.server.storage.care_tables import emergency_access
 from sagittal.server.storage.field_cipher import make_keys
-from sagittal.server.storage.live_tables import live_take
-from sagittal.server.storage.person_tables import consent
-from sagittal.server.storage.report_tables import report_link, signed_report
-from sagittal.server.storage.tables import (
+from sagittal.server.storage.schema.care_tables import emergency_access
+from sagittal.server.storage.schema.live_tables import live_take
+from sagittal.server.storage.schema.person_tables import consent
+from sagittal.server.storage.schema.report_tables import report_link, signed_report
+from sagittal.server.storage.schema.tables import (
     analysis,
     analysis_file,
     file_upload,

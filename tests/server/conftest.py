@@ -12,8 +12,8 @@ from sagittal.server.auth import passwords
 from sagittal.server.jobs.opening import open_queue
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blob_opening import open_blobs
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_opening import open_blobs
 from tests.helpers.clinic import CHEAP, Clinic
 from tests.helpers.databases import write_database
 from tests.helpers.engines import bare_source, choose_url, engine, postgres, source  # noqa: F401 - fixtures

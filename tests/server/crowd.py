@@ -13,8 +13,8 @@ from sqlalchemy import Engine, Table, event, insert
 from sagittal.core.frames import SEGMENTS
 from sagittal.core.quality.devices import DeviceCheck
 from sagittal.server.provenance import CODE_VERSION
-from sagittal.server.storage.blobs import Blob
-from sagittal.server.storage.tables import (
+from sagittal.server.storage.files.blobs import Blob
+from sagittal.server.storage.schema.tables import (
     analysis,
     analysis_file,
     device_check,

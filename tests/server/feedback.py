@@ -10,10 +10,10 @@ from sagittal.core.feedback import Cue
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.live_takes import live, live_training
 from sagittal.server.results.reviewed import ReviewedAnalyses
-from sagittal.server.storage.blobs import BlobStore
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.live_tables import live_take
-from sagittal.server.storage.tables import new_id
+from sagittal.server.storage.files.blobs import BlobStore
+from sagittal.server.storage.schema.live_tables import live_take
+from sagittal.server.storage.schema.tables import new_id
 from tests.helpers.clinic import Clinic
 from tests.server import analysed
 

@@ -18,10 +18,10 @@ from sagittal.server.metrics import RequestMetrics
 from sagittal.server.processes.supervisor import Workers
 from sagittal.server.safekeeping.custody import StrangersError
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blob_folder import FolderBlobs
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_folder import FolderBlobs
 from sagittal.server.storage.high_water import read_mark
-from sagittal.server.storage.tables import patient
+from sagittal.server.storage.schema.tables import patient
 from tests.helpers.databases import write_database
 
 

@@ -20,7 +20,7 @@ from sagittal.server.safekeeping import backup_schedule
 from sagittal.server.safekeeping.backup_schedule import BackupState, Outcome
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import job, now
+from sagittal.server.storage.schema.tables import job, now
 from tests.helpers.databases import write_database
 
 Labels = frozenset[tuple[str, str]]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sagittal.core.formats import cwa
+from sagittal.core.formats.vendors import cwa
 from tests.data import data_folder
 
 RATE = 50

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from sagittal.core.activity.monitor import monitor_activity
-from sagittal.core.formats import cwa, write_recording
+from sagittal.core.formats import write_recording
 from sagittal.core.formats.draft import signal_digest
+from sagittal.core.formats.vendors import cwa
 from sagittal.core.signals.recording import ImuStream, Recording
 from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 from sagittal.core.simulate.daily import plan_daily_life, simulate_daily_life

@@ -12,8 +12,8 @@ import pytest
 from sagittal.server.clinic import patients, sessions
 from tests.helpers.clinic import open_clinic
 from tests.server import analysed, crowd
-from tests.server.api.test_files import API, new_session
-from tests.server.api.test_tables import table
+from tests.server.api.uploads.test_files import API, new_session
+from tests.server.api.uploads.test_tables import table
 from tests.server.pages.test_statements import MOST
 from validation.figures import record_goal
 

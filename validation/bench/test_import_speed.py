@@ -13,9 +13,10 @@ import pyarrow.parquet as pq
 import pytest
 from pyarrow import csv
 
-from sagittal.core.formats import SourceFile, cwa, device_motion, read_recording, write_recording
+from sagittal.core.formats import SourceFile, read_recording, write_recording
 from sagittal.core.formats.text import to_utf8
-from sagittal.core.formats.vendors import find_vendor
+from sagittal.core.formats.vendors import cwa, device_motion
+from sagittal.core.formats.vendors.registry import find_vendor
 from tests.core.formats.making import mt_text
 from tests.core.formats.vendor_files import VENDOR_SAMPLES, N
 from tests.helpers.pairs import in_pairs

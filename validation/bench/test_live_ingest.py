@@ -19,7 +19,7 @@ from sagittal.core.frames import SEGMENTS
 from sagittal.server.clinic import sessions
 from sagittal.server.live.client import StreamReport, stream
 from sagittal.server.live_takes import live
-from sagittal.server.storage.live_tables import live_take
+from sagittal.server.storage.schema.live_tables import live_take
 from tests.faults.clinic import Clinic
 from tests.faults.test_server_deaths import serving
 

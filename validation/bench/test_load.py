@@ -32,7 +32,7 @@ from sagittal.server.jobs.opening import open_queue
 from sagittal.server.processes.supervisor import Workers
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database, Source
-from sagittal.server.storage.tables import analysis, job
+from sagittal.server.storage.schema.tables import analysis, job
 from tests.helpers.service import Service, new_session, served
 
 pytestmark = pytest.mark.timeout(3600)

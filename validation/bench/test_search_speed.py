@@ -11,7 +11,7 @@ import pytest
 from sqlalchemy import update
 
 from sagittal.server.storage.db import Source
-from sagittal.server.storage.tables import job
+from sagittal.server.storage.schema.tables import job
 from tests.helpers.clinic import open_clinic
 from tests.server import crowd
 

@@ -16,11 +16,11 @@ import viser
 
 from sagittal.core.norms import adult_kinematics
 from sagittal.server.viewer.ghost import match_ghost
-from sagittal.server.viewer.live_figure import LiveFigure
-from sagittal.server.viewer.live_reference import LiveReference
+from sagittal.server.viewer.live.live_figure import LiveFigure
+from sagittal.server.viewer.live.live_reference import LiveReference
 from sagittal.server.viewer.live_watch import LiveWatch
 from sagittal.server.viewer.motion import prepare_motion
-from sagittal.server.viewer.replay_figure import ReplayFigure
+from sagittal.server.viewer.replay.replay_figure import ReplayFigure
 from tests.server import walk
 from tests.server.viewer.pictures import POSES, RATE_HZ, picture
 from validation.figures import record_goal

@@ -20,7 +20,7 @@ from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.rotation import about, conjugate, multiply, rotate, to_matrix
 from sagittal.core.signals.calibrated import CalibratedRecording
-from sagittal.core.simulate.soft_tissue import SoftTissue, skin_motion
+from sagittal.core.simulate.gait.soft_tissue import SoftTissue, skin_motion
 from tests.helpers.walks import simulated
 
 WHOLE = PRESETS["lower_body7"]

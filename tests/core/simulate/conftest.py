@@ -19,7 +19,7 @@ from sagittal.core.simulate import (
     simulate,
     simulate_scenario,
 )
-from sagittal.core.simulate.human import Motion, move
+from sagittal.core.simulate.gait.human import Motion, move
 from sagittal.core.simulate.script import plan
 
 MIXED = (

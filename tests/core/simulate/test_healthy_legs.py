@@ -24,7 +24,7 @@ from sagittal.core.norms.values import list_norm_keys
 from sagittal.core.parameters.catalogue import LIMIT_FIGURES
 from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.simulate import SCRIPTS, STEADY
-from sagittal.core.simulate.human import move
+from sagittal.core.simulate.gait.human import move
 from sagittal.core.simulate.script import plan
 from sagittal.core.simulate.truth import WalkTruth, truth_of
 from sagittal.core.simulate.walker import REFERENCE_HEIGHT_M

@@ -11,7 +11,7 @@ from sagittal.core.errors import ParameterError
 from sagittal.core.frames import FOOT, SIDES, SUFFIX, Floats, Side
 from sagittal.core.rotation import rotate
 from sagittal.core.simulate import STEADY, Stand, Straight, Walker
-from sagittal.core.simulate.human import Motion, move
+from sagittal.core.simulate.gait.human import Motion, move
 from sagittal.core.simulate.script import plan
 from sagittal.core.simulate.truth import joint_angles
 from tests.data import data_folder

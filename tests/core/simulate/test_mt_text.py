@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sagittal.core.formats import xsens
 from sagittal.core.formats.draft import finish
+from sagittal.core.formats.vendors import xsens
 from sagittal.core.simulate import RecordingSetup, Simulation, Stand, Straight, mt_files, mt_text, simulate
 
 

@@ -30,7 +30,7 @@ from sagittal.core.simulate import (
     WalkTruth,
     simulate_scenario,
 )
-from sagittal.core.simulate.human import move
+from sagittal.core.simulate.gait.human import move
 from sagittal.core.simulate.script import Script, plan
 from sagittal.core.simulate.truth import truth_of
 from sagittal.core.simulate.walker import REFERENCE_HEIGHT_M

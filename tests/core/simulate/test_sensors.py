@@ -20,9 +20,9 @@ from sagittal.core.simulate import (
     Walker,
     simulate,
 )
+from sagittal.core.simulate.gait.soft_tissue import SoftTissue
 from sagittal.core.simulate.mems import add_sensor_errors
 from sagittal.core.simulate.sensors import SimulatedSignals
-from sagittal.core.simulate.soft_tissue import SoftTissue
 
 SHORT: Script = (Stand(3.0), Straight(5.0, 0.6, 0.54), Stand(2.0))
 

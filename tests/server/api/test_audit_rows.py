@@ -23,7 +23,7 @@ from sagittal.server.results import tunings
 from sagittal.server.sharing import signed_reports
 from sagittal.server.sharing.signed_reports import DOCUMENT, PSEUDONYMISED
 from sagittal.server.storage.field_cipher import make_keys
-from sagittal.server.storage.tables import job, new_id, tuning
+from sagittal.server.storage.schema.tables import job, new_id, tuning
 from sagittal.server.trail import MOST_REFUSED, QUIET_S, AuditTrail
 from sagittal.server.uploads import reference_files, videos
 from tests.helpers.clinic import PASSWORD, Clinic, open_clinic

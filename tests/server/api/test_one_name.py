@@ -14,7 +14,7 @@ import pytest
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.pages.shell import FRAGMENT
 from sagittal.server.report.files.exports import angles_parquet
-from sagittal.server.storage.tables import new_id
+from sagittal.server.storage.schema.tables import new_id
 from tests.helpers.clinic import Clinic
 from tests.server import analysed, walk
 

@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from sagittal.server.api import schemas
 from sagittal.server.sharing.signed_reports import ASSESSMENT_CHARACTERS
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 
 LINE: TypeAdapter[str] = TypeAdapter(schemas.Line)
 CODE: TypeAdapter[str] = TypeAdapter(schemas.Code)

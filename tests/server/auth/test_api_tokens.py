@@ -12,8 +12,8 @@ from sqlalchemy import select, update
 
 from sagittal.server.auth.api_tokens import SCOPES, Scope
 from sagittal.server.auth.roles import POLICY, Action
-from sagittal.server.storage.person_tables import api_token
-from sagittal.server.storage.tables import audit, now
+from sagittal.server.storage.schema.person_tables import api_token
+from sagittal.server.storage.schema.tables import audit, now
 from tests.helpers.clinic import PASSWORD, Clinic
 from tests.helpers.marks import sqlite_only
 

@@ -20,9 +20,9 @@ from sagittal.server.auth.roles import POLICY, PUBLIC, Action, Role
 from sagittal.server.auth.routes import list_declared_actions
 from sagittal.server.auth.throttle import MAX_PER_PAIR
 from sagittal.server.auth.tokens import new_token, token_hash
-from sagittal.server.storage.care_tables import emergency_access
-from sagittal.server.storage.person_tables import api_token, second_factor, security_key
-from sagittal.server.storage.tables import login_session, metadata, new_id, user
+from sagittal.server.storage.schema.care_tables import emergency_access
+from sagittal.server.storage.schema.person_tables import api_token, second_factor, security_key
+from sagittal.server.storage.schema.tables import login_session, metadata, new_id, user
 from tests.helpers.clinic import ORIGIN, PASSWORD, Clinic, open_clinic
 from tests.helpers.engines import on_both_engines
 from tests.server.belongings import OF_NOBODY, add_belongings, fill_address

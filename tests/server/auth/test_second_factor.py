@@ -13,7 +13,7 @@ from sagittal.server.auth import second_factor
 from sagittal.server.auth.throttle import Throttle
 from sagittal.server.commands import user as user_command
 from sagittal.server.storage.archive import make_key
-from sagittal.server.storage.person_tables import second_factor as table
+from sagittal.server.storage.schema.person_tables import second_factor as table
 from tests.helpers.clinic import PASSWORD, Clinic
 from tests.helpers.engines import tell_commands
 

@@ -14,7 +14,7 @@ from sqlalchemy import select, update
 
 from sagittal.server.auth import second_factor
 from sagittal.server.auth.throttle import Throttle
-from sagittal.server.storage.person_tables import security_key, security_key_challenge
+from sagittal.server.storage.schema.person_tables import security_key, security_key_challenge
 from tests.helpers.clinic import PASSWORD, Clinic
 from tests.server.auth.soft_key import SoftKey
 

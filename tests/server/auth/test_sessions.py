@@ -13,7 +13,7 @@ from sagittal.server.auth.sessions import Logins
 from sagittal.server.auth.tokens import token_hash
 from sagittal.server.storage import sqlite_file
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import login_session, metadata
+from sagittal.server.storage.schema.tables import login_session, metadata
 from tests.helpers.clinic import PASSWORD, Clinic
 from tests.helpers.databases import write_database
 from tests.helpers.engines import on_both_engines

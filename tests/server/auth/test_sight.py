@@ -12,8 +12,8 @@ from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Role
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.sharing import care_teams
-from sagittal.server.storage.care_tables import emergency_access
-from sagittal.server.storage.tables import now, patient
+from sagittal.server.storage.schema.care_tables import emergency_access
+from sagittal.server.storage.schema.tables import now, patient
 from tests.helpers.clinic import Clinic
 from tests.helpers.engines import on_both_engines
 

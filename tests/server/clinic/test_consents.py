@@ -11,7 +11,7 @@ from sagittal.server.clinic import consents
 from sagittal.server.errors import Conflict, ServiceError
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.safekeeping import erasure
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 from tests.faults.clinic import Clinic
 
 

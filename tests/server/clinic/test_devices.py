@@ -19,10 +19,10 @@ from sagittal.server.clinic import devices, patients, sessions
 from sagittal.server.clinic.devices import recall_places
 from sagittal.server.report.words.device_words import judge_device
 from sagittal.server.safekeeping import erasure
-from sagittal.server.storage.tables import device_check, now
+from sagittal.server.storage.schema.tables import device_check, now
 from sagittal.server.uploads import recordings
 from tests.helpers.clinic import Clinic, open_clinic
-from tests.server.pages.test_upload import device
+from tests.server.pages.uploads.test_upload import device
 
 pytestmark = pytest.mark.anyio
 

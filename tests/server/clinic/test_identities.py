@@ -28,7 +28,7 @@ from sagittal.server.storage.field_cipher import (
     make_keys,
     read_keys,
 )
-from sagittal.server.storage.person_tables import patient_identity
+from sagittal.server.storage.schema.person_tables import patient_identity
 from tests.helpers.engines import choose_url, tell_commands
 
 WHO = {

@@ -20,9 +20,9 @@ from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.safekeeping import checks, erasure
 from sagittal.server.safekeeping.sweep import sweep
 from sagittal.server.settings import Settings
-from sagittal.server.storage import tables
-from sagittal.server.storage.blob_folder import FolderBlobs
 from sagittal.server.storage.db import Database, Source
+from sagittal.server.storage.files.blob_folder import FolderBlobs
+from sagittal.server.storage.schema import tables
 from sagittal.server.uploads import recordings, reference_files
 
 NO_TRIGGERS = {

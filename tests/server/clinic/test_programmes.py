@@ -14,9 +14,9 @@ from sagittal.server.errors import Conflict, NotFound, ServiceError
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.safekeeping import erasure
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blob_folder import FolderBlobs
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import audit, now, planned_visit
+from sagittal.server.storage.files.blob_folder import FolderBlobs
+from sagittal.server.storage.schema.tables import audit, now, planned_visit
 
 MONDAY = dt.date(2026, 3, 2)
 

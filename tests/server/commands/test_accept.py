@@ -10,7 +10,7 @@ from sqlalchemy import select
 from sagittal.server.commands.accept import accept
 from sagittal.server.safekeeping import custody
 from sagittal.server.storage.high_water import explain_lost_rows, set_mark
-from sagittal.server.storage.tables import audit
+from sagittal.server.storage.schema.tables import audit
 from tests.faults.clinic import Clinic
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from sagittal.server.commands.trash import trash
-from sagittal.server.storage.blobs import BlobFile
+from sagittal.server.storage.files.blobs import BlobFile
 from tests.faults.clinic import Clinic
 
 AT = dt.datetime(2026, 3, 14, 3, 15, tzinfo=dt.UTC)

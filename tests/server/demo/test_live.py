@@ -13,7 +13,7 @@ from sagittal.server.demo.clinic import PRESCRIBED
 from sagittal.server.demo.live import open_take, plan_training, stream_walk
 from sagittal.server.live_takes import live
 from sagittal.server.results import prescriptions
-from sagittal.server.storage.tables import session
+from sagittal.server.storage.schema.tables import session
 from tests.helpers.clinic import open_clinic
 from tests.server.serving import serve
 

@@ -21,7 +21,7 @@ from sagittal.server.results import analysing
 from sagittal.server.results.analyses import AnalysisRecord
 from sagittal.server.results.edit_log import EditHistory
 from sagittal.server.sharing.signed_reports import SignedDocuments, SignedReport
-from sagittal.server.storage.blob_folder import FolderBlobs
+from sagittal.server.storage.files.blob_folder import FolderBlobs
 from sagittal.server.uploads.recordings import RecordedFile, StoredRecording
 from tests.core.formats.making import zipped
 

@@ -14,9 +14,9 @@ from sagittal.server.clinic import consents, notes, patients, sessions
 from sagittal.server.downloads.patient_export import export_patient
 from sagittal.server.errors import NotFound
 from sagittal.server.storage.archive import PIECE
-from sagittal.server.storage.live_tables import live_event, live_take
 from sagittal.server.storage.references import list_referenced
-from sagittal.server.storage.tables import new_id, now
+from sagittal.server.storage.schema.live_tables import live_event, live_take
+from sagittal.server.storage.schema.tables import new_id, now
 from sagittal.server.uploads import recordings
 from tests.faults.clinic import Clinic
 

@@ -10,7 +10,7 @@ from sagittal.server.jobs.feed import JobFeed
 from sagittal.server.jobs.queue import JobView
 from sagittal.server.jobs.table import TableQueue
 from sagittal.server.storage.db import Database, Source
-from sagittal.server.storage.tables import job
+from sagittal.server.storage.schema.tables import job
 
 
 @pytest.fixture

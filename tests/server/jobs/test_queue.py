@@ -19,7 +19,7 @@ from sagittal.server.jobs.opening import open_queue
 from sagittal.server.jobs.queue import Claim, JobView, LeaseState, Priority
 from sagittal.server.jobs.table import MAX_DEATHS
 from sagittal.server.storage.db import Database, Source
-from sagittal.server.storage.tables import job
+from sagittal.server.storage.schema.tables import job
 from tests.helpers.databases import write_database
 
 LEASE_S = 15.0

@@ -37,7 +37,7 @@ from sagittal.server.live.take import STEERING
 from sagittal.server.live_takes import live
 from sagittal.server.live_takes.live_recordings import log_path
 from sagittal.server.results import prescriptions
-from sagittal.server.storage.live_tables import live_event
+from sagittal.server.storage.schema.live_tables import live_event
 from sagittal.server.uploads import recordings
 from tests.helpers.clinic import Clinic, open_clinic
 from tests.helpers.live_clinic import Visit, heard, new_session, visit

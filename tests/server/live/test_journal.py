@@ -16,7 +16,7 @@ from sagittal.server.live_takes import live
 from sagittal.server.storage import sqlite_file
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.disk_log import DiskLog
-from sagittal.server.storage.live_tables import live_event, live_take
+from sagittal.server.storage.schema.live_tables import live_event, live_take
 from tests.helpers.databases import write_database
 
 CUE = {

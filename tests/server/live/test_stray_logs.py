@@ -18,8 +18,8 @@ from sagittal.server.live_takes import live, live_logs, live_recordings
 from sagittal.server.main import main
 from sagittal.server.safekeeping import checks
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blob_folder import FolderBlobs
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blob_folder import FolderBlobs
 from sagittal.server.uploads import recordings
 from tests.helpers.clinic import Clinic, open_clinic
 from tests.helpers.engines import tell_commands

@@ -19,8 +19,8 @@ from sagittal.server.live import hub
 from sagittal.server.live.protocol import CloseCode
 from sagittal.server.live.recorder import Recorder, open_recorder
 from sagittal.server.live_takes.live_recordings import log_path
-from sagittal.server.storage.live_tables import live_take
-from sagittal.server.storage.tables import audit, job, now
+from sagittal.server.storage.schema.live_tables import live_take
+from sagittal.server.storage.schema.tables import audit, job, now
 from sagittal.server.uploads import recordings
 from tests.helpers.clinic import Clinic
 from tests.helpers.live_clinic import closed, heard, visit

@@ -18,7 +18,7 @@ from sagittal.server.nodes.forwarding import Forwarding, UnreachableError, open_
 from sagittal.server.nodes.passage import ASKED_BY, HEADER
 from sagittal.server.nodes.pins import Owner
 from sagittal.server.nodes.registry import WebNode
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 
 pytestmark = pytest.mark.anyio
 

@@ -20,11 +20,11 @@ from sagittal.server.nodes.registry import FORGOTTEN, Nodes
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.safekeeping.custody import StrangersError
 from sagittal.server.settings import Settings, SettingsError
-from sagittal.server.storage.blob_folder import FolderBlobs
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.live_tables import live_take
-from sagittal.server.storage.node_tables import web_node
-from sagittal.server.storage.tables import new_id, now
+from sagittal.server.storage.files.blob_folder import FolderBlobs
+from sagittal.server.storage.schema.live_tables import live_take
+from sagittal.server.storage.schema.node_tables import web_node
+from sagittal.server.storage.schema.tables import new_id, now
 
 ID = "0123456789abcdef" * 2
 URL = "postgresql://sagittal@127.0.0.1/sagittal"

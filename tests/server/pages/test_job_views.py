@@ -8,9 +8,15 @@ import pytest
 
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.jobs.queue import JobView
-from sagittal.server.pages.job_views import FOLLOWED, find_active_jobs, find_newest_job, follow_few, view_job
+from sagittal.server.pages.job_views import (
+    FOLLOWED,
+    find_active_jobs,
+    find_newest_job,
+    follow_few,
+    view_job,
+)
 from sagittal.server.results import filter_runs
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 from sagittal.server.uploads import recordings
 from tests.helpers.clinic import Clinic
 from tests.server import analysed

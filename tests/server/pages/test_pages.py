@@ -10,7 +10,7 @@ import pytest
 
 from sagittal.core.body.model import NOMINAL_HEIGHT_M
 from sagittal.core.online.calibrating import CalibratingParams
-from sagittal.server.pages.charts import draw_chart
+from sagittal.server.pages.results.charts import draw_chart
 from sagittal.server.report.charts.panels import CurvePanel
 from sagittal.server.results import analyses
 from sagittal.server.uploads import recordings
@@ -222,7 +222,7 @@ async def test_a_report_is_drawn_once_until_something_it_shows_changes(
         drawn.append(panel.variable.name)
         return draw_chart(panel, *args, **kwargs)
 
-    monkeypatch.setattr("sagittal.server.pages.session.draw_chart", draw)
+    monkeypatch.setattr("sagittal.server.pages.results.session.draw_chart", draw)
     first = await page(clinic, f"/sessions/{session}")
     assert drawn
     drawn.clear()

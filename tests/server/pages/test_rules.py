@@ -26,12 +26,13 @@ from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.simulate import PATIENTS
 from sagittal.server.export.fhir import write_fhir
 from sagittal.server.http.templates import TEMPLATES, render
-from sagittal.server.pages import paper, shell
+from sagittal.server.pages import shell
+from sagittal.server.pages.sharing import paper
 from sagittal.server.report.files.exports import analysis_files
 from sagittal.server.report.pdf import render_pdf
 from sagittal.server.report.view.headline import MOST, Headline, HeadlineSentence, find_standouts
 from sagittal.server.report.words.limits import limits_view
-from sagittal.server.storage.tables import new_id
+from sagittal.server.storage.schema.tables import new_id
 from sagittal.web.language import LANGUAGES
 from tests.helpers.clinic import Clinic
 from tests.helpers.marks import sweep_after

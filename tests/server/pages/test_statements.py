@@ -16,9 +16,9 @@ from sagittal.server.live_takes import live
 from sagittal.server.pages.routes import ROUTERS
 from sagittal.server.pages.shell import FRAGMENT
 from sagittal.server.results import prescriptions
-from sagittal.server.storage.care_tables import care_team_member
-from sagittal.server.storage.live_tables import live_take
-from sagittal.server.storage.tables import analysis, new_id, recording
+from sagittal.server.storage.schema.care_tables import care_team_member
+from sagittal.server.storage.schema.live_tables import live_take
+from sagittal.server.storage.schema.tables import analysis, new_id, recording
 from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed, crowd
 

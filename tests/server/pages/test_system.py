@@ -14,7 +14,7 @@ from sagittal.server.safekeeping import backup_schedule
 from sagittal.server.safekeeping.backup_schedule import BackupState, Outcome
 from sagittal.server.settings import Settings, SettingsError
 from sagittal.server.storage.readiness import Readiness
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.tables import now
 from tests.helpers.clinic import open_clinic
 
 pytestmark = pytest.mark.anyio

@@ -13,15 +13,15 @@ from sqlalchemy import JSON, Column, Connection, String, Table, insert, select, 
 
 from sagittal.server.clinic import identities, sessions
 from sagittal.server.pages.shell import FRAGMENT
-from sagittal.server.storage.care_tables import clinic_option
-from sagittal.server.storage.columns import UserJson, UserString
-from sagittal.server.storage.report_tables import signed_report
-from sagittal.server.storage.tables import analysis, device_check, job, metadata, new_id, recording
+from sagittal.server.storage.schema.care_tables import clinic_option
+from sagittal.server.storage.schema.columns import UserJson, UserString
+from sagittal.server.storage.schema.report_tables import signed_report
+from sagittal.server.storage.schema.tables import analysis, device_check, job, metadata, new_id, recording
 from sagittal.web.language import catalogue_path, load_catalogue, read_messages
 from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed, crowd
 from tests.server.pages.test_statements import ANSWERS, PAGES, QUERIES, TRAINED
-from tests.server.pages.test_upload import device
+from tests.server.pages.uploads.test_upload import device
 
 pytestmark = pytest.mark.anyio
 

@@ -9,8 +9,8 @@ import pytest
 
 from sagittal.core.pipeline import WALK
 from sagittal.core.pipeline.recipes import ACTIVITY
-from sagittal.server.pages.data import FILE_WORDS
-from sagittal.server.pages.session_context import STAGE_NAMES, STAGES_OF_DAYS
+from sagittal.server.pages.results.data import FILE_WORDS
+from sagittal.server.pages.results.session_context import STAGE_NAMES, STAGES_OF_DAYS
 from sagittal.server.report.files import activity_files, exports
 from sagittal.web.words import day, filesize, moment, number, pattern, seconds
 

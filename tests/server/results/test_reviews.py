@@ -15,7 +15,7 @@ from sagittal.server.errors import Conflict
 from sagittal.server.results import analyses, edit_log, reviews
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.safekeeping import erasure
-from sagittal.server.storage import tables
+from sagittal.server.storage.schema import tables
 from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed, walk
 

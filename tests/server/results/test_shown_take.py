@@ -8,7 +8,7 @@ from sqlalchemy import select
 from sagittal.server.results import analyses
 from sagittal.server.results.analyses import AnalysisRecord
 from sagittal.server.results.shown_take import make_key, submit_for, submit_on_shown
-from sagittal.server.storage.tables import audit, job
+from sagittal.server.storage.schema.tables import audit, job
 from sagittal.server.uploads import recordings
 from sagittal.server.uploads.recordings import RecordedFile
 from tests.helpers.clinic import Clinic

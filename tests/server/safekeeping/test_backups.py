@@ -29,12 +29,12 @@ from sagittal.server.settings import Settings, SettingsError
 from sagittal.server.sharing import report_links
 from sagittal.server.storage import fs
 from sagittal.server.storage.archive import BackupFileError, ClinicKey, make_key, read_archive, read_key
-from sagittal.server.storage.blob_folder import FolderBlobs
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.person_tables import patient_identity
-from sagittal.server.storage.report_tables import report_file, signed_report
-from sagittal.server.storage.tables import audit as audit_table
-from sagittal.server.storage.tables import login_session, now, user
+from sagittal.server.storage.files.blob_folder import FolderBlobs
+from sagittal.server.storage.schema.person_tables import patient_identity
+from sagittal.server.storage.schema.report_tables import report_file, signed_report
+from sagittal.server.storage.schema.tables import audit as audit_table
+from sagittal.server.storage.schema.tables import login_session, now, user
 from sagittal.server.uploads import recordings
 from tests.faults.clinic import Clinic, find_room
 from tests.helpers.engines import on_both_engines, tell_commands

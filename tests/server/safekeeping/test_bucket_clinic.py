@@ -19,12 +19,12 @@ from sagittal.server.safekeeping import backup_schedule, backups, checks, erasur
 from sagittal.server.safekeeping.restore_room import RestoreError
 from sagittal.server.safekeeping.restoring import restore
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blob_bucket import BucketBlobs
-from sagittal.server.storage.blob_folder import FolderBlobs
-from sagittal.server.storage.blob_opening import open_blobs
-from sagittal.server.storage.blobs import StoreAway
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.tables import recording_file
+from sagittal.server.storage.files.blob_bucket import BucketBlobs
+from sagittal.server.storage.files.blob_folder import FolderBlobs
+from sagittal.server.storage.files.blob_opening import open_blobs
+from sagittal.server.storage.files.blobs import StoreAway
+from sagittal.server.storage.schema.tables import recording_file
 from sagittal.server.uploads import recordings, uploads
 from tests.faults.clinic import Clinic, until
 from tests.helpers.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures

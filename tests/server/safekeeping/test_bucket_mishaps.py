@@ -22,11 +22,11 @@ from sagittal.server.safekeeping.restore_room import RestoreError
 from sagittal.server.safekeeping.restoring import restore
 from sagittal.server.settings import Settings, SettingsError
 from sagittal.server.storage import fs, references
-from sagittal.server.storage.blob_bucket import BucketBlobs, BucketTrash
-from sagittal.server.storage.blob_opening import note_bucket, open_blobs, read_note
-from sagittal.server.storage.blobs import StoreAway
 from sagittal.server.storage.db import Database
-from sagittal.server.storage.trash import Address, name_stamp
+from sagittal.server.storage.files.blob_bucket import BucketBlobs, BucketTrash
+from sagittal.server.storage.files.blob_opening import note_bucket, open_blobs, read_note
+from sagittal.server.storage.files.blobs import StoreAway
+from sagittal.server.storage.files.trash import Address, name_stamp
 from sagittal.server.uploads import uploads
 from tests.data import ROOT
 from tests.faults.clinic import Clinic, until

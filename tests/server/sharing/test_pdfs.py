@@ -15,8 +15,8 @@ from sagittal.server.settings import Settings
 from sagittal.server.sharing import pdfs, signed_reports
 from sagittal.server.sharing.paper_child import PaperReply
 from sagittal.server.sharing.pdfs import PdfFailed, make_pdf, read_signed_pdf
-from sagittal.server.storage.report_tables import report_file, signed_report
-from sagittal.server.storage.tables import now
+from sagittal.server.storage.schema.report_tables import report_file, signed_report
+from sagittal.server.storage.schema.tables import now
 from tests.helpers.clinic import Clinic
 from tests.server import feedback
 

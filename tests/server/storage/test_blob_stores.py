@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 
 from sagittal.server.storage import fs
-from sagittal.server.storage.blob_bucket import BucketBlobs
-from sagittal.server.storage.blob_folder import FolderBlobs
-from sagittal.server.storage.blobs import INCOMING, BlobStore, IntegrityError
-from sagittal.server.storage.s3_bucket import PUT_BYTES
-from sagittal.server.storage.trash import KEPT
+from sagittal.server.storage.files.blob_bucket import BucketBlobs
+from sagittal.server.storage.files.blob_folder import FolderBlobs
+from sagittal.server.storage.files.blobs import INCOMING, BlobStore, IntegrityError
+from sagittal.server.storage.files.s3_bucket import PUT_BYTES
+from sagittal.server.storage.files.trash import KEPT
 from tests.helpers.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
 
 SPACE, OTHER = "a" * 32, "b" * 32

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from sagittal.server.settings import Settings, SettingsError, load_settings
-from sagittal.server.storage import blob_bucket, s3_bucket
-from sagittal.server.storage.blob_bucket import BucketBlobs
-from sagittal.server.storage.blob_opening import open_blobs, require_use
-from sagittal.server.storage.blobs import BlobFile, BlobStore, StoreAway
+from sagittal.server.storage.files import blob_bucket, s3_bucket
+from sagittal.server.storage.files.blob_bucket import BucketBlobs
+from sagittal.server.storage.files.blob_opening import open_blobs, require_use
+from sagittal.server.storage.files.blobs import BlobFile, BlobStore, StoreAway
 from tests.data import ROOT
 from tests.helpers.buckets import KEYS, Bucket, bucket, s3_server  # noqa: F401 - fixtures
 

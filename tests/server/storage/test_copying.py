@@ -13,8 +13,8 @@ from sagittal.server import audit
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.storage.copying import copy_rows
 from sagittal.server.storage.db import Database, highest_number, raise_number
-from sagittal.server.storage.tables import audit as audit_table
-from sagittal.server.storage.tables import recording, session
+from sagittal.server.storage.schema.tables import audit as audit_table
+from sagittal.server.storage.schema.tables import recording, session
 from tests.helpers.databases import write_database
 
 

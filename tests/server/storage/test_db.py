@@ -11,7 +11,7 @@ from sqlalchemy.exc import DBAPIError, IntegrityError, StatementError
 
 from sagittal.server.storage.db import Database, Source
 from sagittal.server.storage.migrate import copy_database
-from sagittal.server.storage.tables import new_id, now, patient, session
+from sagittal.server.storage.schema.tables import new_id, now, patient, session
 
 WRITERS, ROUNDS = 50, 4
 

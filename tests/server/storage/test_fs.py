@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from sagittal.server.storage import fs
-from sagittal.server.storage.blob_folder import FolderBlobs
-from sagittal.server.storage.blobs import IntegrityError
+from sagittal.server.storage.files.blob_folder import FolderBlobs
+from sagittal.server.storage.files.blobs import IntegrityError
 from tests.data import ROOT
 from tests.faults.failing import FailingSystem
 

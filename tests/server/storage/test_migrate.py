@@ -24,7 +24,7 @@ from sagittal.server.commands import serve
 from sagittal.server.settings import Settings
 from sagittal.server.storage import migrate
 from sagittal.server.storage.db import Database, Source
-from sagittal.server.storage.tables import metadata
+from sagittal.server.storage.schema.tables import metadata
 from tests.data import ROOT
 from tests.helpers.postgres import run_sql
 

@@ -25,10 +25,10 @@ from sagittal.server.settings import Settings, SettingsError
 from sagittal.server.storage import migrate
 from sagittal.server.storage.db import Database, highest_number
 from sagittal.server.storage.high_water import set_mark
-from sagittal.server.storage.person_tables import api_token
 from sagittal.server.storage.postgres import PostgresServer
 from sagittal.server.storage.refusal import is_busy
-from sagittal.server.storage.tables import metadata, new_id, now, patient, user
+from sagittal.server.storage.schema.person_tables import api_token
+from sagittal.server.storage.schema.tables import metadata, new_id, now, patient, user
 from tests.helpers.clinic import ORIGIN, open_clinic
 from tests.helpers.databases import write_database
 from tests.helpers.engines import require_postgres

@@ -19,7 +19,7 @@ from sagittal.server.viewer.colours import GHOST, to_linear_rgb
 from sagittal.server.viewer.ghost import PHASES, find_heading, match_ghost, match_reference
 from sagittal.server.viewer.motion import GhostMotion, ReplayMotion, prepare_motion
 from sagittal.server.viewer.reference import ReferenceWalk
-from sagittal.server.viewer.replay_figure import ReplayFigure
+from sagittal.server.viewer.replay.replay_figure import ReplayFigure
 from tests.server import walk
 
 TURN = np.radians(70.0)

@@ -18,10 +18,10 @@ from sagittal.core.norms import adult_kinematics, look_up_norms
 from sagittal.core.rotation import conjugate, multiply
 from sagittal.server.live.messages import STALE_S, Picture
 from sagittal.server.live.room import Room
-from sagittal.server.viewer.live_figure import LiveFigure
-from sagittal.server.viewer.live_reference import LiveReference, find_standing_angles
+from sagittal.server.viewer.live.live_figure import LiveFigure
+from sagittal.server.viewer.live.live_reference import LiveReference, find_standing_angles
+from sagittal.server.viewer.live.moment import FigureMoment
 from sagittal.server.viewer.live_watch import FeedFrame, LiveWatch, read_moment
-from sagittal.server.viewer.moment import FigureMoment
 from sagittal.server.viewer.reference import SEGMENTS, ReferenceWalk, add_standing_angles, find_better_side
 from tests.server import walk
 from tests.server.viewer import pictures

@@ -13,7 +13,7 @@ from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.jobs.queue import BESIDE, COMPARE_FILTERS, EXPORT, SENSITIVITY, TUNE
 from sagittal.server.results import tunings
 from sagittal.server.settings import Settings
-from sagittal.server.storage.blob_source import open_source
+from sagittal.server.storage.files.blob_source import open_source
 from sagittal.server.uploads import recordings
 from sagittal.server.worker import tasks
 from sagittal.server.worker.task import TASKS, load

@@ -17,8 +17,8 @@ from sagittal.server.jobs.queue import Claim, JobQueue, LeaseState
 from sagittal.server.processes.channel import Channel
 from sagittal.server.settings import Settings
 from sagittal.server.storage import references
-from sagittal.server.storage.blobs import Blob, BlobStore, StoreAway
 from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blobs import Blob, BlobStore, StoreAway
 from sagittal.server.worker import worker as at
 from sagittal.server.worker.child import compute
 from sagittal.server.worker.messages import Checkpoint, ChildReady, Failure, Order, Result

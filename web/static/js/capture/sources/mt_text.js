@@ -1,5 +1,5 @@
 // Xsens MT Manager text, one file per sensor: "//" lines, a header line, rows by tab, comma, semicolon or space.
-// The same rules as core/formats/xsens.py; a browser test holds the two against each other.
+// The same rules as core/formats/vendors/xsens.py; a browser test holds the two against each other.
 import { speak } from "../../common/words.js";
 const GROUPS = [["Acc_X", "Acc_Y", "Acc_Z"], ["Gyr_X", "Gyr_Y", "Gyr_Z"], ["Mag_X", "Mag_Y", "Mag_Z"]];
 const BLANK_IN_EXPORT = /^(SampleTimeFine|Year|Month|Day|Second|UTC_\w+)$/;

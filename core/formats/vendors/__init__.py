@@ -1,0 +1,1 @@
+"""Files of sensor makers: one module each, listed in registry."""

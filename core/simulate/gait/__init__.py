@@ -1,0 +1,1 @@
+"""How a simulated person walks: feet, pelvis, legs, timing, soft tissue."""

@@ -1,0 +1,1 @@
+"""Routes of accounts: sign-in, second factor, keys and tokens, users."""

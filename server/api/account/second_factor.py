@@ -1,0 +1,52 @@
+"""One's own second factor: set up, proved by a code, removed."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter
+
+from sagittal.server import audit
+from sagittal.server.api.account import account_schemas
+from sagittal.server.api.account.proofs import Proving
+from sagittal.server.api.documents import refusals
+from sagittal.server.auth import accounts, second_factor
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Config, Db, Failures
+from sagittal.server.http.json_body import StrictJsonRoute
+
+router = APIRouter(route_class=StrictJsonRoute, prefix="/account/second-factor", tags=["account"])
+Self = Annotated[Identity, require(Action.USE_ACCOUNT)]
+
+
+@router.post("", response_model=second_factor.SecondFactorSetUp, responses=refusals(409, 429))
+def set_up(
+    body: account_schemas.PasswordProof, db: Db, settings: Config, proof: Proving
+) -> second_factor.SecondFactorSetUp:
+    """Make a secret for an authenticator; it is asked for once a code has proved it (`confirm`)."""
+    proof.check_password(body.password)
+    with db.write() as c:
+        return second_factor.begin(c, settings.second_factor_key, proof.who.user_id, proof.who.name)
+
+
+@router.post("/confirm", response_model=account_schemas.RecoveryCodes, responses=refusals(429))
+def confirm(
+    body: account_schemas.CodeProof, db: Db, settings: Config, failures: Failures, who: Self
+) -> account_schemas.RecoveryCodes:
+    """Ask for codes from now on; the answer has the recovery codes, this once."""
+    with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
+        codes = second_factor.confirm(c, settings.second_factor_key, who.user_id, body.code)
+        audit.record(c, who, "user.second_factor_on", "user", who.user_id)
+    return account_schemas.RecoveryCodes("\n".join(codes))
+
+
+@router.post("/remove", status_code=204, responses=refusals(429))
+def remove(body: account_schemas.CodeProof, db: Db, settings: Config, failures: Failures, who: Self) -> None:
+    """Ask for no code any more; needs one, or a recovery code."""
+    with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
+        if not second_factor.use(c, settings.second_factor_key, who.user_id, body.code):
+            raise second_factor.CodeWrong(403)
+        second_factor.remove(c, who.user_id)
+        audit.record(c, who, "user.second_factor_off", "user", who.user_id)

@@ -1,0 +1,1 @@
+"""Routes of exports, archives and studies."""

@@ -1,0 +1,77 @@
+"""The film of the tablet's camera in pieces (docs/reference/live-protocol.md); the take's token opens it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Header, Path, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import ClientDisconnect
+
+from sagittal.server.api.documents import PUBLIC, refusals
+from sagittal.server.api.live_takes import live_schemas as schemas
+from sagittal.server.api.uploads.files import RAW_BODY, read_size
+from sagittal.server.auth.access import require
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Films, Id
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.http.problems import Problem
+from sagittal.server.live_takes import films
+
+router = APIRouter(
+    route_class=StrictJsonRoute,
+    prefix="/live/takes/{take_id}/film",
+    tags=["live"],
+    dependencies=[require(Action.STREAM)],
+)
+
+
+def _read_token(
+    authorization: Annotated[str, Header(description="Bearer and the token that the code gave")] = "",
+) -> str:
+    if not authorization:
+        raise films.TokenNotValid
+    return authorization.removeprefix("Bearer ")
+
+
+Token = Annotated[str, Depends(_read_token)]
+
+
+@router.post("", response_model=films.FilmProgress, responses=refusals(401), openapi_extra=PUBLIC)
+def begin_film(take_id: Id, body: schemas.FilmBeginning, token: Token, intake: Films) -> films.FilmProgress:
+    """Begin the film of a take, or ask how far it is; it is kept who let the person be filmed."""
+    return intake.begin(take_id, token, body.began_us, consent=body.consent)
+
+
+@router.put(
+    "/{number}",
+    response_model=films.FilmProgress,
+    responses=refusals(401, 409, 413),
+    openapi_extra={**PUBLIC, "requestBody": {"required": True, **RAW_BODY}},
+)
+async def add_piece(
+    take_id: Id,
+    number: Annotated[int, Path(ge=0, le=1_000_000, description="0, 1, …")],
+    request: Request,
+    token: Token,
+    intake: Films,
+) -> films.FilmProgress:
+    """Keep a piece; the answer comes when it is on the disk. A piece may come twice, a gap is refused."""
+    read_size(request, films.MOST_PIECE_BYTES)
+    piece = bytearray()
+    try:
+        async for some in request.stream():
+            piece += some
+            if len(piece) > films.MOST_PIECE_BYTES:
+                raise Problem(
+                    413, "file_too_large", f"A piece has at most {films.MOST_PIECE_BYTES} bytes; cut it."
+                )
+    except ClientDisconnect:
+        raise Problem(400, "upload_cut", "The connection broke within the piece. Send it again.") from None
+    return await run_in_threadpool(intake.add, take_id, token, number, bytes(piece))
+
+
+@router.post("/end", response_model=schemas.EndedFilm, responses=refusals(401, 409), openapi_extra=PUBLIC)
+def end_film(take_id: Id, token: Token, intake: Films) -> schemas.EndedFilm:
+    """Set the film beside its take, once that is over; of a take that came to nothing it is discarded."""
+    return schemas.EndedFilm(kept=intake.end(take_id, token))

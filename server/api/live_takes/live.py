@@ -1,0 +1,128 @@
+"""Live takes of a session: open, pair, command, end; the sockets are in server/live."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
+
+from sagittal.server.api.documents import PUBLIC, refusals
+from sagittal.server.api.live_takes import live_schemas as schemas
+from sagittal.server.api.schemas import make_answer
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import sessions
+from sagittal.server.context import Db, Failures, Id, LiveHub, OpenTrail, address_of
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.live_takes import live
+
+router = APIRouter(route_class=StrictJsonRoute, tags=["live"])
+Therapist = Annotated[Identity, require(Action.RUN_LIVE)]
+SOCKET = "/api/v1/live"
+
+
+@router.post(
+    "/sessions/{session_id}/live", status_code=201, response_model=schemas.OpenedTake, responses=refusals(409)
+)
+async def open_take(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> schemas.OpenedTake:
+    """Open a take; a tablet joins it with the code within ten minutes."""
+
+    def write() -> tuple[live.LiveTakeRecord, str]:
+        with db.write() as c:
+            return live.open_take(c, who, session_id, hub.owner)
+
+    take, code = await run_in_threadpool(write)
+    hub.tell_row(take)
+    return _opened(take, code)
+
+
+@router.get("/sessions/{session_id}/live", response_model=schemas.LiveState)
+def read_take(session_id: Id, db: Db, hub: LiveHub, trail: OpenTrail, who: Therapist) -> dict[str, Any]:
+    """Where the session's newest take stands."""
+    with db.read() as c:
+        sessions.get(c, session_id)
+    trail.record_watched(who, "live.watched", "session", session_id)
+    return hub.standing(session_id)
+
+
+@router.post(
+    "/sessions/{session_id}/live/code",
+    status_code=201,
+    response_model=schemas.OpenedTake,
+    responses=refusals(409),
+)
+async def give_code(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> schemas.OpenedTake:
+    """Give another code; the one before ends, and when it is used the tablet before is sent away."""
+
+    def write() -> tuple[live.LiveTakeRecord, str]:
+        with db.write() as c:
+            return live.new_code(c, who, session_id)
+
+    take, code = await run_in_threadpool(write)
+    hub.tell_row(take)
+    return _opened(take, code)
+
+
+@router.post(
+    "/sessions/{session_id}/live/commands", response_model=schemas.LiveState, responses=refusals(409)
+)
+async def give_command(
+    session_id: Id, body: schemas.LiveCommand, hub: LiveHub, who: Therapist
+) -> dict[str, Any]:
+    """Carry a command out; it is kept with its time and who gave it."""
+    return await hub.command(who, session_id, body.command, body.value, body.t_s)
+
+
+@router.post("/sessions/{session_id}/live/close", response_model=schemas.TakeAnswer, responses=refusals(409))
+async def close_take(session_id: Id, hub: LiveHub, who: Therapist) -> schemas.TakeAnswer:
+    """End the take without the tablet; what has come becomes the session's recording and is analysed."""
+    return make_answer(schemas.TakeAnswer, await hub.close(who, session_id))
+
+
+@router.get("/sessions/{session_id}/live/events", response_model=list[live.LiveEvent])
+def list_events(session_id: Id, db: Db, trail: OpenTrail, who: Therapist) -> list[live.LiveEvent]:
+    """What happened in the session's takes, in order."""
+    with db.read() as c:
+        sessions.get(c, session_id)
+        found = [event for take in live.takes_of(c, session_id) for event in live.events(c, take.id)]
+    trail.record_watched(who, "live.events_opened", "session", session_id)
+    return found
+
+
+@router.post(
+    "/live/pairings",
+    status_code=201,
+    dependencies=[require(Action.PAIR)],
+    response_model=schemas.PairedTablet,
+    responses=refusals(404, 429),
+    openapi_extra=PUBLIC,
+)
+async def pair(
+    request: Request, body: schemas.PairingCode, db: Db, hub: LiveHub, trail: OpenTrail, failures: Failures
+) -> schemas.PairedTablet:
+    """Join a tablet to a take by its code; a code works once."""
+    # counted per address: a stranger cannot keep other tablets out by guessing
+    address = address_of(request)
+    who = f"pairing from {address}"
+    await run_in_threadpool(failures.check, who, address)
+
+    def write() -> tuple[live.TabletAccess, live.LiveTakeRecord]:
+        with db.write() as c:
+            paired = live.pair(c, body.code)
+            return paired, live.get(c, paired.take)
+
+    try:
+        paired, take = await run_in_threadpool(write)
+    except live.CodeNotValid:
+        await run_in_threadpool(failures.fail, who, address)
+        await run_in_threadpool(trail.record_refused, "live.pairing_failed", "live", None, address)
+        raise
+    await run_in_threadpool(failures.succeed, who, address)
+    hub.tell_row(take)
+    return make_answer(schemas.PairedTablet, paired, socket=SOCKET)
+
+
+def _opened(take: live.LiveTakeRecord, code: str) -> schemas.OpenedTake:
+    return make_answer(schemas.OpenedTake, take, code=code, expires_at=take.code_expires_at)

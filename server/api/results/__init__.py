@@ -1,0 +1,1 @@
+"""Routes of analyses and what is read from them."""

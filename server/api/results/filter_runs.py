@@ -1,0 +1,200 @@
+"""Orientation filters on a take: the list, references, comparisons asked for and their files."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Request
+from pydantic import Field
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from sagittal.core.estimators import PaperReference
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.downloads.downloads import ANY_FILE, attachment
+from sagittal.server.api.uploads.files import RAW_BODY, read_size, receive_body
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import sessions
+from sagittal.server.context import Blobs, Config, Db, Id, OpenTrail, Queue
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.jobs.queue import JobView
+from sagittal.server.report.words.filter_list import FILTERS
+from sagittal.server.results import filter_runs
+from sagittal.server.uploads import recordings, reference_files
+
+router = APIRouter(route_class=StrictJsonRoute, tags=["filters"])
+references = APIRouter(prefix="/sessions/{session_id}/references", tags=["filters"])
+
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+Uploader = Annotated[Identity, require(Action.UPLOAD)]
+FilterName = Annotated[str, Field(json_schema_extra={"enum": [f.name for f in FILTERS]})]
+"""Documented as a choice; another name is refused with a sentence by the service."""
+ReferenceName = Annotated[str, Path(max_length=500, description="any Unicode")]
+
+
+@dataclass(frozen=True)
+class FilterAnswer:
+    """An orientation filter; `name` is what a comparison takes."""
+
+    name: str
+    label: Annotated[str, Field(description="what is only a reconstruction says so")]
+    engine: Annotated[str, Field(description="E1 to E6, or Sagittal for our own")]
+    grade: Annotated[
+        str | None, Field(description="A exact, B from formulas, C reconstruction; null: our own")
+    ]
+    magnetometer: Annotated[str, Field(description="needed, optional or unused")]
+    paper: PaperReference | None
+
+
+class FilterRunNew(schemas.Request):
+    """Which filters to run on the analysis that the session shows, and what to hold them against."""
+
+    filters: Annotated[list[FilterName], Field(min_length=1, max_length=100)]
+    magnetometer: bool = True
+    reference: Annotated[str | None, Field(max_length=500, description="name of an uploaded reference")] = (
+        None
+    )
+
+
+@dataclass(frozen=True)
+class FilterRunAnswer:
+    """A finished comparison of filters."""
+
+    id: str
+    analysis_id: str
+    session_id: str
+    job_id: str
+    settings: dict[str, Any]
+    reference_name: str | None
+    reference_sha256: str | None
+    code_version: str
+    created_at: dt.datetime
+    files: list[recordings.RecordedFile]
+
+
+@router.get("/filters", response_model=list[FilterAnswer])
+def list_filters(who: Annotated[Identity, require(Action.READ_API)]) -> list[FilterAnswer]:
+    """The orientation filters of this version, by engine."""
+    return [schemas.make_answer(FilterAnswer, f) for f in FILTERS]
+
+
+@router.post(
+    "/sessions/{session_id}/filter-runs", status_code=202, response_model=JobView, responses=refusals(404)
+)
+def compare(
+    session_id: Id,
+    body: FilterRunNew,
+    db: Db,
+    queue: Queue,
+    who: Annotated[Identity, require(Action.ANALYSE)],
+) -> JobView:
+    """Run filters on this take as one job; the same choice on the same analysis is run once."""
+    with db.write() as c:
+        return filter_runs.submit(
+            c,
+            queue,
+            who,
+            session_id,
+            filters=body.filters,
+            magnetometer=body.magnetometer,
+            reference=body.reference,
+        )
+
+
+@router.get("/sessions/{session_id}/filter-runs", response_model=list[FilterRunAnswer])
+def list_runs(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[FilterRunAnswer]:
+    """The finished comparisons of a session, the newest first."""
+    with db.read() as c:
+        sessions.get(c, session_id)
+        found = filter_runs.of_session(c, session_id)
+    trail.record_watched(who, "filter_runs.opened", "session", session_id)
+    return [_shown(run) for run in found]
+
+
+@router.get("/filter-runs/{run_id}", response_model=FilterRunAnswer)
+def read_run(run_id: Id, db: Db, trail: OpenTrail, who: Reader) -> FilterRunAnswer:
+    """Open a comparison: what went in, by what version, and which files came out."""
+    with db.read() as c:
+        found = filter_runs.get(c, run_id)
+    trail.record_opened(who, "filter_run.opened", "filter_run", run_id)
+    return _shown(found)
+
+
+@router.get(
+    "/filter-runs/{run_id}/files/{name}",
+    response_class=Response,
+    responses=ANY_FILE,
+)
+def read_run_file(run_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
+    """Download a file of a comparison; its name says which one it is of, never of whom."""
+    with db.read() as c:
+        found = filter_runs.get(c, run_id)
+    content = filter_runs.file_bytes(blobs, found, name)
+    trail.record_opened(who, "filter_run.file_opened", "filter_run", run_id, {"file": name})
+    stem, dot, ending = name.rpartition(".")
+    return attachment(content, f"{stem}-{run_id[:8]}{dot}{ending}")
+
+
+@references.get("", response_model=list[recordings.RecordedFile])
+def list_references(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[recordings.RecordedFile]:
+    """Orientations of other systems that were uploaded to compare with."""
+    with db.read() as c:
+        found = reference_files.list_files(c, session_id)
+    trail.record_watched(who, "references.opened", "session", session_id)
+    return found
+
+
+@references.put(
+    "/{name:path}",
+    status_code=201,
+    response_model=recordings.RecordedFile,
+    responses=refusals(413),
+    openapi_extra={"requestBody": {"required": True, **RAW_BODY}},
+)
+async def put_reference(
+    session_id: Id,
+    name: ReferenceName,
+    request: Request,
+    settings: Config,
+    db: Db,
+    blobs: Blobs,
+    who: Uploader,
+) -> recordings.RecordedFile:
+    """Add a reference, an OpenSim .sto or a table of quaternions; the same name replaces it."""
+    size = read_size(request, settings.max_file_bytes)
+    upload = await run_in_threadpool(
+        reference_files.receive_reference, db, blobs, settings, who, session_id, name, size
+    )
+    return await receive_body(request, upload)
+
+
+@references.get(
+    "/{name:path}",
+    response_class=Response,
+    responses={200: {"description": "The file", **RAW_BODY}},
+)
+def read_reference(
+    session_id: Id, name: ReferenceName, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
+) -> Response:
+    """Download a reference, byte for byte."""
+    with db.read() as c:
+        content = reference_files.file_bytes(c, blobs, session_id, name)
+    trail.record_opened(who, "reference.opened", "session", session_id)
+    return attachment(content, name.rpartition("/")[2], "application/octet-stream")
+
+
+@references.delete("/{name:path}", status_code=204)
+def delete_reference(session_id: Id, name: ReferenceName, db: Db, who: Uploader) -> None:
+    """Take a reference away; comparisons that used it stay as they are."""
+    with db.write() as c:
+        reference_files.remove(c, who, session_id, name)
+
+
+def _shown(found: filter_runs.FilterRunRecord) -> FilterRunAnswer:
+    files = [recordings.RecordedFile(name, blob.size, blob.sha256) for name, blob in found.files.items()]
+    return schemas.make_answer(FilterRunAnswer, found, files=files)

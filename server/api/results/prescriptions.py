@@ -1,0 +1,131 @@
+"""Prescriptions of biofeedback, the targets they may have, and what came of them in a session."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+from starlette.responses import Response
+
+from sagittal.core.feedback.prescription import SOURCES
+from sagittal.core.parameters.catalogue import list_trainable
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.downloads.downloads import BINARY, attachment
+from sagittal.server.api.results import feedback_schemas as schemas
+from sagittal.server.api.schemas import Side
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.context import Db, Id, OpenTrail, Reviewed
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.http.problems import Problem
+from sagittal.server.report.tables import feedback_csv
+from sagittal.server.report.words.feedback_words import prescription_words
+from sagittal.server.results import feedback, histories, prescriptions, targets
+from sagittal.server.results.prescriptions import PatientPrescription
+from sagittal.server.storage.db import Database
+from sagittal.server.trail import AuditTrail
+
+router = APIRouter(route_class=StrictJsonRoute, tags=["feedback"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+Therapist = Annotated[Identity, require(Action.RUN_LIVE)]
+_CSV: dict[int | str, dict[str, Any]] = {
+    200: {"description": "The table", "content": {"text/csv": {"schema": BINARY}}}
+}
+
+
+@router.get("/patients/{patient_id}/prescriptions", response_model=list[schemas.PrescriptionAnswer])
+def list_prescriptions(patient_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[dict[str, Any]]:
+    """The patient's prescriptions, the newest first; one that has not ended is in force."""
+    with db.read() as c:
+        patients.get(c, patient_id)
+        written = prescriptions.of_patient(c, patient_id)
+    trail.record_opened(who, "prescriptions.opened", "patient", patient_id)
+    return [_shown(w) for w in written]
+
+
+@router.post(
+    "/patients/{patient_id}/prescriptions", status_code=201, response_model=schemas.PrescriptionAnswer
+)
+def write_prescription(
+    patient_id: Id, body: schemas.PrescriptionNew, db: Db, reviewed: Reviewed, who: Therapist
+) -> dict[str, Any]:
+    """Prescribe feedback; the prescription in force ends."""
+    with db.write() as c:
+        return _shown(prescriptions.write(c, reviewed, who, patient_id, body.model_dump(exclude_unset=True)))
+
+
+@router.post(
+    "/prescriptions/{prescription_id}/end", response_model=schemas.PrescriptionAnswer, responses=refusals(409)
+)
+def end_prescription(prescription_id: Id, db: Db, who: Therapist) -> dict[str, Any]:
+    """End a prescription; the record stays."""
+    with db.write() as c:
+        return _shown(prescriptions.end(c, who, prescription_id))
+
+
+@router.get("/patients/{patient_id}/targets", response_model=list[schemas.TargetOffer])
+def read_targets(
+    patient_id: Id,
+    db: Db,
+    reviewed: Reviewed,
+    trail: OpenTrail,
+    who: Reader,
+    parameter: Annotated[str, Query(max_length=64, description="one that a prescription can train")],
+    side: Annotated[Side | None, Query(description="that is trained; none = both")] = None,
+) -> list[dict[str, Any]]:
+    """What each source gives as target of a parameter for this person, or why it gives nothing."""
+    trainable = list_trainable()
+    if parameter not in trainable:
+        raise Problem(
+            422, "bad_value", f"'{parameter}' cannot be trained; expected one of {', '.join(trainable)}."
+        )
+    with db.read() as c:
+        walk = targets.last_walk(c, reviewed, patients.get(c, patient_id))
+    trail.record_watched(who, "targets.opened", "patient", patient_id)
+    offers = [(source, targets.offer(walk, source, parameter, side)) for source in SOURCES]
+    return [
+        {
+            "source": source,
+            "mean": None if o.target is None else o.target.mean,
+            "sd": None if o.target is None else o.target.sd,
+            "words": None if o.target is None else o.target.words,
+            "reason": o.reason,
+        }
+        for source, o in offers
+    ]
+
+
+@router.get("/sessions/{session_id}/feedback", response_model=schemas.Feedback)
+def read_feedback(
+    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+) -> dict[str, object]:
+    """Strides with and without feedback, probe blocks, level, side effects, and the retention test."""
+    gathered = _opened(db, trail, who, session_id)
+    view = feedback.view(reviewed, gathered)
+    if view is not None:
+        return view.to_json()
+    return {"reason": feedback.REASONS[gathered.reason or ""]}
+
+
+@router.get("/sessions/{session_id}/feedback.csv", response_class=Response, responses=_CSV)
+def read_feedback_table(
+    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+) -> Response:
+    """Every stride of the live take with its cue; without feedback only the header."""
+    view = feedback.view(reviewed, _opened(db, trail, who, session_id))
+    return attachment(feedback_csv(view), f"feedback-{session_id[:8]}.csv")
+
+
+def _opened(db: Database, trail: AuditTrail, who: Identity, session_id: str) -> feedback.FeedbackRecords:
+    with db.read() as c:
+        patient = patients.get(c, sessions.get(c, session_id).patient_id)
+        found = feedback.gather(c, patient, session_id, histories.list_analysed(c, patient.id))
+    trail.record_opened(who, "feedback.opened", "session", session_id)
+    return found
+
+
+def _shown(written: PatientPrescription) -> dict[str, Any]:
+    said = [f"{label}: {text}" for label, text in prescription_words(written.content)]
+    return {**vars(written), "content": written.content.to_json(), "words": said}

@@ -1,0 +1,85 @@
+"""The report of a session's analysis: everything its pages show, as JSON and as tables."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path
+from starlette.responses import Response
+
+from sagittal.server.api import schemas
+from sagittal.server.api.downloads.downloads import BINARY, attachment
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import patients, sessions
+from sagittal.server.context import Db, Id, OpenTrail, Reviewed
+from sagittal.server.report.tables import curves_csv, parameters_csv
+from sagittal.server.report.view.model import ReportModel
+from sagittal.server.results import analyses, comparisons, controls, edit_log, histories, reports
+from sagittal.server.results.reviewed import ReviewedAnalyses
+from sagittal.server.storage.db import Database
+from sagittal.server.trail import AuditTrail
+
+router = APIRouter(prefix="/sessions/{session_id}", tags=["report"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+_CSV: dict[int | str, dict[str, Any]] = {
+    200: {"description": "The table", "content": {"text/csv": {"schema": BINARY}}}
+}
+
+
+@router.get("/report", response_model=schemas.ReportAnswer)
+def read_report(
+    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+) -> dict[str, object]:
+    """Quality, parameters with norms, cycle curves with norm bands, strides, provenance."""
+    return _opened(db, reviewed, trail, who, session_id).to_json()
+
+
+@router.get("/parameters.csv", response_class=Response, responses=_CSV)
+def read_parameters(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
+    """The table of parameters, left and right, with the norm."""
+    report = _opened(db, reviewed, trail, who, session_id)
+    return attachment(parameters_csv(report), f"parameters-{session_id[:8]}.csv")
+
+
+@router.get("/parameters/{name}", response_model=schemas.ParameterBehind)
+def read_parameter(
+    session_id: Id,
+    name: Annotated[str, Path(pattern=r"^[a-z0-9_]{1,64}$")],
+    db: Db,
+    reviewed: Reviewed,
+    trail: OpenTrail,
+    who: Reader,
+) -> dict[str, object]:
+    """One parameter with its definition and the value of every stride, counted or not."""
+    with db.read() as c:
+        session = sessions.get(c, session_id)
+        patient = patients.get(c, session.patient_id)
+        found = analyses.get_shown(c, session_id)
+        edits = edit_log.edits_of(c, found.id)
+        known = controls.list_visits(c, patient, session)
+    trail.record_opened(who, "parameter.opened", "session", session_id, {"parameter": name})
+    return reports.behind_number(reviewed, found, edits, patient, session, name, known).to_json()
+
+
+@router.get("/curves.csv", response_class=Response, responses=_CSV)
+def read_curves(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
+    """The cycle curves: mean and spread by side and per cent of the cycle, with the norm."""
+    return attachment(
+        curves_csv(_opened(db, reviewed, trail, who, session_id)), f"curves-{session_id[:8]}.csv"
+    )
+
+
+def _opened(
+    db: Database, reviewed: ReviewedAnalyses, trail: AuditTrail, who: Identity, session_id: str
+) -> ReportModel:
+    with db.read() as c:
+        session = sessions.get(c, session_id)
+        patient = patients.get(c, session.patient_id)
+        found = analyses.get_shown(c, session_id)
+        edits = edit_log.edits_of(c, found.id)
+        before = comparisons.find_previous(c, session, histories.list_analysed(c, patient.id))
+        known = controls.list_visits(c, patient, session)
+    trail.record_opened(who, "report.opened", "session", session_id, {"analysis_id": found.id})
+    return reports.read(reviewed, found, edits, patient, session, before, known)[1]

@@ -1,0 +1,1 @@
+"""Routes of signed reports and who may read them."""

@@ -1,0 +1,94 @@
+"""The video beside a take."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response, StreamingResponse
+
+from sagittal.server.api import schemas
+from sagittal.server.api.documents import refusals
+from sagittal.server.api.downloads.downloads import BINARY
+from sagittal.server.api.uploads.files import RAW_BODY, read_size, receive_body
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Config, Db, Id, OpenTrail
+from sagittal.server.http.json_body import StrictJsonRoute
+from sagittal.server.http.ranges import answer_range
+from sagittal.server.uploads import recordings, videos
+
+router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}/video", tags=["sessions"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+Writer = Annotated[Identity, require(Action.WRITE_SESSION)]
+
+
+@router.get("", response_model=videos.SessionVideo)
+def read_video(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> videos.SessionVideo:
+    """What is known of the video, and who said that the person agreed to be filmed."""
+    with db.read() as c:
+        found = videos.get(c, session_id)
+    trail.record_watched(who, "video.opened", "session", session_id)
+    return found
+
+
+@router.put(
+    "",
+    status_code=201,
+    response_model=recordings.RecordedFile,
+    responses=refusals(413),
+    openapi_extra={"requestBody": {"required": True, **RAW_BODY}},
+)
+async def put_video(
+    session_id: Id,
+    name: Annotated[str, Query(min_length=1, max_length=200)],
+    consent: Annotated[bool, Query(description="the person agreed to be filmed; it is kept who said so")],
+    request: Request,
+    settings: Config,
+    db: Db,
+    blobs: Blobs,
+    who: Writer,
+) -> recordings.RecordedFile:
+    """Set a video beside the take, MP4, QuickTime or WebM; it replaces the one before."""
+    size = read_size(request, settings.max_file_bytes)
+
+    def begin() -> videos.receive_video:
+        videos.require_consent(consent)
+        return videos.receive_video(db, blobs, settings, who, session_id, name, size)
+
+    return await receive_body(request, await run_in_threadpool(begin))
+
+
+@router.patch("", response_model=videos.SessionVideo)
+def align_video(session_id: Id, body: schemas.VideoAlignment, db: Db, who: Writer) -> videos.SessionVideo:
+    """Say which moment of the video is the take's time 0."""
+    with db.write() as c:
+        return videos.align(c, who, session_id, body.offset_s)
+
+
+@router.delete("", status_code=204)
+def remove_video(session_id: Id, db: Db, who: Writer) -> None:
+    """Take the video away."""
+    with db.write() as c:
+        videos.remove(c, who, session_id)
+
+
+@router.get(
+    "/content",
+    response_class=StreamingResponse,
+    responses={
+        200: {"description": "The video, or the range of it", "content": {"video/*": {"schema": BINARY}}}
+    },
+)
+def play_video(
+    request: Request, session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
+) -> Response:
+    """The video's bytes; players ask for ranges of it."""
+    with db.read() as c:
+        found, space = videos.find_stored(c, blobs, session_id)
+    trail.record_watched(who, "video.opened", "session", session_id)
+    read = partial(blobs.read_part, space, found.sha256)
+    return answer_range(request.headers, found.size, found.sha256, read, found.media_type)

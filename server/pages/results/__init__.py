@@ -1,0 +1,1 @@
+"""Pages of analyses and what is read from them."""

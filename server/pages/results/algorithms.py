@@ -1,0 +1,106 @@
+"""The same take through several orientation filters: choose, run, see how far they are apart."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, Literal
+from urllib.parse import quote
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse
+from sqlalchemy import Connection
+from starlette.responses import Response
+
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import jobs
+from sagittal.server.context import Blobs, Db, Id
+from sagittal.server.jobs.queue import COMPARE_FILTERS
+from sagittal.server.pages.job_views import view_job
+from sagittal.server.pages.results.session_context import lead_to_days, read_context
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.report.view.filter_view import NAME, view_comparison
+from sagittal.server.report.words.filter_list import PROPOSED, list_engines
+from sagittal.server.results import analyses, filter_runs
+from sagittal.server.uploads import reference_files
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+STAGES: Final = (
+    ("analysis", "Analyse the take as before"),
+    ("filters", "Run the filters"),
+    ("comparing", "Compare them"),
+)
+"""Stages of a comparison, in words."""
+
+FILE_WORDS: Final = {
+    "filters.json": "Everything on this page",
+    "filters.csv": "Cost and agreement of each filter",
+    "spread.csv": "Spread over the take, in stance and in swing",
+    "spread_cycle.csv": "Spread over the gait cycle",
+    "spread_time.csv": "Spread over time",
+    "orientations.parquet": "Orientation of every segment by each filter",
+    "reference.csv": "RMSE and Bland–Altman against the reference",
+}
+
+Word = Annotated[str | None, Query(max_length=100)]
+
+
+@router.get("/sessions/{sid}/algorithms")
+def show_algorithms(
+    request: Request,
+    db: Db,
+    blobs: Blobs,
+    sid: Id,
+    who: Annotated[Identity, require(Action.READ_RESULT)],
+    run: Word = None,
+    over: Literal["cycle", "time"] = "cycle",
+    of: Word = None,
+    against: Word = None,
+) -> Response:
+    """Choose filters, run them, see their spread and how they agree.
+
+    Parameters
+    ----------
+    run : which comparison, else the newest. of : segment or joint angle held against the reference.
+    against : filter whose plot is drawn.
+    """
+    with db.read() as c:
+        context = read_context(c, sid)
+        if elsewhere := lead_to_days(context):
+            return elsewhere
+        context |= list_choices(c, sid)
+        found = filter_runs.of_session(c, sid)
+    shown = next((r for r in found if r.id == run), found[0] if found else None)
+    if shown is not None:
+        content = filter_runs.file_bytes(blobs, shown, NAME)
+        context["view"] = view_comparison(content, over, of, against)
+        context["run"] = shown
+        context["chosen"] = shown.settings["filters"]
+        context["files"] = [
+            {"name": name, "what": FILE_WORDS.get(name, ""), "href": _href(shown.id, name)}
+            for name in shown.files
+        ]
+    context["runs"] = found
+    record_opening(request, who, "session", sid)
+    return render_page(request, db, who, "algorithms.html", "patients", **context)
+
+
+def list_choices(c: Connection, session_id: str) -> dict[str, Any]:
+    """What the form offers, and the comparison that is at work or failed last."""
+    newest = next(iter(jobs.of_session(c, session_id, kind=COMPARE_FILTERS)), None)
+    return {
+        "analysed": analyses.latest(c, session_id) is not None,
+        "engines": list_engines(),
+        "chosen": PROPOSED,
+        "references": reference_files.list_files(c, session_id),
+        "work": None if newest is None else view_job(newest),
+        "work_stages": STAGES,
+        "run": None,
+        "view": None,
+        "files": [],
+    }
+
+
+def _href(run_id: str, name: str) -> str:
+    return f"/api/v1/filter-runs/{run_id}/files/{quote(name)}"

@@ -1,0 +1,168 @@
+"""Downloads, the health of the estimator, provenance, running again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Annotated, Any, Final
+from urllib.parse import quote
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+from sqlalchemy import Connection
+from starlette.responses import Response
+
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.context import Blobs, Db, Id
+from sagittal.server.downloads import exports
+from sagittal.server.export.kinds import EXPORTED
+from sagittal.server.pages.job_views import follow_few, view_job
+from sagittal.server.pages.results.session_context import read_context
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.pages.words import SEGMENT_NAMES
+from sagittal.server.report.view.sensor_checks import sensor_checks
+from sagittal.server.report.words.estimator import choice_label, estimator_view
+from sagittal.server.results import analyses, repairs
+from sagittal.server.storage.files.blobs import BlobStore
+from sagittal.server.uploads import recordings, videos
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+FILE_WORDS: Final[Mapping[str, str]] = {
+    "analysis.json": "Quality, calibration, parameters, warnings, provenance",
+    "angles.parquet": "Joint angles in degrees over time",
+    "poses.parquet": "Orientation and position of every segment over time",
+    "tracks.parquet": "Paths of the feet and what else strides are measured on",
+    "repaired.json": "The set-up that is proposed instead of this one",
+    "signals.parquet": "What the sensors measured, on one time axis",
+    "events.csv": "Contacts and foot-offs as detected",
+    "steps.csv": "Steps of the trunk sensor, where no foot carries one",
+    "repetitions.csv": "Every squat with its measures, and why it was left out",
+    "activity.json": "Daily life: days, hours, transitions, walking bouts, how the sensor was worn",
+    "activity_spans.parquet": "What the person did from when to when",
+    "activity_spans.csv": "The same as text",
+    "activity_inclination.parquet": "Inclination of the trunk in degrees, once a second",
+    "activity_steps.parquet": "Time of every step of daily life",
+    "activity_hours.csv": "Steps and minutes of each posture in every hour",
+    "transitions.csv": "Postural transitions, and leans that do not count with the reason",
+    "walking_bouts.csv": "Every walk of daily life with its steps and cadence",
+    "strides.csv": "Every stride with its parameters, and why it was left out",
+}
+
+
+@router.get("/sessions/{sid}/data")
+def show_data(
+    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+) -> Response:
+    """Downloads, the estimator's health, provenance, running again."""
+    with db.read() as c:
+        context = read_context(c, sid)
+        context |= list_downloads(c, blobs, sid, results=who.may(Action.READ_RESULT))
+        context["exports"] = _list_exports(c, context)
+        seen = who.may(Action.READ_RESULT) and context["session"].has_video
+        context["video"] = videos.find(c, sid) if seen else None
+    record_opening(request, who, "session", sid)
+    return render_page(request, db, who, "data.html", "patients", **context)
+
+
+def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results: bool) -> dict[str, Any]:
+    """Files to download, estimator, sensor checks, provenance and the mapping behind the shown analysis."""
+    this = recordings.current(c, session_id)
+    found = analyses.of_session(c, session_id) if results else []
+    shown = found[0] if found else None
+    stored = {} if shown is None else json.loads(analyses.file_bytes(blobs, shown, "analysis.json"))
+    files = [] if shown is None else [(shown.id, name, blob.size) for name, blob in shown.files.items()]
+    return {
+        "analysis": shown,
+        "files_changed": shown is not None and this is not None and shown.recording_id != this.id,
+        "archive": None if shown is None else f"/api/v1/sessions/{session_id}/archive.zip",
+        "estimator": estimator_view(stored.get("estimator")),
+        "sensors": sensor_checks(stored.get("agreement")),
+        "earlier": [
+            {
+                "id": a.id,
+                "created_at": a.created_at,
+                "estimator": _asked_for(a.config),
+                "again": _ask_again(this, shown, a),
+            }
+            for a in found[1:]
+        ],
+        "results": [
+            {
+                "name": name,
+                "what": _describe_file(name),
+                "size": size,
+                "href": f"/api/v1/analyses/{analysis_id}/files/{quote(name)}",
+            }
+            for analysis_id, name, size in files
+            if not name.startswith(EXPORTED)
+        ],
+        "originals": [
+            {**vars(f), "href": f"/api/v1/sessions/{session_id}/files/{quote(f.name)}" if results else None}
+            for f in (this.files if this else ())
+        ],
+        "provenance": _provenance(shown) if shown else [],
+        "mapping": _mapping(shown.manifest if shown else None),
+    }
+
+
+def _list_exports(c: Connection, context: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The formats for other programs: to download, at work, or to be asked for; none without an analysis."""
+    shown = context["analysis"]
+    if shown is None:
+        return []
+    offers = exports.list_offers(c, context["patient"], context["session"], shown)
+    found = [
+        {
+            **vars(offer),
+            "job": None if offer.job is None else view_job(offer.job),
+            "href": offer.file and f"/api/v1/analyses/{offer.analysis_id}/files/{quote(offer.file)}",
+        }
+        for offer in offers
+    ]
+    follow_few([offer["job"] for offer in found])
+    return found
+
+
+def _describe_file(name: str) -> str:
+    if name.startswith("sensitivity-"):
+        return "How far the angles of squats move with each measure"
+    return FILE_WORDS.get(name, "")
+
+
+def _ask_again(
+    this: recordings.StoredRecording | None,
+    shown: analyses.AnalysisRecord | None,
+    earlier: analyses.AnalysisRecord,
+) -> dict[str, Any] | None:
+    """What asks for an earlier set-up of the same files again; None where it is that of the shown one."""
+    if this is None or shown is None or earlier.recording_id != this.id:
+        return None
+    if repairs.take_setup(None, earlier.manifest) == repairs.take_setup(None, shown.manifest):
+        return None
+    return {
+        "manifest": repairs.take_setup(this.manifest, earlier.manifest),
+        "config": dict(earlier.config),
+    }
+
+
+def _asked_for(config: Mapping[str, Any]) -> str | None:
+    """The estimator somebody chose by name."""
+    asked = (config.get("poses") or {}).get("estimator")
+    return None if asked is None else choice_label(asked)
+
+
+def _provenance(shown: analyses.AnalysisRecord) -> list[tuple[str, str]]:
+    return [
+        ("Input sha256", shown.input_sha256),
+        ("Settings sha256", shown.config_sha256),
+        ("Version", shown.code_version),
+        ("Analysis", shown.id),
+    ]
+
+
+def _mapping(manifest: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+    sensors = (manifest or {}).get("sensors") or {}
+    return [(device, SEGMENT_NAMES.get(segment, "not used")) for device, segment in sensors.items()]

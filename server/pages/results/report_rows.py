@@ -1,0 +1,112 @@
+"""Which rows of the parameter table stand where: first, folded, on paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from sagittal.core.parameters.catalogue import require_entries
+from sagittal.core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
+from sagittal.core.plurals import plural
+from sagittal.server.report.view import level
+from sagittal.server.report.view.model import ReportModel
+from sagittal.server.report.view.table import BEYOND_SD, ParameterRow
+
+SECONDARY: Final = (
+    "Parts of stance and swing",
+    "Walking and turning",
+    "Regularity of the trunk",
+    "Support in seconds",
+)
+"""Groups for those who look closer: folded on the page, not on paper."""
+
+MATTERING: Final = (
+    "gait_speed_mps",
+    "cadence_spm",
+    "step_length_m",
+    "stance_pct",
+    "double_support_pct",
+    "knee_flexion_max_swing_deg",
+    "hip_flexion_min_deg",
+    "ankle_dorsiflexion_ic_deg",
+    "foot_pitch_ic_deg",
+    "pci_pct",
+    "foot_pitch_tc_deg",
+    "max_heel_clearance_m",
+    "circumduction_m",
+    "stride_time_s",
+    "step_time_s",
+    "step_regularity_v",
+    "stride_regularity_v",
+    "harmonic_ratio_v",
+    "step_count",
+    "walking_duration_min",
+)
+"""What a therapist reads first, of what the sensors can give."""
+
+FIRST_ROWS: Final = 10
+
+NOT_ON_PAPER: Final = ("swing_pct", "swing_time_s", "turning_angle_deg")
+"""What the rest of a stride leaves, and what a straight walk has none of."""
+
+require_entries((*MATTERING, *NOT_ON_PAPER), "sagittal.server.pages.results.report_rows")
+
+
+def select_first(model: ReportModel) -> tuple[ParameterRow, ...]:
+    """The ten rows that matter most of what these sensors gave, in fixed order; of squats and tests all.
+
+    A joint angle is measured from the zero of its curve.
+    """
+    rows = {row.name: row for _, group in model.page_groups for row in group}
+    if model.squats is not None:
+        return tuple(row for row in rows.values() if row.group == SQUAT)
+    if model.functional is not None and not model.strides:
+        return tuple(row for row in rows.values() if row.group in FUNCTIONAL and row.reason is None)
+    from_zero = {level.from_standing(name): row for name, row in rows.items()}
+    found = (from_zero.get(name) or rows.get(name) for name in MATTERING)
+    return tuple(row for row in found if row is not None and row.reason is None)[:FIRST_ROWS]
+
+
+def fold_groups(model: ReportModel, first: Sequence[ParameterRow]) -> list[dict[str, Any]]:
+    """All other rows by group; the head of each says how many are beyond the norm, so that none hides."""
+    shown = {row.name for row in first}
+    groups = ((name, [row for row in rows if row.name not in shown]) for name, rows in model.page_groups)
+    return [{"name": name, "rows": rows, "words": _count_beyond(rows)} for name, rows in groups if rows]
+
+
+def _count_beyond(rows: Sequence[ParameterRow]) -> str:
+    beyond = sum(
+        any(c is not None and c.z is not None and abs(c.z) > BEYOND_SD for c in (r.both, r.left, r.right))
+        for r in rows
+    )
+    values = f"{len(rows)} {plural(len(rows), 'value', 'values')}"
+    return f"{values}, {beyond} beyond {BEYOND_SD:g} SD" if beyond else values
+
+
+def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[ParameterRow, ...]]]:
+    """The parameter table; empty when not one number was found, because then one sentence says more.
+
+    On paper only what was measured has a row; `missing` says the rest in one line.
+    """
+    groups = [(name, rows) for name, rows in model.page_groups if name not in SECONDARY]
+    if all(row.reason for _, rows in groups for row in rows):
+        return []
+    if not paper:
+        return groups
+    short = (
+        (name, tuple(r for r in rows if r.reason is None and r.name not in NOT_ON_PAPER))
+        for name, rows in groups
+    )
+    return [(name, rows) for name, rows in short if rows]
+
+
+def select_others(
+    model: ReportModel, first: Sequence[ParameterRow]
+) -> list[tuple[str, tuple[ParameterRow, ...]]]:
+    """The rows of paper that are not among the first ones."""
+    shown = {row.name for row in first}
+    short = (
+        (name, tuple(r for r in rows if r.name not in shown))
+        for name, rows in select_groups(model, paper=True)
+    )
+    return [(name, rows) for name, rows in short if rows]

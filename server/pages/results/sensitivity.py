@@ -1,0 +1,78 @@
+"""How sure the angles of squats are: one measure of body or sensors off at a time."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final
+from urllib.parse import quote
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse
+from sqlalchemy import Connection
+from starlette.responses import Response
+
+from sagittal.server.auth.access import require
+from sagittal.server.auth.identity import Identity
+from sagittal.server.auth.roles import Action
+from sagittal.server.clinic import jobs
+from sagittal.server.context import Blobs, Db, Id
+from sagittal.server.jobs.queue import SENSITIVITY
+from sagittal.server.pages.job_views import view_job
+from sagittal.server.pages.results.session_context import read_context
+from sagittal.server.pages.shell import record_opening, render_page
+from sagittal.server.report.view.sensitivity import view_sensitivity
+from sagittal.server.results import analyses, sensitivities
+from sagittal.server.uploads import reference_files
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+STAGES: Final = (
+    ("analysis", "Analyse the take as before"),
+    ("parameters", "Put 24 measures off, one at a time"),
+)
+"""Stages of a sensitivity analysis, in words."""
+
+
+@router.get("/sessions/{sid}/sensitivity")
+def show_sensitivity(
+    request: Request,
+    db: Db,
+    blobs: Blobs,
+    sid: Id,
+    who: Annotated[Identity, require(Action.READ_RESULT)],
+    run: Annotated[str | None, Query(max_length=100)] = None,
+    show: Annotated[str, Query(max_length=20)] = "step",
+) -> Response:
+    """Start one, follow it, read its tables.
+
+    Parameters
+    ----------
+    run : which one, else the newest. show : change by steps, by a share of the nominal value, or in %.
+    """
+    with db.read() as c:
+        context = read_context(c, sid)
+        context |= list_choices(c, sid)
+        found = sensitivities.of_session(c, sid)
+        shown = next((r for r in found if r.id == run), found[0] if found else None)
+        kept = None if shown is None else sensitivities.find_file(c, shown)
+    context |= {"runs": found, "run": shown}
+    if shown is not None and kept is not None:
+        analysis, name = kept
+        context["view"] = view_sensitivity(analyses.file_bytes(blobs, analysis, name), show)
+        context["earlier"] = context["analysed"] != analysis.id
+        context["csv"] = f"/api/v1/analyses/{analysis.id}/files/{quote(shown.files[1])}"
+    record_opening(request, who, "session", sid)
+    return render_page(request, db, who, "sensitivity.html", "patients", **context)
+
+
+def list_choices(c: Connection, session_id: str) -> dict[str, Any]:
+    """What the form offers, and the job that is at work or failed last."""
+    newest = next(iter(jobs.of_session(c, session_id, kind=SENSITIVITY)), None)
+    analysed = analyses.latest(c, session_id)
+    names = [f.name for f in reference_files.list_files(c, session_id)]
+    return {
+        "analysed": None if analysed is None else analysed.id,
+        "references": [name for name in names if name.lower().endswith(sensitivities.TABLE)],
+        "work": None if newest is None else view_job(newest),
+        "work_stages": STAGES,
+        "view": None,
+    }

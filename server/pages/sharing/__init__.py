@@ -1,0 +1,1 @@
+"""Pages of signed reports and who may read them."""

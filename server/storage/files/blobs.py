@@ -1,0 +1,306 @@
+"""Content-addressed files: `blobs/<space>/<sha256>`, immutable, verified at every read.
+
+    blobs = open_blobs(settings)        # storage/blob_opening.py: a folder, or an S3-compatible bucket
+    blob = blobs.put(space, content)    # when this returns the file is durable there
+
+A space is a patient's id. The same bytes of two patients are two files, so that an upload cannot reveal what
+another patient has (no existence oracle) and an erased patient is an erased space.
+
+A file is always written anew over an equal one: that costs a write, repairs a damaged file, and makes the
+file young, so that the sweep of unreferenced files cannot take what somebody is about to refer to.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO, ClassVar, Final, Self
+
+from sagittal.core.errors import SagittalError
+from sagittal.server.storage import fs
+from sagittal.server.storage.files.trash import Trash
+
+PIECE: Final = 1 << 20
+"""Bytes of a file that are in memory at once."""
+_HEX32 = re.compile(r"[0-9a-f]{32}")
+_HEX64 = re.compile(r"[0-9a-f]{64}")
+INCOMING = "incoming"
+"""The space of files that are being received, or were when their process died; always a local folder."""
+
+
+class IntegrityError(SagittalError):
+    """A stored file is gone or its bytes are not those that were stored."""
+
+    status = 503
+
+
+class StoreAway(SagittalError):  # noqa: N818 - says what is the matter
+    """The store cannot be asked now: nothing is known of the file, and trying again may help.
+
+    Parameters
+    ----------
+    refuses : it answers but does not let us in, which somebody must mend. detail : for the administrator.
+    """
+
+    status = 503
+
+    def __init__(self, detail: str, *, refuses: bool) -> None:
+        super().__init__("store_refuses" if refuses else "store_away", REFUSES if refuses else AWAY)
+        self.detail, self.refuses = detail, refuses
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild_away, (self.detail, self.refuses)
+
+
+AWAY: Final = "The bucket of stored files cannot be reached; nothing was changed."
+REFUSES: Final = "The bucket of stored files refuses the server; nothing was changed."
+
+
+@dataclass(frozen=True)
+class Blob:
+    """A stored file: its content's hash and its length in bytes."""
+
+    sha256: str
+    size: int
+
+
+@dataclass(frozen=True)
+class BlobFile:
+    """A file found in the store, referred to or not; `age_s` since it was written."""
+
+    space: str
+    name: str
+    age_s: float
+
+
+class BlobStore(ABC):
+    """All blobs, wherever they are.
+
+    Parameters
+    ----------
+    incoming : local folder of files on their way in; made if absent. trash : what nothing refers to any more.
+    place : where they are, for people.
+    """
+
+    moved_at_once: ClassVar[int]
+    """Files that go to the trash under one write lock: nobody else can write meanwhile."""
+
+    def __init__(self, incoming: Path, trash: Trash, place: str) -> None:
+        self.incoming, self.trash, self.place = incoming, trash, place
+        self._locks = incoming.parent.with_name("part-locks")
+        fs.make_folder(incoming)
+
+    @abstractmethod
+    def receive(self, space: str, limit: int | None = None) -> Receiver:
+        """Take a file in chunks: `with store.receive(pid, limit) as r: r.write(chunk); blob = r.keep()`."""
+
+    @abstractmethod
+    def adopt(self, space: str, path: Path, sha256: str) -> None:
+        """Take over a synced file of `incoming` with this content, durably.
+
+        A folder moves it; a bucket leaves it to the caller, who removes it once its row is written.
+        """
+
+    def put(self, space: str, content: bytes) -> Blob:
+        """Store bytes; when this returns they survive a power cut."""
+        with self.receive(space) as receiver:
+            receiver.write(content)
+            return receiver.keep()
+
+    def part(self, upload_id: str) -> Path:
+        """Where a file that comes in parts waits to be whole (services/uploads.py)."""
+        return self.incoming / self.name_part(upload_id)
+
+    @staticmethod
+    def name_part(upload_id: str) -> str:
+        """Name of that file."""
+        if not _HEX32.fullmatch(upload_id):
+            raise ValueError(f"'{upload_id}' is not the id of an upload.")
+        return f"{upload_id}.part"
+
+    def hold_part(self, upload_id: str) -> AbstractContextManager[None]:
+        """Be the only one who adds to this part or names it, of all processes that share the folder.
+
+        A few others wait with it, so that the files of the locks stay few.
+        """
+        fs.make_folder(self._locks)
+        return fs.hold_lock(self._locks / f"{self.name_part(upload_id)[:2]}.lock")
+
+    def lock_sweep(self) -> fs.Lock:
+        """Be the only sweep of all processes that share the folder; raises fs.LockedError."""
+        fs.make_folder(self._locks)
+        return fs.Lock(self._locks / "sweep.lock", "a sweep")
+
+    @abstractmethod
+    def probe(self) -> None:
+        """Write something and remove it again; raises OSError, StoreAway."""
+
+    def read(self, space: str, sha256: str) -> bytes:
+        """Return the bytes, or raise IntegrityError (blob_missing, blob_damaged), StoreAway."""
+        content = self._load(space, sha256)
+        if content is None:
+            raise make_missing(sha256)
+        if hashlib.sha256(content).hexdigest() != sha256:
+            raise make_damaged(sha256)
+        return content
+
+    def open(self, space: str, sha256: str) -> BinaryIO:
+        """Open the bytes, verified before the first is given; raises as `read`."""
+        file = self.open_unverified(space, sha256)
+        if file is None:
+            raise make_missing(sha256)
+        if digest_open(file) != sha256:
+            file.close()
+            raise make_damaged(sha256)
+        file.seek(0)
+        return file
+
+    @abstractmethod
+    def _load(self, space: str, sha256: str) -> bytes | None:
+        """The bytes as they are; None = the file is not there."""
+
+    @abstractmethod
+    def open_unverified(self, space: str, sha256: str) -> BinaryIO | None:
+        """Open the bytes as they are, to be sought in and closed; None = the file is not there."""
+
+    @abstractmethod
+    def read_part(self, space: str, sha256: str, start: int, stop: int) -> bytes:
+        """Bytes from `start` to before `stop`, as they are.
+
+        Raises
+        ------
+        IntegrityError
+            blob_missing; blob_damaged where the file is shorter.
+        StoreAway
+            the store cannot be reached.
+        """
+
+    @abstractmethod
+    def has(self, space: str, sha256: str) -> bool:
+        """Whether the file is there; asked briefly, since a write lock may be held meanwhile."""
+
+    def require(self, space: str, sha256: str) -> None:
+        """Raise IntegrityError unless the file is there; call it in the transaction that refers to it."""
+        if not self.has(space, sha256):
+            raise make_missing(sha256)
+
+    def files(self) -> Iterator[BlobFile]:
+        """Every file of ours in the store, half-received ones too (their space is INCOMING)."""
+        for path in sorted(self.incoming.iterdir()):
+            age_s = age_of(path)
+            if age_s is not None:
+                yield BlobFile(INCOMING, path.name, age_s)
+        yield from self._stored()
+
+    @abstractmethod
+    def _stored(self) -> Iterator[BlobFile]:
+        """Every file that was stored whole."""
+
+    def is_older(self, one: BlobFile, age_s: float) -> bool:
+        """Look again: it is there, and nobody has written it anew since it was found."""
+        found = age_of(self.incoming / one.name) if one.space == INCOMING else self._age_of(one)
+        return found is not None and found >= age_s
+
+    @abstractmethod
+    def _age_of(self, one: BlobFile) -> float | None:
+        """Seconds since a stored file was written; None = it is not there."""
+
+    def discard(self, found: Iterable[BlobFile]) -> None:
+        """Remove files that were found, for good."""
+        of_spaces: dict[str, list[str]] = {}
+        for one in found:
+            if one.space == INCOMING:
+                fs.remove_file(self.incoming / one.name)
+            else:
+                of_spaces.setdefault(one.space, []).append(one.name)
+        for space, names in of_spaces.items():
+            self.remove(space, *names)
+
+    @abstractmethod
+    def remove(self, space: str, *names: str) -> None:
+        """Remove files for good; gone already is fine. Asked briefly, as `has`."""
+
+    @abstractmethod
+    def erase(self, space: str) -> None:
+        """Remove a whole space."""
+
+    @abstractmethod
+    def settle(self, spaces: Iterable[str]) -> None:
+        """Make what was removed from these spaces survive a power cut."""
+
+
+class Receiver(ABC):
+    """One blob on its way in, in a local file until it is whole."""
+
+    def __init__(self, incoming: Path, limit: int | None) -> None:
+        self._file = fs.IncomingFile(incoming, limit)
+
+    def write(self, data: bytes) -> None:
+        """Append bytes; raises fs.SizeLimitError beyond the limit."""
+        self._file.write(data)
+
+    @abstractmethod
+    def keep(self) -> Blob:
+        """Give the file its name; when this returns it is durable. Raises StoreAway."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._file.__exit__(None, None, None)
+
+
+def digest_open(file: BinaryIO) -> str:
+    """Hexadecimal SHA-256 of an open file from its place on, read piece by piece."""
+    digest = hashlib.sha256()
+    while piece := file.read(PIECE):
+        digest.update(piece)
+    return digest.hexdigest()
+
+
+def check_address(space: str, sha256: str) -> str:
+    """`<space>/<sha256>` of a blob; raises ValueError when it is none."""
+    if not (is_space(space) and _HEX64.fullmatch(sha256)):
+        raise ValueError(f"'{space}/{sha256}' is not the address of a blob.")
+    return f"{space}/{sha256}"
+
+
+def is_space(name: str) -> bool:
+    """Whether a space may have this name."""
+    return _HEX32.fullmatch(name) is not None
+
+
+def age_of(path: Path) -> float | None:
+    """Seconds since a local file was written; None = it is not there."""
+    try:
+        return time.time() - path.stat().st_mtime
+    except FileNotFoundError:
+        return None
+
+
+def make_damaged(sha256: str) -> IntegrityError:
+    """What is said of a file whose bytes are not its own."""
+    return IntegrityError(
+        "blob_damaged",
+        f"The stored file {sha256[:12]}… has changed on the disk; its content is not used. "
+        "Restore it from a backup or upload the original again.",
+    )
+
+
+def make_missing(sha256: str) -> IntegrityError:
+    """What is said of a file that is gone."""
+    return IntegrityError(
+        "blob_missing",
+        f"The stored file {sha256[:12]}… is not there. "
+        "Restore it from a backup or upload the original again.",
+    )
+
+
+def _rebuild_away(detail: str, refuses: bool) -> StoreAway:
+    return StoreAway(detail, refuses=refuses)

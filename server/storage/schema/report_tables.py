@@ -1,0 +1,69 @@
+"""Tables of a session's report: the therapist's text, what was signed, the links to it.
+
+By the rules of storage/tables.py.
+"""
+
+from __future__ import annotations
+
+from sqlalchemy import CheckConstraint, Column, Integer, String, Table, UniqueConstraint
+
+from sagittal.server.storage.schema.columns import (
+    UserLines,
+    UserString,
+    Utc,
+    describe_file,
+    id_column,
+    metadata,
+    owner,
+    reference,
+)
+
+assessment = Table(
+    "assessment",
+    metadata,
+    owner("session_id", "session"),
+    Column("content", UserLines, nullable=False),  # of the therapist, on the report
+    Column("changed_at", Utc, nullable=False),
+)
+
+signed_report = Table(
+    "signed_report",
+    metadata,
+    id_column(),
+    reference("session_id", "session"),
+    Column("number", Integer, nullable=False),  # version of the session's report, from 1
+    Column("analysis_id", String(32), nullable=False),  # what it was made from; no key: it stands by itself
+    Column("language", String(8), nullable=False),
+    Column("signed_by", UserString(200)),  # the name it bears; no key, as accounts may go
+    Column("signed_at", Utc, nullable=False),
+    Column("reopened_by", UserString(200)),
+    Column("reopened_at", Utc),  # None: in force
+    Column("reopened_because", UserLines),
+    UniqueConstraint("session_id", "number"),
+    CheckConstraint("(reopened_at IS NULL) = (reopened_because IS NULL)", name="reopened"),
+)
+
+report_file = Table(
+    "report_file",
+    metadata,
+    owner("report_id", "signed_report"),
+    Column("name", String(32), primary_key=True),
+    *describe_file(),
+)
+
+report_link = Table(
+    "report_link",
+    metadata,
+    id_column(),
+    reference("report_id", "signed_report"),
+    Column("token_sha256", String(64), nullable=False, unique=True),  # the token is only in the address
+    Column("made_by", UserString(200)),
+    reference("maker_id", "user", nullable=True, index=False),  # its account; made_by is the name it had
+    Column("made_at", Utc, nullable=False),
+    Column("expires_at", Utc, nullable=False),
+    Column("revoked_at", Utc),
+    Column("openings", Integer, nullable=False),
+    Column("opened_at", Utc),  # last
+    reference("emergency_id", "emergency_access", nullable=True),  # in which it was made and ends
+    CheckConstraint("openings >= 0", name="openings"),
+)
