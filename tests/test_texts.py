@@ -163,7 +163,7 @@ def find_uncounted(messages: Collection[str]) -> list[str]:
 def test_a_count_has_a_message_for_one() -> None:
     formats = [
         message
-        for path in sorted((ROOT / "core" / "formats").glob("*.py"))
+        for path in sorted((ROOT / "core" / "formats").rglob("*.py"))
         for message in python_texts(path.read_text("utf-8"), whole=False)
     ]
     found = find_uncounted([*list_messages(), *formats])

@@ -7,10 +7,13 @@ is what it needs of a finished analysis; nothing here filters a signal, and noth
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from sagittal.core.angles import JointAngles
 from sagittal.core.body.feet import FootTracks
+from sagittal.core.consistency.feet import CONTRADICTED, judge_feet
 from sagittal.core.errors import Notice
 from sagittal.core.events.alternation import AlternationParams, measure_foot_lag
 from sagittal.core.events.bouts import Bout, BoutParams, find_bouts
@@ -20,8 +23,9 @@ from sagittal.core.events.result import GaitEvents, Strides
 from sagittal.core.events.steps import Steps
 from sagittal.core.events.strides import count_strides, stride_list
 from sagittal.core.events.turns import Turn
-from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.frames import FOOT, Bools, Floats, Segment, Side
 from sagittal.core.parameters import Surface, take_figures
+from sagittal.core.parameters.between_feet import withhold_between_feet
 from sagittal.core.parameters.flats import Flats, find_flats
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.parameters.rows import Column
@@ -129,8 +133,22 @@ def measure_gait(tracks: Tracks, edits: Sequence[Edit] = ()) -> MeasuredGait:
     first = figures.parameters if steps is None else _of_steps(tracks, steps, figures.parameters)
     estimated = () if tracks.angles is None else tracks.angles.estimated
     first = state_uncertainty(first, events, estimated, feet_lag_s=_find_feet_lag(tracks, events))
+    contradictions = judge_feet(events, strides, bouts, lambda side, at: _is_measured(tracks, side, at))
+    if contradictions:
+        first = withhold_between_feet(first, CONTRADICTED)
+        strides = replace(strides, notices=(*strides.notices, *contradictions))
     parameters = first + bout_parameters(bouts) + turn_parameters(tracks.turns)
     return MeasuredGait(events, strides, parameters, figures.columns, bouts, tracks.turns, steps)
+
+
+def _is_measured(tracks: Tracks, side: Side, at_s: Floats) -> Bools:
+    """Whether a foot's sensor was there at times (n,) s; it was where no foot is known."""
+    valid = tracks.valid.get(FOOT[side])
+    if valid is None:
+        return np.ones(len(at_s), np.bool_)
+    start = float(tracks.t_s[0]) if len(tracks.t_s) else 0.0
+    index = np.clip(np.round((at_s - start) * tracks.rate_hz).astype(np.int64), 0, len(valid) - 1)
+    return np.asarray(valid[index], np.bool_)
 
 
 def _find_feet_lag(tracks: Tracks, events: GaitEvents) -> float:

@@ -136,6 +136,7 @@ REASONS: Final[Mapping[str, str]] = {
     "no_double_support": "not measured: the feet were never on the floor together",
     "joint_missing": "not measured: a segment of this joint carries no sensor",
     "estimator_bad": "withheld: the sensors contradict each other here",
+    "feet_contradict": "withheld: the contacts of left and right contradict each other",
     "path_bad": "withheld: the foot's path does not fit its rests on the floor",
     "fixed_by_model": "not measured: the leg model holds it fixed",
     "at_bound": "withheld: the leg model's knee rests on its limit",

@@ -1,0 +1,94 @@
+"""Both feet make the same strides: counts and stride times of left and right while walking.
+
+Whoever walks, each contact of one foot lies between two of the other. A foot whose contacts were found in
+part, or twice, breaks that, and so do two clocks at different rates. What needs both feet is then withheld
+(docs/science/consistency.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+
+from sagittal.core.errors import Notice
+from sagittal.core.events.bouts import Bout
+from sagittal.core.events.result import GaitEvents, Strides
+from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Side
+
+CONTRADICTED: Final = "feet_contradict"
+"""Code of the notice, and reason of what is withheld between the feet."""
+COUNT_SHARE: Final = 0.10
+LEAST_CONTACTS: Final = 8
+"""Limit of the difference of contacts as a share of the larger number, besides one a bout, and the least
+contacts that can be judged. Clean recordings reach 0.05 (docs/science/consistency.md)."""
+TIME_SHARE: Final = 0.10
+LEAST_STRIDES: Final = 4
+"""Limit of the difference of the median stride times as a share of the longer, and the least strides a side.
+Clean recordings reach 0.04 (festination)."""
+
+
+def judge_feet(
+    events: GaitEvents,
+    strides: Strides,
+    bouts: Sequence[Bout],
+    is_measured: Callable[[Side, Floats], Bools],
+) -> tuple[Notice, ...]:
+    """Say where left and right contradict each other; nothing where too little was walked to tell.
+
+    Parameters
+    ----------
+    events, strides : as they count, edits included. bouts : walking, by the contacts of both feet.
+    is_measured : whether a foot's sensor was there at times (n,) s; contacts of the other foot count then.
+    """
+    counts = {side: _count_contacts(events, side, bouts, is_measured) for side in SIDES}
+    more = max(counts.values())
+    if min(counts.values()) == 0:
+        # one foot without a sensor, or without any contact, is told by who looks for contacts
+        return ()
+    lost = more - min(counts.values())
+    if more >= LEAST_CONTACTS and lost > len(bouts) + COUNT_SHARE * more:
+        return (_tell_counts(counts),)
+    times = {side: _find_stride_time(strides, side) for side in SIDES}
+    left, right = times["left"], times["right"]
+    if left is not None and right is not None and abs(left - right) > TIME_SHARE * max(left, right):
+        return (_tell_times(left, right),)
+    return ()
+
+
+def _count_contacts(
+    events: GaitEvents, side: Side, bouts: Sequence[Bout], is_measured: Callable[[Side, Floats], Bools]
+) -> int:
+    at = np.array(events.times(side, "ic"), np.float64)
+    at = at[is_measured("right" if side == "left" else "left", at)]
+    return sum(int(((at >= b.first_s - 1e-6) & (at <= b.end_s + 1e-6)).sum()) for b in bouts)
+
+
+def _find_stride_time(strides: Strides, side: Side) -> float | None:
+    used = [s.end_s - s.start_s for s in strides.strides if s.side == side and s.excluded_reason is None]
+    return float(np.median(used)) if len(used) >= LEAST_STRIDES else None
+
+
+_WITHHELD: Final = (
+    "What is measured between the feet is withheld. Correct the contacts in the timeline, or check the "
+    "sensors of both feet and their clocks."
+)
+
+
+def _tell_counts(counts: dict[Side, int]) -> Notice:
+    fewer: Side = "left" if counts["left"] < counts["right"] else "right"
+    return Notice(
+        CONTRADICTED,
+        f"Contacts while walking: left foot {counts['left']}, right foot {counts['right']}. "
+        f"Both feet make the same strides, so contacts are missing or were found twice. {_WITHHELD}",
+        FOOT[fewer],
+    )
+
+
+def _tell_times(left: float, right: float) -> Notice:
+    return Notice(
+        CONTRADICTED,
+        f"A stride of the left foot takes {left:.2f} s, one of the right foot {right:.2f} s. Both feet make "
+        f"the same strides, so the contacts of one foot are wrong, or its clock is. {_WITHHELD}",
+    )
