@@ -38,7 +38,7 @@ def test_import_contracts_hold_and_a_planted_violation_breaks_them(tmp_path: Pat
     errors.write_text(
         errors.read_text("utf-8") + "\nimport sagittal.core.angles\nimport sagittal.server.settings\n"
     )
-    tables = package / "server" / "storage" / "tables.py"
+    tables = package / "server" / "storage" / "schema" / "tables.py"
     tables.write_text(tables.read_text("utf-8") + "\nimport sagittal.server.pages.shell\n")
     broken = linted(tmp_path)
     assert broken.returncode == 1
