@@ -400,6 +400,7 @@ SCRIPT_PLACES: Final = (
     SCRIPTS,
     "core/agreement/tell_live.py",
     "core/calibration/score.py",
+    "core/calibration/score_rules.py",
     "core/norms/",
     "core/online/",
     "core/parameters/catalogue/",

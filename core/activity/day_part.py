@@ -128,18 +128,7 @@ def read_day(
         no_baseline=clip(find_runs(_mark(wear.worn, len(frames.valid)) & ~posture.known & frames.valid)),
         lying=clip([(x.a, x.b) for x in lying if x.still]),
         tilted=clip([(x.a, x.b) for x in lying if not x.still]),
-        periods=tuple(
-            describe_period(
-                max(day[0], p.start_s),
-                min(day[1], p.end_s),
-                _array(p.up),
-                _array(p.forward),
-                p.method,
-                p.leans,
-            )
-            for p in periods
-            if p.end_s > day[0] and p.start_s < day[1]
-        ),
+        periods=_describe_periods(periods, day),
         transitions=tuple(sorted((t for t in found if holds(t.time_s)), key=lambda t: t.time_s)),
         candidates=tuple(c for c in refused if holds(c.time_s)),
         steps_s=steps[inside],
@@ -148,6 +137,22 @@ def read_day(
         step_leans=trunk[inside],
         turns=tuple(t for t in slab.turns if holds(t.start_s)),
         inclination_deg=_seconds(frames, posture, day),
+    )
+
+
+def _describe_periods(periods: Sequence[WearPeriod], day: Window) -> tuple[WearPeriod, ...]:
+    """The periods of wear that reach into a day, cut to it."""
+    return tuple(
+        describe_period(
+            max(day[0], p.start_s),
+            min(day[1], p.end_s),
+            _array(p.up),
+            _array(p.forward),
+            p.method,
+            p.leans,
+        )
+        for p in periods
+        if p.end_s > day[0] and p.start_s < day[1]
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from sagittal.core.agreement.exchange import SensorExchange, find_exchange, undo_exchange
 from sagittal.core.agreement.joints import list_worn_joints
 from sagittal.core.agreement.lags import SensorDrift, SensorLag, find_drifts, find_sensor_lags, list_judged
-from sagittal.core.agreement.params import AgreementParams, JointParams
+from sagittal.core.agreement.params import AgreementParams, JointParams, SlipParams
 from sagittal.core.agreement.repair import leave_out, take_lag_out, turn_back
 from sagittal.core.agreement.slips import SensorSlip, find_slips
 from sagittal.core.agreement.standings import compare_standings
@@ -131,22 +131,12 @@ def check_agreement(
     said += [tell_drift(x, params.lags) for x in drifts]
     late = _lags_over_time(current.t_s, lags, drifts) if params.lags.repair else {}
     if late:
-        shifted = {
-            s: take_lag_out(current.sensors[s], current.t_s, x, current.rate_hz, timeline)
-            for s, x in late.items()
-        }
-        current = replace(current, sensors={**current.sensors, **shifted})
+        current = _take_lags_out(current, late, timeline)
         kept = {s: x for s, x in terms.items() if s not in late}
         same = [w for w in joints if not {w.first, w.second} & set(late)]
         joints, terms = compare_sensors(current, params.joints, kept, same, over_s)
         said += [tell_left_over(x) for x in find_sensor_lags(joints, params.lags) if x.told]
-    slips, places = find_slips(current, terms, joints, params.slips)
-    before, stayed = compare_standings(current, terms, params.slips)
-    # a joint near the edge of a walk may blame its other sensor, which both standings then clear
-    legs = {x.segment[-1] for x in before}
-    slips = tuple(x for x in slips if x.segment[-1] not in legs or x.segment not in stayed)
-    slips += tuple(x for x in before if x.segment not in {slip.segment for slip in slips})
-    places |= {s: x for s, x in stayed.items() if s not in places or _length(x) > _length(places[s])}
+    slips, places = _find_all_slips(current, terms, joints, params.slips)
     said += [tell_slip(x, params.slips) for x in slips]
     back = {x.segment: x for x in slips if x.is_repaired and params.slips.repair}
     turned = {s: turn_back(current.sensors[s], current.t_s, x) for s, x in back.items()}
@@ -175,6 +165,30 @@ def check_agreement(
 def measure_misfits(joints: Iterable[JointWindows]) -> dict[tuple[Segment, Segment], float]:
     """Joint → median misfit of its two sides; joints without a window are left out."""
     return {(j.first, j.second): float(np.median(j.residual)) for j in joints if len(j.t_s)}
+
+
+def _find_all_slips(
+    recording: UniformRecording, terms: Terms, joints: Sequence[JointWindows], params: SlipParams
+) -> tuple[tuple[SensorSlip, ...], dict[Segment, Window]]:
+    """Slips while walking and between two standings, as `find_slips` gives them."""
+    slips, places = find_slips(recording, terms, joints, params)
+    before, stayed = compare_standings(recording, terms, params)
+    # a joint near the edge of a walk may blame its other sensor, which both standings then clear
+    legs = {x.segment[-1] for x in before}
+    slips = tuple(x for x in slips if x.segment[-1] not in legs or x.segment not in stayed)
+    slips += tuple(x for x in before if x.segment not in {slip.segment for slip in slips})
+    places |= {s: x for s, x in stayed.items() if s not in places or _length(x) > _length(places[s])}
+    return slips, places
+
+
+def _take_lags_out(
+    recording: UniformRecording, late: Mapping[Segment, Floats], timeline: TimelineParams
+) -> UniformRecording:
+    shifted = {
+        s: take_lag_out(recording.sensors[s], recording.t_s, x, recording.rate_hz, timeline)
+        for s, x in late.items()
+    }
+    return replace(recording, sensors={**recording.sensors, **shifted})
 
 
 def _length(window: Window) -> float:

@@ -24,15 +24,8 @@ from sagittal.core.agreement.lags import SensorLag, find_sensor_lags
 from sagittal.core.agreement.live_joints import LivePair, Pair, list_pairs, relabel
 from sagittal.core.agreement.live_terms import LiveTerms, RawSecond, TermSecond
 from sagittal.core.agreement.params import LiveAgreementParams
-from sagittal.core.agreement.slips import (
-    PlaceTurns,
-    SensorSlip,
-    find_turns,
-    is_lasting,
-    is_moving,
-    judge_turns,
-    question_strides,
-)
+from sagittal.core.agreement.place_turns import PlaceTurns, find_turns, is_lasting, judge_turns
+from sagittal.core.agreement.slips import SensorSlip, is_moving, question_strides
 from sagittal.core.agreement.strides import choose_leg, find_largest_axis
 from sagittal.core.agreement.terms import LevelMotion
 from sagittal.core.agreement.windows import JointWindows

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import get_args
 
-from sagittal.core.body.arms import ArmParams
+from sagittal.core.body.arm_params import ArmParams
 from sagittal.core.body.erkf.params import ErkfParams
 from sagittal.core.body.kinematics import AnchorParams
 from sagittal.core.body.l7s.filter import L7sParams

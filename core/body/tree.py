@@ -174,6 +174,17 @@ class ImuTree:
         return self.segments(p, q)[1]
 
 
+def _check_mounts(mounts: Mapping[Segment, Floats], segments: Sequence[Segment]) -> None:
+    missing = [s for s in segments if s not in mounts]
+    if missing:
+        raise EstimationError(
+            "segments_missing",
+            f"{len(segments) - len(missing)} of {len(segments)} sensors are there, missing: "
+            f"{', '.join(missing)}; choose an estimator for the sensors worn.",
+            sensor=missing[0],
+        )
+
+
 def person_tree(
     body: BodyModel,
     mounts: Mapping[Segment, Floats],
@@ -196,14 +207,7 @@ def person_tree(
     EstimationError `segments_missing` when one of `segments` has no mount, `segment_length` when a length of
     the body model is not positive; and those of `ImuTree`.
     """
-    missing = [s for s in segments if s not in mounts]
-    if missing:
-        raise EstimationError(
-            "segments_missing",
-            f"{len(segments) - len(missing)} of {len(segments)} sensors are there, missing: "
-            f"{', '.join(missing)}; choose an estimator for the sensors worn.",
-            sensor=missing[0],
-        )
+    _check_mounts(mounts, segments)
     _check_lengths(body)
     q_mount = from_matrix(np.stack([mounts[s] for s in segments]))
     place = np.stack([(places or {}).get(s, sensor_place(s, body)) for s in segments])

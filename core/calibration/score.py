@@ -1,6 +1,6 @@
 """How good a calibration is: checks of every sensor, each with its limit, what it means and what to do.
 
-The rules stand in one table (`RULES`); limits are `ScoreParams`. Where the limits come from:
+The rules stand in one table (score_rules.py); limits are `ScoreParams`. Where the limits come from:
 docs/science/calibration.md, "Score".
 """
 
@@ -18,16 +18,13 @@ from sagittal.core.calibration.forward import MeasureName
 from sagittal.core.calibration.functional import FUNCTIONAL
 from sagittal.core.calibration.gyro_pca import GOOD_AXIS, measure_main_axis
 from sagittal.core.calibration.knee_axis import KNEE_SEEN, STEEPEST, measure_knees
+from sagittal.core.calibration.score_rules import RULE_OF, CheckName, CheckRule
 from sagittal.core.calibration.walking import TRUNK
 from sagittal.core.frames import FOOT, GRAVITY, SEGMENTS, SHANK, SIDES, THIGH, Bools, Floats, Segment
 from sagittal.core.rotation import wrap_angle
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.rest import index_window, measure_turn
 
-CheckName = Literal[
-    "forward_found", "stillness", "gravity", "axis_share", "repetitions", "mirror", "knee_axis",
-    "joint_misfit", "heading_spread",
-]  # fmt: skip
 CalibrationVerdict = Literal["pass", "redo", "not_judged"]
 
 TURNED_ALL: Final = 1.0
@@ -62,103 +59,6 @@ class ScoreParams:
     knee_axis: float = 10.0
     joint_misfit: float = 0.9
     heading_spread: float = 25.0
-
-
-@dataclass(frozen=True)
-class CheckRule:
-    """One check as people read it.
-
-    Parameters
-    ----------
-    least : the value must reach the limit; else it must not exceed it. means : what a value beyond the limit
-    says. todo : what to do then.
-    """
-
-    name: CheckName
-    title: str
-    unit: str
-    least: bool
-    means: str
-    todo: str
-
-
-RULES: Final[tuple[CheckRule, ...]] = (
-    CheckRule(
-        "forward_found",
-        "Forward axis found",
-        "",
-        False,
-        "Which way the sensor faces is not known, so its angles are withheld.",
-        "Stand still for 3 s, then walk at least 8 steps straight ahead, or declare the mounting.",
-    ),
-    CheckRule(
-        "stillness",
-        "Standing still",
-        "°",
-        False,
-        "The segment tilted while the person stood, so its upright is off by up to half of that.",
-        "Let the person stand still for 3 to 5 s, with a hand on a rail if needed, and record again.",
-    ),
-    CheckRule(
-        "gravity",
-        "Gravity at rest",
-        "%",
-        False,
-        "The accelerometer is off by so much at rest; distances and tilts of this sensor are doubtful.",
-        "Calibrate the accelerometer as its maker says, or wear another sensor.",
-    ),
-    CheckRule(
-        "axis_share",
-        "One axis of turning",
-        "",
-        True,
-        "The segment turned about several axes, so its flexion axis is not clear.",
-        "Fasten the sensor, and walk straight ahead at the usual speed, without turning.",
-    ),
-    CheckRule(
-        "repetitions",
-        "Steps or repetitions",
-        "",
-        True,
-        "The direction rests on few repetitions, so chance has a large part in it.",
-        "Walk further straight ahead, at least 8 steps, or repeat the movement at least 10 times.",
-    ),
-    CheckRule(
-        "mirror",
-        "Left mirrors right",
-        "°",
-        False,
-        "Left and right turn about axes that are no mirror images; one forward axis may be off by that.",
-        "Look whether both sensors sit alike and tight, then stand and walk again.",
-    ),
-    CheckRule(
-        "knee_axis",
-        "Knee seen from both sides",
-        "°",
-        False,
-        "Thigh and shank disagree about the axis of their knee, so one forward axis is off by that.",
-        "Fasten both sensors of that knee, away from muscle, then stand and walk again.",
-    ),
-    CheckRule(
-        "joint_misfit",
-        "Joints hold together",
-        "",
-        False,
-        "The sensors beside its joints do not show one acceleration of the joint.",
-        "Check who wears which sensor, its strap and its clock; then record again.",
-    ),
-    CheckRule(
-        "heading_spread",
-        "Measures of forward agree",
-        "°",
-        False,
-        "Walking velocity, acceleration and joints show different ways forward.",
-        "Start straight ahead from standing, walk without turning, and stand still at the end.",
-    ),
-)
-"""All checks in the order in which they are shown."""
-
-RULE_OF: Final[Mapping[CheckName, CheckRule]] = {rule.name: rule for rule in RULES}
 
 
 @dataclass(frozen=True)

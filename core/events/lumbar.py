@@ -141,26 +141,39 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
             f"{params.bouts.min_strides + 2} without a break: no walking bout is reported. "
             "Record a longer walk.",
         )
-    steps: list[Step] = []
-    for bout in bouts:
-        for run in _unbroken([t for t in times if bout.first_s <= t <= bout.end_s], bout):
-            sides: list[Side | None] = [None] * len(run)
-            if segment == "pelvis":
-                sides = _sides(run, yaw_rate, bout.step_s, rate, params)
-            steps += [Step(t, side) for t, side in zip(run, sides, strict=True)]
-    notices = []
-    if any(s.side is None for s in steps):
-        notices.append(
-            Notice(
-                "side_unknown",
-                "Which foot made a step cannot be told"
-                + (" from the chest." if segment == "chest" else " everywhere from this sensor.")
-                + " Step times and cadence do not depend on it.",
-                segment,
-                severity="info",
-            )
-        )
-    return Steps(tuple(steps), bouts, segment, tuple(notices), {"score": float(rhythm.score.max())})
+    steps = [
+        step
+        for bout in bouts
+        for run in _unbroken([t for t in times if bout.first_s <= t <= bout.end_s], bout)
+        for step in _tell_feet(run, segment, yaw_rate, bout.step_s, rate, params)
+    ]
+    notices = _tell_unknown_sides(steps, segment)
+    return Steps(tuple(steps), bouts, segment, notices, {"score": float(rhythm.score.max())})
+
+
+def _tell_feet(
+    run: list[float], segment: Segment, yaw_rate: Floats, step_s: float, rate_hz: float, params: LumbarParams
+) -> list[Step]:
+    """The steps of an unbroken run with their feet, which only the pelvis tells."""
+    sides: list[Side | None] = [None] * len(run)
+    if segment == "pelvis":
+        sides = _sides(run, yaw_rate, step_s, rate_hz, params)
+    return [Step(t, side) for t, side in zip(run, sides, strict=True)]
+
+
+def _tell_unknown_sides(steps: list[Step], segment: Segment) -> tuple[Notice, ...]:
+    if all(s.side is not None for s in steps):
+        return ()
+    return (
+        Notice(
+            "side_unknown",
+            "Which foot made a step cannot be told"
+            + (" from the chest." if segment == "chest" else " everywhere from this sensor.")
+            + " Step times and cadence do not depend on it.",
+            segment,
+            severity="info",
+        ),
+    )
 
 
 def find_step_times(recording: UniformRecording, segment: Segment, params: StepTimeParams) -> list[float]:

@@ -40,6 +40,7 @@ from sagittal.core.frames import SIDES, Bools, Floats, Segment
 from sagittal.core.fusion.algorithms.choice import LABELS
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.pipeline import Progress, TakeAnalysis
+from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.rest import Window
 
 OWN_CHAIN: Final = "Sagittal, as analysed"
@@ -75,18 +76,7 @@ def compare_filters(
     refused or diverged.
     FormatError of `place_reference`.
     """
-    mounted = analysis.mounted
-    calibrated = analysis.calibrated if mounted is None else mounted.calibrated
-    alone = analysis.fused if mounted is None else mounted.orientations
-    own = analysis.orientations
-    if calibrated is None or alone is None or own is None:
-        if analysis.legs is not None:
-            raise EstimationError(
-                "no_orientations",
-                "Squats are followed by the chain of the leg; filters are compared on walks.",
-            )
-        why = "" if analysis.problem is None else f" {analysis.problem.message}"
-        raise EstimationError("nothing_calibrated", f"No sensor of this take is calibrated.{why}")
+    calibrated, alone, own = _require_orientations(analysis)
     recording = calibrated.recording
     keep = choose_samples(len(recording.t_s), recording.rate_hz)
     signals = prepare_signals(calibrated, alone, magnetometer=request.magnetometer)
@@ -102,17 +92,15 @@ def compare_filters(
     for k, name in enumerate(dict.fromkeys(request.filters)):
         progress("filters", k / len(request.filters))
         runs[name] = run_filter(name, signals, recording.rate_hz, keep, clock)
-    if not any(run.q for run in runs.values()):
-        told = next(run.told[0].message for run in runs.values())
-        raise EstimationError("no_filter_ran", f"No filter gave a result. The first says: {told}")
+    _check_any_ran(runs)
     progress("comparing", 1.0)
     angles = {name: kept.measure_angles(run.q).angles for name, run in runs.items() if run.q}
     chain_angles = kept.measure_angles(kept.chain)
     spreads, medians = _spread_segments(runs, kept)
     spreads |= spread_of_angles(list(angles.values()), chain_angles.angles)
-    scores = None
     every: dict[str | None, Mapping[Segment, Floats]] = {None: kept.chain}
     every.update((name, run.q) for name, run in runs.items())
+    scores = None
     if reference is not None:
         placed = place_reference(reference, analysis.source.segments, medians, kept.valid, kept.t_s)
         measured: dict[str | None, Mapping[str, Floats]] = {None: chain_angles.angles}
@@ -136,6 +124,29 @@ def compare_filters(
         every,
         kept.valid,
     )
+
+
+def _require_orientations(analysis: TakeAnalysis) -> tuple[CalibratedRecording, Orientations, Orientations]:
+    """What is calibrated, its orientations sensor by sensor, and those of the product."""
+    mounted = analysis.mounted
+    calibrated = analysis.calibrated if mounted is None else mounted.calibrated
+    alone = analysis.fused if mounted is None else mounted.orientations
+    own = analysis.orientations
+    if calibrated is None or alone is None or own is None:
+        if analysis.legs is not None:
+            raise EstimationError(
+                "no_orientations",
+                "Squats are followed by the chain of the leg; filters are compared on walks.",
+            )
+        why = "" if analysis.problem is None else f" {analysis.problem.message}"
+        raise EstimationError("nothing_calibrated", f"No sensor of this take is calibrated.{why}")
+    return calibrated, alone, own
+
+
+def _check_any_ran(runs: Mapping[str, FilterRun]) -> None:
+    if not any(run.q for run in runs.values()):
+        told = next(run.told[0].message for run in runs.values())
+        raise EstimationError("no_filter_ran", f"No filter gave a result. The first says: {told}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -73,21 +73,7 @@ def place_reference(
     """
     named = name_segments(table, worn)
     common = [s for s in SEGMENTS if s in named and s in median]
-    if not common:
-        raise FormatError(
-            "no_common_segment",
-            f"{table.source} has {', '.join(list(table.q)[:8])}, the take {', '.join(median)}. "
-            "Name columns by segments or by sensor ids of this take.",
-        )
-    lasts_s = float(table.t_s[-1] - table.t_s[0])
-    if lasts_s > LONGEST_S:
-        raise FormatError(
-            "too_long",
-            f"{table.source} lasts {lasts_s:.6g} s by its time; expected at most {LONGEST_S:g} s. "
-            "A column in ms or µs says so in its name: time_ms, time_us.",
-        )
-    if lasts_s < LEAST_OVERLAP_S:
-        raise _too_short(table.source)
+    _check_reference(table, common, median)
     step = float(t_s[1] - t_s[0])
     own_t = np.arange(table.t_s[0], table.t_s[-1], step)
     pairs = [
@@ -107,7 +93,32 @@ def place_reference(
         known = known[:: -(-len(known) // FITTED)]
         world, sensor = fit_frames(seen[known], median[s][known])
         q[s] = multiply(multiply(conjugate(world), seen), conjugate(sensor))
-    told = (
+    return PlacedReference(q, lag_s, correlation, _tell_placing(lag_s, correlation))
+
+
+def _check_reference(
+    table: OrientationTable, common: Sequence[Segment], median: Mapping[Segment, Floats]
+) -> None:
+    if not common:
+        raise FormatError(
+            "no_common_segment",
+            f"{table.source} has {', '.join(list(table.q)[:8])}, the take {', '.join(median)}. "
+            "Name columns by segments or by sensor ids of this take.",
+        )
+    lasts_s = float(table.t_s[-1] - table.t_s[0])
+    if lasts_s > LONGEST_S:
+        raise FormatError(
+            "too_long",
+            f"{table.source} lasts {lasts_s:.6g} s by its time; expected at most {LONGEST_S:g} s. "
+            "A column in ms or µs says so in its name: time_ms, time_us.",
+        )
+    if lasts_s < LEAST_OVERLAP_S:
+        raise _too_short(table.source)
+
+
+def _tell_placing(lag_s: float, correlation: float) -> tuple[Notice, ...]:
+    """What was fitted to lay the reference onto the take."""
+    return (
         Notice(
             "reference_lag",
             f"The reference's clock was moved {'back' if lag_s < 0.0 else 'on'} by {abs(lag_s):.3f} s, "
@@ -122,7 +133,6 @@ def place_reference(
             severity="info",
         ),
     )
-    return PlacedReference(q, lag_s, correlation, told)
 
 
 def name_segments(table: OrientationTable, worn: Mapping[str, Segment | None]) -> dict[Segment, Floats]:

@@ -68,27 +68,7 @@ def describe_table(name: str, head: bytes, channels: bytes, sidecar: bytes | Non
             "bad_table",
             f"{name} has {cells} columns, but its channels.tsv names {len(rows)}; export both again.",
         )
-    points: dict[str, dict[str, dict[str, str]]] = {}
-    units: dict[str, str] = {}
-    time: tuple[str, str] | None = None
-    for i, row in enumerate(rows):
-        column = str(i + 1)
-        kind = _TYPES.get(row["type"].upper())
-        if row["type"].upper() == "LATENCY":
-            if time is not None:
-                raise _ambiguous(name, "time", time[0], column)
-            time = (column, row["units"])
-        if kind is None or row["component"].lower() not in _AXES:
-            continue
-        axes = points.setdefault(row["tracked_point"], {}).setdefault(kind, {})
-        taken = axes.setdefault(row["component"].lower(), column)
-        if taken != column:
-            what = f"{row['type']} {row['component']} of '{row['tracked_point']}'"
-            raise _ambiguous(name, what, taken, column)
-        if units.setdefault(kind, row["units"]) != row["units"] and kind != "mag":
-            raise FormatError(
-                "unknown_unit", f"{name}: its channels of type {row['type']} have several units."
-            )
+    points, units, time = _sort_channels(rows, name)
     found = {
         point: {
             kind: tuple(axes[a] for a in _AXES) for kind, axes in kinds.items() if set(axes) == set(_AXES)
@@ -116,6 +96,34 @@ def describe_table(name: str, head: bytes, channels: bytes, sidecar: bytes | Non
         ),
         {p: s for p in columns if (s := segment_named(p) or segment_named(placed[p])) is not None},
     )
+
+
+def _sort_channels(
+    rows: Sequence[Mapping[str, str]], name: str
+) -> tuple[dict[str, dict[str, dict[str, str]]], dict[str, str], tuple[str, str] | None]:
+    """Tracked point → signal → axis → column, the unit of every signal, and column and unit of time."""
+    points: dict[str, dict[str, dict[str, str]]] = {}
+    units: dict[str, str] = {}
+    time: tuple[str, str] | None = None
+    for i, row in enumerate(rows):
+        column = str(i + 1)
+        kind = _TYPES.get(row["type"].upper())
+        if row["type"].upper() == "LATENCY":
+            if time is not None:
+                raise _ambiguous(name, "time", time[0], column)
+            time = (column, row["units"])
+        if kind is None or row["component"].lower() not in _AXES:
+            continue
+        axes = points.setdefault(row["tracked_point"], {}).setdefault(kind, {})
+        taken = axes.setdefault(row["component"].lower(), column)
+        if taken != column:
+            what = f"{row['type']} {row['component']} of '{row['tracked_point']}'"
+            raise _ambiguous(name, what, taken, column)
+        if units.setdefault(kind, row["units"]) != row["units"] and kind != "mag":
+            raise FormatError(
+                "unknown_unit", f"{name}: its channels of type {row['type']} have several units."
+            )
+    return points, units, time
 
 
 def _ambiguous(name: str, what: str, first: str, second: str) -> FormatError:

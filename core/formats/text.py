@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal, cast
 
 import numpy as np
@@ -135,6 +135,49 @@ def read_columns(
         have a wanted title.
     """
     titles, names = names, number_columns(names)
+    _check_titles(titles, names, wanted, source)
+    if not bytes(body[:_HEAD]).strip():
+        raise FormatError("empty", f"{source} has a header but no samples; record or export it again.")
+    table = _Table(_as_utf8(body), separator, names, wanted, decimal_comma)
+    values, rows, notices = _read_values(table, source)
+    notices += _check_rows(rows, table.broken, len(names), source)
+    return Columns(values, tuple(notices))
+
+
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """A table without its header; `broken` is how many cells the rows have that were left out."""
+
+    body: memoryview
+    separator: bytes
+    names: list[str]
+    wanted: Sequence[str]
+    decimal_comma: bool
+    broken: list[int] = field(default_factory=list)
+
+    def read(self, kind: pa.DataType) -> pa.Table:
+        """The wanted columns, all of one type; ArrowInvalid where a cell is not of it."""
+        self.broken.clear()
+        read = pc.ReadOptions(column_names=self.names, use_threads=False, block_size=1 << 22)
+        parse = pc.ParseOptions(
+            delimiter=self.separator.decode(), invalid_row_handler=self._skip, ignore_empty_lines=True
+        )
+        convert = pc.ConvertOptions(
+            column_types=dict.fromkeys(self.wanted, kind),
+            include_columns=list(self.wanted),
+            null_values=MISSING,
+            strings_can_be_null=True,
+            decimal_point="," if self.decimal_comma else ".",
+        )
+        return pc.read_csv(cast("Any", pa.BufferReader(pa.py_buffer(self.body))), read, parse, convert)
+
+    def _skip(self, row: pc.InvalidRow) -> Literal["skip"]:
+        self.broken.append(row.actual_columns)
+        return "skip"
+
+
+def _check_titles(titles: Sequence[str], names: Sequence[str], wanted: Sequence[str], source: str) -> None:
+    """Raise `ambiguous_column` where several columns have a wanted title."""
     for name in wanted:
         if name not in names and name in titles:
             raise FormatError(
@@ -143,67 +186,49 @@ def read_columns(
                 f"{describe_columns(titles, name)}. Export it again with each column once, "
                 "or name the right columns in a manifest.",
             )
-    if not bytes(body[:_HEAD]).strip():
-        raise FormatError("empty", f"{source} has a header but no samples; record or export it again.")
-    body = _as_utf8(body)
-    broken: list[int] = []
 
-    def skip(row: pc.InvalidRow) -> Literal["skip"]:
-        broken.append(row.actual_columns)
-        return "skip"
 
-    read = pc.ReadOptions(column_names=names, use_threads=False, block_size=1 << 22)
-    parse = pc.ParseOptions(delimiter=separator.decode(), invalid_row_handler=skip, ignore_empty_lines=True)
-    point = "," if decimal_comma else "."
-
-    def table(kind: pa.DataType) -> pa.Table:
-        broken.clear()
-        convert = pc.ConvertOptions(
-            column_types=dict.fromkeys(wanted, kind),
-            include_columns=list(wanted),
-            null_values=MISSING,
-            strings_can_be_null=True,
-            decimal_point=point,
-        )
-        return pc.read_csv(cast("Any", pa.BufferReader(pa.py_buffer(body))), read, parse, convert)
-
-    notices: list[Notice] = []
+def _read_values(table: _Table, source: str) -> tuple[dict[str, Floats], int, list[Notice]]:
+    """The wanted columns, the number of rows, and a notice of cells that are no numbers."""
     try:
-        found = table(pa.float64())
-        values = {n: _as_floats(found[n]) for n in wanted}
+        found = table.read(pa.float64())
+        return {n: _as_floats(found[n]) for n in table.wanted}, len(found), []
     except pa.ArrowInvalid:
-        try:
-            found = table(pa.string())
-        except pa.ArrowInvalid as e:
-            raise FormatError("bad_table", f"{source} is not a readable table ({e}); export it again.") from e
-        values, bad = _cell_by_cell(found, wanted, decimal_comma)
-        notices.append(
-            Notice(
-                "bad_cells",
-                f"{source}: {bad} cells are not numbers and count as missing; the export may be damaged.",
-                severity=grade_loss(bad, len(found) * len(wanted)),
-            )
-        )
-    rows = len(found)
+        pass
+    try:
+        found = table.read(pa.string())
+    except pa.ArrowInvalid as e:
+        raise FormatError("bad_table", f"{source} is not a readable table ({e}); export it again.") from e
+    values, bad = _cell_by_cell(found, table.wanted, table.decimal_comma)
+    notice = Notice(
+        "bad_cells",
+        f"{source}: {bad} cells are not numbers and count as missing; the export may be damaged.",
+        severity=grade_loss(bad, len(found) * len(table.wanted)),
+    )
+    return values, len(found), [notice]
+
+
+def _check_rows(rows: int, broken: Sequence[int], columns: int, source: str) -> list[Notice]:
+    """A notice of rows without the columns of the header; `bad_table` where most are."""
     if rows == 0 or len(broken) > max(2, rows // 2):
         raise FormatError(
             "bad_table",
             f"{source}: {len(broken)} of {rows + len(broken)} rows "
-            f"{plural(len(broken), 'does', 'do')} not have the {len(names)} columns of the header "
+            f"{plural(len(broken), 'does', 'do')} not have the {columns} columns of the header "
             f"(found {broken[0] if broken else 0}); export it again with one separator.",
         )
-    if broken:
-        notices.append(
-            Notice(
-                "truncated_line",
-                f"{source}: {len(broken)} of {rows + len(broken)} lines "
-                f"{plural(len(broken), 'does', 'do')} not have {len(names)} columns and "
-                f"{plural(len(broken), 'was', 'were')} left out; the file may have been cut off "
-                "while it was written.",
-                severity=grade_loss(len(broken), rows + len(broken)),
-            )
+    if not broken:
+        return []
+    return [
+        Notice(
+            "truncated_line",
+            f"{source}: {len(broken)} of {rows + len(broken)} lines "
+            f"{plural(len(broken), 'does', 'do')} not have {columns} columns and "
+            f"{plural(len(broken), 'was', 'were')} left out; the file may have been cut off "
+            "while it was written.",
+            severity=grade_loss(len(broken), rows + len(broken)),
         )
-    return Columns(values, tuple(notices))
+    ]
 
 
 def _as_utf8(body: memoryview) -> memoryview:

@@ -17,8 +17,9 @@ from sagittal.core.errors import EstimationError
 from sagittal.core.events.bouts import find_bouts
 from sagittal.core.events.result import GaitEvent, GaitEvents, Stride, Strides
 from sagittal.core.events.turns import Turn, TurnParams
-from sagittal.core.frames import FOOT, Floats, Protocol, Segment
+from sagittal.core.frames import FOOT, Protocol, Segment
 from sagittal.core.functional_tests.chair import LONGEST_S, measure_chair_rises
+from sagittal.core.functional_tests.kept_samples import KeptSamples
 from sagittal.core.functional_tests.params import FunctionalTestParams
 from sagittal.core.functional_tests.result import FunctionalTest, GuidedTestView, TestPhase, shift_test
 from sagittal.core.functional_tests.rising import SIT_TO_STAND
@@ -28,7 +29,7 @@ from sagittal.core.functional_tests.tug import measure_tug
 from sagittal.core.functional_tests.walks import LENGTH, measure_six_minutes, measure_ten_metres
 from sagittal.core.parameters.live_stride import LiveStride
 from sagittal.core.parameters.measure import MeasuredGait
-from sagittal.core.signals.recording import GivenLimits, SensorSignals, Subject, UniformRecording
+from sagittal.core.signals.recording import GivenLimits, Subject, UniformRecording
 from sagittal.core.signals.rest import QuietParams, find_rest_windows, measure_quietness
 from sagittal.core.timeline.live import UniformBlock
 
@@ -99,7 +100,7 @@ class GuidedTest:
         self._tick = max(1, round(self.params.tick_s * rate_hz))
         self._ticks_a_look = max(1, round(self.params.look_s / self.params.tick_s))
         k = len(self._watched)
-        self._kept = _KeptSamples(k)
+        self._kept = KeptSamples(k)
         self._judged = 0
         self._strides: list[LiveStride] = []
         self._events: list[GaitEvent] = []
@@ -377,57 +378,3 @@ _WHOLE: Final[Mapping[str, tuple[str, ...]]] = {
 
 def _rises(test: FunctionalTest | None) -> int:
     return 0 if test is None else sum(s.name == SIT_TO_STAND for s in test.segments)
-
-
-class _KeptSamples:
-    """The last samples of some columns, at their places of the axis."""
-
-    def __init__(self, columns: int) -> None:
-        self.first = self.end = 0
-        self._size = 0
-        self._signals = np.zeros((1 << 10, columns, 6))
-        self._flags = np.zeros((1 << 10, columns, 2), np.bool_)
-
-    def append(self, block: UniformBlock, columns: np.ndarray[Any, Any]) -> None:
-        """Take the next samples of the axis."""
-        n = len(block)
-        if self._size + n > len(self._signals):
-            self._grow(n)
-        k = slice(self._size, self._size + n)
-        self._signals[k, :, :3] = block.acc[:, columns]
-        self._signals[k, :, 3:] = block.gyr[:, columns]
-        self._flags[k, :, 0] = block.valid[:, columns]
-        self._flags[k, :, 1] = block.interpolated[:, columns]
-        self._size += n
-        self.end = block.first + n
-
-    def drop_before(self, at: int) -> None:
-        """Forget what is before a sample of the axis."""
-        self.first = max(self.first, min(at, self.end))
-
-    def cut(self, low: int, at: int, segments: Sequence[Segment]) -> dict[Segment, SensorSignals]:
-        """Copies of what the sensors measured."""
-        k = self._span(low, at)
-        signals, flags = self._signals[k], self._flags[k]
-        found: dict[Segment, SensorSignals] = {}
-        for i, s in enumerate(segments):
-            acc, gyr = np.ascontiguousarray(signals[:, i, :3]), np.ascontiguousarray(signals[:, i, 3:])
-            found[s] = SensorSignals(s, acc, gyr, None, flags[:, i, 0].copy(), flags[:, i, 1].copy())
-        return found
-
-    def _span(self, low: int, at: int) -> slice:
-        zero = self.end - self._size
-        return slice(max(0, max(low, self.first) - zero), max(0, at - zero))
-
-    def _grow(self, n: int) -> None:
-        """Make room: drop what was forgotten, then double until it fits."""
-        used = self.end - self.first
-        length = len(self._signals)
-        while used + n > length // 2:
-            length *= 2
-        for name in ("_signals", "_flags"):
-            old: Floats = getattr(self, name)
-            new = np.zeros((length, *old.shape[1:]), old.dtype)
-            new[:used] = old[self._size - used : self._size]
-            setattr(self, name, new)
-        self._size = used

@@ -162,6 +162,48 @@ def advance(
     return out, AttitudeState(x[:4].copy(), x[4:7].copy(), float(x[7]), float(x[8]))
 
 
+@dataclass(frozen=True, eq=False)
+class _Runs:
+    """The filter over parts of a take, either way; as the parameters of `estimate_orientation`."""
+
+    gyr: SampleSeries
+    acc: SampleSeries
+    valid: Bools
+    rate_hz: float
+    rest_norm: float
+    params: AttitudeParams
+
+    def run(
+        self, q0: Floats, first: int, last: int, age_s: float = np.inf, out: Floats | None = None
+    ) -> Floats:
+        """Orientation at sample `last` from that at `first`; all from the lower to the higher into `out`."""
+        step, low = (1, first) if last >= first else (-1, last)
+        state = AttitudeState(q0, step * self.gyr[first : first + 1][0], age_s)
+        if out is not None:
+            out[first - low] = q0
+        for block in list(cut_blocks(abs(last - first)))[::step]:
+            # of the samples without the first one
+            start = low + (step == 1)
+            part = slice(start + block.start, start + block.stop)
+            rate, force = step * self.gyr[part][::step], self.acc[part][::step]
+            q, state = advance(
+                state, rate, force, self.valid[part][::step], self.rate_hz, self.rest_norm, self.params
+            )
+            if out is not None:
+                out[part.start - low : part.stop - low] = q[::step]
+        return state.q
+
+    def smooth(self, into: Floats, q0: Floats, start: int, a: int, b: int, age_s: float = np.inf) -> None:
+        """Write orientations of the samples a to b, both included, from q0 at one of them."""
+        at_end = start == b and start != a
+        first = self.run(q0, b, a, age_s) if at_end else self.run(self.run(q0, start, b, age_s), b, a)
+        last = self.run(first, a, b, out=into)
+        backward = np.empty_like(into)
+        self.run(last, b, a, out=backward)
+        for part in cut_blocks(len(into)):
+            into[part] = find_middle(backward[part], into[part])
+
+
 def estimate_orientation(
     q_rest: Floats,
     at: int,
@@ -185,33 +227,7 @@ def estimate_orientation(
     ----------
     gyr, acc : (n, 3) as in `advance`, asked for in blocks.
     """
-
-    def run(q0: Floats, first: int, last: int, age_s: float = np.inf, out: Floats | None = None) -> Floats:
-        """Orientation at sample `last` from that at `first`; all from the lower to the higher into `out`."""
-        step, low = (1, first) if last >= first else (-1, last)
-        state = AttitudeState(q0, step * gyr[first : first + 1][0], age_s)
-        if out is not None:
-            out[first - low] = q0
-        for block in list(cut_blocks(abs(last - first)))[::step]:
-            # of the samples without the first one
-            start = low + (step == 1)
-            part = slice(start + block.start, start + block.stop)
-            rate, force = step * gyr[part][::step], acc[part][::step]
-            q, state = advance(state, rate, force, valid[part][::step], rate_hz, rest_norm, params)
-            if out is not None:
-                out[part.start - low : part.stop - low] = q[::step]
-        return state.q
-
-    def smooth(into: Floats, q0: Floats, start: int, a: int, b: int, age_s: float = np.inf) -> None:
-        """Write orientations of the samples a to b, both included, from q0 at one of them."""
-        at_end = start == b and start != a
-        first = run(q0, b, a, age_s) if at_end else run(run(q0, start, b, age_s), b, a)
-        last = run(first, a, b, out=into)
-        backward = np.empty_like(into)
-        run(last, b, a, out=backward)
-        for part in cut_blocks(len(into)):
-            into[part] = find_middle(backward[part], into[part])
-
+    runs = _Runs(gyr, acc, valid, rate_hz, rest_norm, params)
     out = np.empty((len(valid), 4))
     stretches = _stretches(valid, round(params.relearn_s * rate_hz))
     if not stretches:
@@ -219,13 +235,13 @@ def estimate_orientation(
         return out
     home = min(range(len(stretches)), key=lambda k: max(stretches[k][0] - at, at - stretches[k][1], 0))
     a, b = stretches[home]
-    smooth(out[a : b + 1], q_rest, min(max(at, a), b), a, b)
+    runs.smooth(out[a : b + 1], q_rest, min(max(at, a), b), a, b)
     out[:a], out[b + 1 :] = out[a], out[b]
     for a, b in stretches[home + 1 :]:
-        smooth(out[a : b + 1], out[a - 1].copy(), a, a, b, 0.0)
+        runs.smooth(out[a : b + 1], out[a - 1].copy(), a, a, b, 0.0)
         out[b + 1 :] = out[b]
     for a, b in reversed(stretches[:home]):
-        smooth(out[a : b + 1], out[b + 1].copy(), b, a, b, 0.0)
+        runs.smooth(out[a : b + 1], out[b + 1].copy(), b, a, b, 0.0)
         out[:a] = out[a]
     return out
 

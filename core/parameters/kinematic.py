@@ -6,7 +6,7 @@ The windows of the figures are those of the reference table (core/norms/data), s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from itertools import chain
 from typing import Final
@@ -107,12 +107,7 @@ def read_cycles(
     of = strides.columns
     foot_off = 100.0 * (of.tc_s - of.start_s) / of.duration_s
     ends: dict[str, dict[Side, float]] = {}
-    why: dict[str, dict[Side, str]] = {}
-    for name, reason in angles.withheld.items():
-        base, _, suffix = name.rpartition("_")
-        own_sides = [s for s in SIDES if SUFFIX[s] == suffix]
-        for side in own_sides or SIDES:
-            why.setdefault(base if own_sides else name, {})[side] = reason
+    why = _tell_withheld(angles.withheld)
     known = CycleCurves(
         curves={},
         stride_index={side: tuple(own.tolist()) for side, own in of.of.items()},
@@ -125,13 +120,7 @@ def read_cycles(
     for side in SIDES:
         own = of.of[side]
         bounds = np.stack((of.start_s[own], of.end_s[own]), axis=1)
-        names = {}
-        for name in angles.angles:
-            base, _, suffix = name.rpartition("_")
-            if suffix == SUFFIX[side]:
-                names[name] = base
-            elif suffix not in SUFFIX.values():
-                names[name] = name
+        names = _name_variables(angles.angles, side)
         courses = {
             variable: angles.headings[segment]
             for segment, variable in (("pelvis", "pelvis_rotation"), (FOOT[side], "foot_progression"))
@@ -156,6 +145,29 @@ def read_cycles(
                 ends.setdefault(base, {})[side] = angles.bounds[name]
             take(known, base, side, row)
     return known
+
+
+def _tell_withheld(withheld: Mapping[str, str]) -> dict[str, dict[Side, str]]:
+    """Variable → side → why it is not there."""
+    why: dict[str, dict[Side, str]] = {}
+    for name, reason in withheld.items():
+        base, _, suffix = name.rpartition("_")
+        own_sides = [s for s in SIDES if SUFFIX[s] == suffix]
+        for side in own_sides or SIDES:
+            why.setdefault(base if own_sides else name, {})[side] = reason
+    return why
+
+
+def _name_variables(angles: Iterable[str], side: Side) -> dict[str, str]:
+    """Angle → variable, of the angles of one side and those of neither."""
+    names = {}
+    for name in angles:
+        base, _, suffix = name.rpartition("_")
+        if suffix == SUFFIX[side]:
+            names[name] = base
+        elif suffix not in SUFFIX.values():
+            names[name] = name
+    return names
 
 
 def mean_curve(curves: CycleCurves, variable: str, side: Side) -> MeanCurve:

@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from sagittal.core.errors import Notice, ParameterError, SagittalError
+from sagittal.core.events.lumbar import TRUNK
 from sagittal.core.pipeline.activity_stages import ACTIVITY_MONITOR, ACTIVITY_QUALITY
 from sagittal.core.pipeline.analysis import TakeAnalysis
 from sagittal.core.pipeline.config import PipelineConfig
@@ -27,7 +28,6 @@ from sagittal.core.pipeline.stages import (
     POSES,
     QUALITY,
     TIMELINE,
-    TRUNK,
     TRUNK_EVENTS,
     TRUNK_PARAMETERS,
     PipelineStage,

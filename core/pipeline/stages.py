@@ -20,7 +20,6 @@ from sagittal.core.angles.withheld import list_fixed, withhold, withhold_at_slip
 from sagittal.core.body.estimate import estimate_poses
 from sagittal.core.body.l7s.inputs import remove_gravity
 from sagittal.core.body.mounting import mount_sensors
-from sagittal.core.body.poses import figure_precision
 from sagittal.core.body.walking_frame import in_walking_frame
 from sagittal.core.calibration.declared import propose_mountings
 from sagittal.core.calibration.score import score_calibration
@@ -29,16 +28,22 @@ from sagittal.core.events.alternation import tell_foot_lag
 from sagittal.core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
 from sagittal.core.events.detection import detect_contacts as detect_foot_contacts
 from sagittal.core.events.foot_movement import measure_foot_movements
-from sagittal.core.events.lumbar import detect_steps, split_about_vertical, trunk_sensor
+from sagittal.core.events.lumbar import TRUNK, detect_steps, split_about_vertical, trunk_sensor
 from sagittal.core.events.result import GaitEvents
 from sagittal.core.events.turns import body_yaw_rate, find_turns
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
 from sagittal.core.fusion.mahony import estimate_orientations
-from sagittal.core.fusion.orientations import LastReading, Orientations
+from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.parameters.measure import Tracks, measure_gait
 from sagittal.core.parameters.spatial import surface_of
 from sagittal.core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
 from sagittal.core.pipeline.config import PipelineConfig
+from sagittal.core.pipeline.let_go import (
+    forget_magnetometers,
+    keep_refined_alone,
+    keep_what_is_measured,
+    keep_what_poses_read,
+)
 from sagittal.core.quality.stuck import drop_stuck_sensors, mark_stuck
 from sagittal.core.setup.propose import propose_labels, propose_repair
 from sagittal.core.signals.calibrated import CalibratedRecording
@@ -48,9 +53,6 @@ from sagittal.core.signals.rest import STANDING, Window, find_rest_windows
 
 CHAIN: Final[frozenset[Segment]] = frozenset(s for joint in LEG_JOINTS for s in joint)
 """With all of these worn the joints compare the clocks of both feet."""
-
-TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
-"""Segments whose acceleration tells how regular the gait is."""
 
 TRUNK_ALONE: Final = (
     "No sensor could be calibrated. Cadence, step times and turns come from the trunk sensor alone, which "
@@ -115,24 +117,6 @@ def judge_signals(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
     report = quality.assess(analysis.source, uniform, config.quality, drop_stuck_sensors(uniform).sensors)
     problem = next((n for n in report.notices if n.severity == "error"), None)
     return replace(analysis, report=report, problem=problem)
-
-
-def forget_magnetometers(analysis: TakeAnalysis) -> TakeAnalysis:
-    """No magnetometers: behind quality only a comparison of filters reads them."""
-    source, uniform, agreed = analysis.source, analysis.uniform, analysis.agreed
-    streams = {d: s.change(mag=None) for d, s in source.streams.items()}
-    analysis = replace(analysis, source=replace(source, streams=streams))
-    if uniform is not None:
-        analysis = replace(analysis, uniform=_without_magnetometers(uniform))
-    if agreed is not None:
-        whole = None if agreed.whole is None else _without_magnetometers(agreed.whole)
-        kept = replace(agreed, recording=_without_magnetometers(agreed.recording), whole=whole)
-        analysis = replace(analysis, agreed=kept)
-    return analysis
-
-
-def _without_magnetometers(recording: UniformRecording) -> UniformRecording:
-    return replace(recording, sensors={s: x.change(mag=None) for s, x in recording.sensors.items()})
 
 
 def calibrate_sensors(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -217,38 +201,6 @@ def build_figure(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
         side: body.contact_mask(t_s, events.times(side, "ic"), events.times(side, "tc")) for side in SIDES
     }
     return replace(analysis, posed=withhold_distances(estimate_poses(mounted, contacts, config.poses)))
-
-
-def keep_what_poses_read(analysis: TakeAnalysis) -> TakeAnalysis:
-    """Of the orientations before mounting only the feet's, which `measure_walk` falls back on; those behind
-    it for the estimator alone, which lets go of what it refines while it runs."""
-    fused, mounted = require_stage(analysis.fused, "orientation"), require_stage(analysis.mounted, "mounting")
-    fused = replace(fused, q={s: q for s, q in fused.q.items() if s in FOOT.values()})
-    passed = replace(mounted.orientations, q=LastReading(mounted.orientations.q))
-    return replace(analysis, fused=fused, mounted=replace(mounted, orientations=passed))
-
-
-def keep_refined_alone(analysis: TakeAnalysis) -> TakeAnalysis:
-    """No orientations from before the estimator; a foot that it left out keeps what it had.
-
-    `measure_walk` falls back on the feet's where there are no angles: their stage does not fail.
-    """
-    mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
-    fused, refined = require_stage(analysis.fused, "orientation"), posed.orientations
-    fused = replace(fused, q={s: refined.q.get(s, q) for s, q in fused.q.items()})
-    return replace(analysis, fused=fused, mounted=replace(mounted, orientations=refined))
-
-
-def keep_what_is_measured(analysis: TakeAnalysis) -> TakeAnalysis:
-    """Orientations of feet and trunk alone, of which there are parameters; of a long take the figure as it is
-    written."""
-    mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
-    kept = {s: q for s, q in posed.orientations.q.items() if s in (*FOOT.values(), *TRUNK)}
-    orientations, poses = replace(posed.orientations, q=kept), posed.poses
-    kind = figure_precision(len(poses.t_s))
-    turned = {s: q if s in kept else np.asarray(q, kind) for s, q in poses.q.items()}
-    posed = replace(posed, orientations=orientations, poses=replace(poses, q=turned))
-    return replace(analysis, mounted=replace(mounted, orientations=orientations), posed=posed)
 
 
 def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:

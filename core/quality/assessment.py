@@ -207,14 +207,7 @@ def _sensor(
     notices = list_suspicions(signals.device_id, f, stream.acc, stream.quat)
     lost, longest = measure_losses(stream)
     gaps = find_runs(~signals.valid | signals.interpolated)
-    at_rest = np.zeros(len(uniform.t_s), np.bool_)
-    for window in rest:
-        at_rest[index_window(window, uniform.rate_hz)] = True
-    at_rest &= signals.valid
-    norm = bias = None
-    if at_rest.any():
-        norm = float(np.median(find_lengths(signals.acc[at_rest])))
-        bias = float(np.linalg.norm(signals.gyr[at_rest].mean(axis=0)))
+    norm, bias = _measure_rest(signals, uniform, rest)
     invalid = float(np.mean(~signals.valid))
     notices += _gap_notice(segment, signals, uniform, invalid, params)
     acc_share, acc_top = saturation(stream.acc, params.acc_floor)
@@ -226,18 +219,7 @@ def _sensor(
         if stream.mag is None or not f.still
         else magnetic_share(stream.mag, f.still_slice, params.magnetic)
     )
-    if magnetic is not None and magnetic > params.magnetic_share:
-        notices.append(
-            Notice(
-                "magnetic_disturbed",
-                f"The magnetic field at {segment} is off its value at rest in {100 * magnetic:.0f} % of "
-                "the samples "
-                f"(limit {100 * params.magnetic_share:.0f} %). The magnetometer is not used for joint "
-                "angles.",
-                segment,
-                severity="info",
-            )
-        )
+    notices += _tell_magnetic(segment, magnetic, params)
     quality = SensorQuality(
         segment=segment,
         device_id=signals.device_id,
@@ -256,6 +238,37 @@ def _sensor(
         magnetic_pct=None if magnetic is None else 100 * magnetic,
     )
     return quality, notices
+
+
+def _measure_rest(
+    signals: SensorSignals, uniform: UniformRecording, rest: tuple[Window, ...]
+) -> tuple[float | None, float | None]:
+    """Length of the specific force and of the mean rate at rest, None without any."""
+    at_rest = np.zeros(len(uniform.t_s), np.bool_)
+    for window in rest:
+        at_rest[index_window(window, uniform.rate_hz)] = True
+    at_rest &= signals.valid
+    if not at_rest.any():
+        return None, None
+    norm = float(np.median(find_lengths(signals.acc[at_rest])))
+    bias = float(np.linalg.norm(signals.gyr[at_rest].mean(axis=0)))
+    return norm, bias
+
+
+def _tell_magnetic(segment: Segment, magnetic: float | None, params: QualityParams) -> list[Notice]:
+    if magnetic is None or magnetic <= params.magnetic_share:
+        return []
+    return [
+        Notice(
+            "magnetic_disturbed",
+            f"The magnetic field at {segment} is off its value at rest in {100 * magnetic:.0f} % of "
+            "the samples "
+            f"(limit {100 * params.magnetic_share:.0f} %). The magnetometer is not used for joint "
+            "angles.",
+            segment,
+            severity="info",
+        ),
+    ]
 
 
 def _gap_notice(

@@ -126,50 +126,70 @@ def plan_daily_life(hours: float, seed: int) -> tuple[DailyItem, ...]:
     while passed() < end:
         day_left = 86400.0 - passed() % 86400.0
         if day_left > 79200.0 and hours > 10.0:
-            # the night: back and sides in turn
-            asleep = float(rng.uniform(6.0, 7.5)) * 3600.0
-            while asleep > 0.0:
-                part = float(rng.uniform(1200.0, 5400.0))
-                items.append(DailyItem(str(rng.choice(["lie", "lie_side"])), part))
-                asleep -= part
-            items += [DailyItem("sit", 30.0)]
+            items += _spend_night(rng)
         kind = rng.choice(
             ["sit", "chores", "walk", "stairs", "rest", "off"], p=[0.38, 0.3, 0.2, 0.06, 0.05, 0.01]
         )
-        if kind == "sit":
-            items += [
-                DailyItem("stand", 4.0),
-                DailyItem("sit", float(rng.uniform(60.0, 2400.0))),
-                DailyItem("stand", 5.0),
-            ]
-        elif kind == "chores":
-            for _ in range(int(rng.integers(1, 6))):
-                pace = float(rng.uniform(80.0, 115.0))
-                items += [DailyItem("stand", float(rng.uniform(5.0, 120.0)))]
-                items += [DailyItem("walk", float(rng.uniform(6.0, 20.0)), pace)]
-                if rng.random() < 0.3:
-                    items += [DailyItem("stand", 2.0), DailyItem("bow", float(rng.uniform(2.0, 4.0)))]
-        elif kind == "walk":
-            pace = float(rng.uniform(90.0, 125.0))
-            items += [DailyItem("walk", float(rng.uniform(30.0, 600.0)), pace), DailyItem("stand", 8.0)]
-        elif kind == "stairs":
-            pace = float(rng.uniform(80.0, 100.0))
-            way = str(rng.choice(["stairs_up", "stairs_down"]))
-            items += [DailyItem("walk", 15.0, pace), DailyItem(way, float(rng.uniform(10.0, 30.0)), pace)]
-            items += [DailyItem("walk", 12.0, pace)]
-        elif kind == "rest":
-            items += [
-                DailyItem("sit", 20.0),
-                DailyItem("lie", float(rng.uniform(300.0, 2400.0))),
-                DailyItem("sit", 15.0),
-            ]
-        elif not any(i.posture == OFF for i in items):
-            items += [
-                DailyItem("stand", 20.0),
-                DailyItem(OFF, float(rng.uniform(2400.0, 5400.0))),
-                DailyItem("stand", 20.0),
-            ]
+        if kind != "off" or not any(i.posture == OFF for i in items):
+            items += _spend_time(str(kind), rng)
     return tuple(items)
+
+
+def _spend_night(rng: np.random.Generator) -> list[DailyItem]:
+    """Back and sides in turn, then up."""
+    items: list[DailyItem] = []
+    asleep = float(rng.uniform(6.0, 7.5)) * 3600.0
+    while asleep > 0.0:
+        part = float(rng.uniform(1200.0, 5400.0))
+        items.append(DailyItem(str(rng.choice(["lie", "lie_side"])), part))
+        asleep -= part
+    return [*items, DailyItem("sit", 30.0)]
+
+
+def _spend_time(kind: str, rng: np.random.Generator) -> list[DailyItem]:
+    """Some minutes of a day: one kind of those that `plan_daily_life` draws."""
+    if kind == "sit":
+        return [
+            DailyItem("stand", 4.0),
+            DailyItem("sit", float(rng.uniform(60.0, 2400.0))),
+            DailyItem("stand", 5.0),
+        ]
+    if kind == "chores":
+        return _do_chores(rng)
+    if kind == "walk":
+        pace = float(rng.uniform(90.0, 125.0))
+        return [DailyItem("walk", float(rng.uniform(30.0, 600.0)), pace), DailyItem("stand", 8.0)]
+    if kind == "stairs":
+        pace = float(rng.uniform(80.0, 100.0))
+        way = str(rng.choice(["stairs_up", "stairs_down"]))
+        return [
+            DailyItem("walk", 15.0, pace),
+            DailyItem(way, float(rng.uniform(10.0, 30.0)), pace),
+            DailyItem("walk", 12.0, pace),
+        ]
+    if kind == "rest":
+        return [
+            DailyItem("sit", 20.0),
+            DailyItem("lie", float(rng.uniform(300.0, 2400.0))),
+            DailyItem("sit", 15.0),
+        ]
+    return [
+        DailyItem("stand", 20.0),
+        DailyItem(OFF, float(rng.uniform(2400.0, 5400.0))),
+        DailyItem("stand", 20.0),
+    ]
+
+
+def _do_chores(rng: np.random.Generator) -> list[DailyItem]:
+    """Standing and short walks in turn, bowing now and then."""
+    items: list[DailyItem] = []
+    for _ in range(int(rng.integers(1, 6))):
+        pace = float(rng.uniform(80.0, 115.0))
+        items += [DailyItem("stand", float(rng.uniform(5.0, 120.0)))]
+        items += [DailyItem("walk", float(rng.uniform(6.0, 20.0)), pace)]
+        if rng.random() < 0.3:
+            items += [DailyItem("stand", 2.0), DailyItem("bow", float(rng.uniform(2.0, 4.0)))]
+    return items
 
 
 def draw_style(seed: int) -> ChestStyle:

@@ -7,7 +7,7 @@ carries its own drawn deviations, so the footprints are the exact truth
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import cos, inf, sin, sqrt
 
 import numpy as np
@@ -173,66 +173,86 @@ def plan(script: Script, walker: Walker, rng: np.random.Generator) -> Plan:
         length, a radius or a time is not positive.
     """
     _check(script)
-    spread = walker.variability
-    x = y = heading = t = 0.0
-    side: Side = "right"
-    opens = True
-    steps: list[Footprint] = []
-    stands: list[tuple[float, float]] = []
-
-    def landing(of: Side, wider_m: float) -> tuple[float, float, float]:
-        lateral = -SIGN[of] * (walker.width_m / 2.0 + wider_m)
-        foot = heading - SIGN[of] * walker.sides[of].toe_out_rad
-        return x - lateral * sin(heading), y + lateral * cos(heading), foot
-
+    walk = _Walk(walker, rng)
     first = {
         s: Footprint(s, -inf, fx, fy, 0.0, foot, 0.0, inf)
         for s in SIDES
-        for fx, fy, foot in (landing(s, 0.0),)
+        for fx, fy, foot in (walk.land(s, 0.0),)
     }
     for item, following in zip(script, (*script[1:], Stand(1.0)), strict=True):
         if isinstance(item, Stand):
-            stands.append((t, t + item.duration_s))
-            t += item.duration_s
-            opens = True
+            walk.stand(item.duration_s)
             continue
         moves = item.moves()
         closing = isinstance(following, Stand)
         if closing:
             moves = [*moves, Move(CLOSING * moves[-1].length_m, 0.0, moves[-1].duration_s)]
         for i, move in enumerate(moves):
-            g = np.clip(rng.standard_normal(6), -CLIP, CLIP)
-            gait = walker.sides[side]
-            length = move.length_m * gait.length_factor * (1.0 + spread.step_length * g[0])
-            # two steps make a stride: √2 keeps the stride's variation at the asked value
-            duration = move.duration_s * gait.time_factor * (1.0 + sqrt(2.0) * spread.step_time * g[1])
-            heading += move.turn_rad / 2.0
-            x += length * cos(heading)
-            y += length * sin(heading)
-            heading += move.turn_rad / 2.0
-            t += duration
-            fx, fy, foot = landing(side, spread.width_m * g[2])
-            steps.append(
-                Footprint(
-                    side=side,
-                    time_s=t,
-                    x_m=fx,
-                    y_m=fy,
-                    path_rad=heading,
-                    foot_rad=foot,
-                    step_m=length,
-                    step_s=duration,
-                    opens=opens,
-                    closes=closing and i == len(moves) - 1,
-                    pitch_rad=spread.pitch_rad * g[3],
-                    knee_rad=spread.knee_rad * g[4],
-                    hip_rad=spread.hip_rad * g[5],
-                )
+            walk.step(move, closes=closing and i == len(moves) - 1)
+    footprints = {s: (first[s], *(f for f in walk.steps if f.side == s)) for s in SIDES}
+    return Plan(tuple(walk.steps), footprints, tuple(walk.stands), walk.t)
+
+
+@dataclass
+class _Walk:
+    """Somebody on the way: where, when, which foot is next, and what was done so far."""
+
+    walker: Walker
+    rng: np.random.Generator
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+    t: float = 0.0
+    side: Side = "right"
+    opens: bool = True
+    steps: list[Footprint] = field(default_factory=list)
+    stands: list[tuple[float, float]] = field(default_factory=list)
+
+    def land(self, of: Side, wider_m: float) -> tuple[float, float, float]:
+        """Where a foot comes down beside the path, and where it points."""
+        lateral = -SIGN[of] * (self.walker.width_m / 2.0 + wider_m)
+        foot = self.heading - SIGN[of] * self.walker.sides[of].toe_out_rad
+        return self.x - lateral * sin(self.heading), self.y + lateral * cos(self.heading), foot
+
+    def stand(self, duration_s: float) -> None:
+        """Stand still; the next step opens a walk."""
+        self.stands.append((self.t, self.t + duration_s))
+        self.t += duration_s
+        self.opens = True
+
+    def step(self, move: Move, *, closes: bool) -> None:
+        """One step of the foot that is next."""
+        spread = self.walker.variability
+        g = np.clip(self.rng.standard_normal(6), -CLIP, CLIP)
+        gait = self.walker.sides[self.side]
+        length = move.length_m * gait.length_factor * (1.0 + spread.step_length * g[0])
+        # two steps make a stride: √2 keeps the stride's variation at the asked value
+        duration = move.duration_s * gait.time_factor * (1.0 + sqrt(2.0) * spread.step_time * g[1])
+        self.heading += move.turn_rad / 2.0
+        self.x += length * cos(self.heading)
+        self.y += length * sin(self.heading)
+        self.heading += move.turn_rad / 2.0
+        self.t += duration
+        fx, fy, foot = self.land(self.side, spread.width_m * g[2])
+        self.steps.append(
+            Footprint(
+                side=self.side,
+                time_s=self.t,
+                x_m=fx,
+                y_m=fy,
+                path_rad=self.heading,
+                foot_rad=foot,
+                step_m=length,
+                step_s=duration,
+                opens=self.opens,
+                closes=closes,
+                pitch_rad=spread.pitch_rad * g[3],
+                knee_rad=spread.knee_rad * g[4],
+                hip_rad=spread.hip_rad * g[5],
             )
-            opens = False
-            side = "left" if side == "right" else "right"
-    footprints = {s: (first[s], *(f for f in steps if f.side == s)) for s in SIDES}
-    return Plan(tuple(steps), footprints, tuple(stands), t)
+        )
+        self.opens = False
+        self.side = "left" if self.side == "right" else "right"
 
 
 def _check(script: Script) -> None:

@@ -7,6 +7,8 @@ and hold the last value (docs/science/timeline.md, "Rule").
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from sagittal.core.errors import Notice, SignalError
@@ -30,35 +32,11 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
         sample_rate_too_low, no_overlap, too_short, clock_jump.
     """
     params = params or TimelineParams()
-    worn = {
-        s: recording.streams[d]
-        for d, s in recording.segments.items()
-        if s is not None and d in recording.streams
-    }
-    too_long = [d for d in recording.long if recording.segments.get(d) is not None]
-    if too_long:  # nor are the others analysed as if it had not been worn
-        raise SignalError(
-            "recording_too_long",
-            f"The recording of “{'”, “'.join(too_long)}” is too long for the protocol "
-            f"'{recording.protocol}'. Cut out the walk, or choose daily life (activity) for a sensor on the "
-            "trunk.",
-        )
-    if not worn:
-        raise SignalError(
-            "no_mapping",
-            "No sensor is assigned to a segment; say which sensor is worn where "
-            f"(sensors found: {', '.join(recording.streams)}).",
-        )
+    worn = _find_worn(recording)
     _refuse_copies(worn)
     notices = list(recording.notices)
     notices += [n for s in worn.values() for n in s.notices]
-    usable = {segment: s for segment, s in worn.items() if s.held("gyr") is not None}
-    if not usable:
-        raise SignalError(
-            "missing_gyro",
-            f"None of the {len(worn)} sensors has a gyroscope signal, so no orientation can be computed. "
-            "Export the recording again with the rate of turn (Gyr_X, Gyr_Y, Gyr_Z).",
-        )
+    usable = _find_usable(worn)
     _check_clocks(usable)
     rate, rate_notices = _common_rate(usable, params)
     start, end, length_notices = _common_range(usable, params)
@@ -82,6 +60,42 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
         notices=(*notices, *rate_notices, *length_notices),
         belt_speed_mps=recording.belt_speed_mps,
     )
+
+
+def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
+    """The sensors that are worn on a segment."""
+    worn = {
+        s: recording.streams[d]
+        for d, s in recording.segments.items()
+        if s is not None and d in recording.streams
+    }
+    too_long = [d for d in recording.long if recording.segments.get(d) is not None]
+    if too_long:  # nor are the others analysed as if it had not been worn
+        raise SignalError(
+            "recording_too_long",
+            f"The recording of “{'”, “'.join(too_long)}” is too long for the protocol "
+            f"'{recording.protocol}'. Cut out the walk, or choose daily life (activity) for a sensor on the "
+            "trunk.",
+        )
+    if not worn:
+        raise SignalError(
+            "no_mapping",
+            "No sensor is assigned to a segment; say which sensor is worn where "
+            f"(sensors found: {', '.join(recording.streams)}).",
+        )
+    return worn
+
+
+def _find_usable(worn: Mapping[Segment, ImuStream]) -> dict[Segment, ImuStream]:
+    """Those with a gyroscope."""
+    usable = {segment: s for segment, s in worn.items() if s.held("gyr") is not None}
+    if not usable:
+        raise SignalError(
+            "missing_gyro",
+            f"None of the {len(worn)} sensors has a gyroscope signal, so no orientation can be computed. "
+            "Export the recording again with the rate of turn (Gyr_X, Gyr_Y, Gyr_Z).",
+        )
+    return usable
 
 
 def _refuse_copies(worn: dict[Segment, ImuStream]) -> None:

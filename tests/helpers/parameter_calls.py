@@ -12,7 +12,8 @@ import numpy as np
 
 from sagittal.core.agreement.exchange import judge_legs
 from sagittal.core.agreement.labels import PATH, sort_by_joints
-from sagittal.core.agreement.slips import PlaceStep, PlaceTurns, judge_turns, question_strides
+from sagittal.core.agreement.place_turns import PlaceStep, PlaceTurns, judge_turns
+from sagittal.core.agreement.slips import question_strides
 from sagittal.core.agreement.standings import StandingTurn, _has_slipped
 from sagittal.core.agreement.terms import LevelMotion, find_terms
 from sagittal.core.calibration.functional import find_functional_movements

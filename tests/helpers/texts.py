@@ -29,6 +29,7 @@ WHOLE: Final = (
     "core/agreement/tell.py",
     "core/agreement/tell_live.py",
     "core/calibration/score.py",
+    "core/calibration/score_rules.py",
     "core/change",
     "core/subject/condition.py",
     "core/estimators.py",

@@ -17,7 +17,8 @@ import numpy as np
 from sagittal.core.agreement import check_agreement
 from sagittal.core.body.mounting import mount_sensors
 from sagittal.core.calibration import calibrate
-from sagittal.core.calibration.score import RULES, CalibrationScore, score_calibration
+from sagittal.core.calibration.score import CalibrationScore, score_calibration
+from sagittal.core.calibration.score_rules import RULES
 from sagittal.core.frames import SHANK, SIDES, THIGH, Segment
 from sagittal.core.fusion.mahony import estimate_orientations
 from sagittal.core.pipeline import PipelineConfig

@@ -6,7 +6,7 @@ A sparse mode of visibly lower accuracy: never take stride lengths from it where
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Final, get_args
 
@@ -82,16 +82,12 @@ def l7s_poses(
     if both_ways:
         valid = np.stack([orientations.valid[s] if s in measured else steps["left"] for s in BODIES], axis=1)
     offsets, windows = place_windows(take, valid, rate, params)
-    figure, P = _Figure(take), np.empty((0, 0))
-    for window in windows:
-        figure.add(window)
-        P = window.P
-        del window
+    figure = _Figure(take)
+    P = figure.add_all(windows)
     known = KnownSamples().push([orientations.valid[s] for s in measured], take.step)
     shown = figure.measure()
     del take, windows
     checks = walking_checks(figure.seen, model, rate)
-    variances = np.diag(P)[:18].reshape(3, 6)[:, :3]
     poses = Poses(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
@@ -105,10 +101,7 @@ def l7s_poses(
         diagnostics={
             "adjoint": params.adjoint,
             **shown,
-            "step_share": {s: float(np.mean(steps[s])) for s in LEGS},
-            "sensor_ahead_m": {s: float(-offsets[i, 2]) for i, s in enumerate(LEGS)},
-            "position_sd_m": {s: float(np.sqrt(x.max())) for s, x in zip(BODIES, variances, strict=True)},
-            "min_eigenvalue": float(np.linalg.eigvalsh(P)[0]),
+            **_describe_filter(steps, offsets, P),
             "gap_s": longest_gaps({s: orientations.valid[s] for s in measured}, rate),
             **checks,
         },
@@ -154,6 +147,15 @@ class _Figure:
             self._turned.append(angle_between(turned, measured).reshape(-1, 2))
         give_pages_back((*self.q.values(), *self.p.values()))
 
+    def add_all(self, windows: Iterable[PlacedWindow]) -> Floats:
+        """All windows of the take, one at a time; P at their end."""
+        P = np.empty((0, 0))
+        for window in windows:
+            self.add(window)
+            P = window.P
+            del window
+        return P
+
     def measure(self) -> dict[str, object]:
         """The diagnostics of `l7s_poses` that the windows give."""
         turned, moving = np.concatenate(self._turned), np.count_nonzero(self._moving)
@@ -166,6 +168,17 @@ class _Figure:
             "excess_m": {s: float(self._excess[i]) for i, s in enumerate(LEGS)},
             "foot_turned_rad": {s: float(turned[:, i].mean()) for i, s in enumerate(LEGS)},
         }
+
+
+def _describe_filter(steps: Mapping[Side, Bools], offsets: Floats, P: Floats) -> dict[str, object]:
+    """The diagnostics of `l7s_poses` that steps, sensors' places and covariance give."""
+    variances = np.diag(P)[:18].reshape(3, 6)[:, :3]
+    return {
+        "step_share": {s: float(np.mean(steps[s])) for s in LEGS},
+        "sensor_ahead_m": {s: float(-offsets[i, 2]) for i, s in enumerate(LEGS)},
+        "position_sd_m": {s: float(np.sqrt(x.max())) for s, x in zip(BODIES, variances, strict=True)},
+        "min_eigenvalue": float(np.linalg.eigvalsh(P)[0]),
+    }
 
 
 def _never_still(steps: Mapping[Side, Bools]) -> tuple[Notice, ...]:

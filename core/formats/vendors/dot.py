@@ -9,7 +9,7 @@ in m/s² and angular rate in deg/s in the sensor's axes, orientation sensor → 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -20,6 +20,7 @@ from sagittal.core.formats.aliases import segment_in
 from sagittal.core.formats.draft import WRAP_32, Draft, make_draft
 from sagittal.core.formats.source import stem_of
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, SourceSpec
+from sagittal.core.frames import Floats
 
 LABEL: Final = "Movella DOT CSV"
 _HEAD: Final = 40
@@ -51,17 +52,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
     """
     lines = text.head_lines(data, _HEAD)
     separator = text.read_separator(lines[0]) or b","
-    at = next(
-        (i for i, line in enumerate(lines) if _COUNTER in text.split(line, separator) and b":" not in line),
-        None,
-    )
-    if at is None:
-        raise FormatError("bad_table", f"{source} has no header line with {_COUNTER}; export it again.")
-    says = {
-        cells[0].rstrip(": ").lower(): cells[1]
-        for line in lines[:at]
-        if (cells := text.split(line, separator))[1:]
-    }
+    at, says = _read_keys(lines, separator, source)
     device = _device(says, source)
     names = text.split(lines[at], separator)
     if not set(_ACC) <= set(names):
@@ -78,16 +69,8 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
         wanted,
         decimal_comma=text.has_decimal_comma(text.first_row(body), separator),
     )
-    fine = table.values.get(_FINE)
-    notices = list(table.notices)
     rate = spec.rate_hz if spec and spec.rate_hz else _rate(says)
-    if fine is not None and np.isfinite(fine).any():
-        clock, ticks, wrap = "device", fine * _MICRO, WRAP_32 * _MICRO
-        if says.get("syncstatus", "").lower().startswith("un"):
-            ticks = np.mod(ticks - ticks[np.isfinite(ticks)][0], wrap)
-            notices.append(_unsynchronised(source))
-    else:
-        clock, ticks, wrap = "counter", table.values[_COUNTER], float(WRAP_32)
+    clock, ticks, wrap, told = _read_clock(table, says, source)
     return (
         make_draft(
             device,
@@ -101,11 +84,40 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
             mag=table.stack(_MAG) if _MAG in groups else None,
             quat=table.stack(_QUAT) if _QUAT in groups else None,
             rate_hz=rate,
-            notices=notices,
+            notices=[*table.notices, *told],
             wrap=wrap,
             segment=segment_in(says.get("devicetag", "")),
         ),
     )
+
+
+def _read_keys(lines: Sequence[bytes], separator: bytes, source: str) -> tuple[int, dict[str, str]]:
+    """Which line is the header, and what the lines before it say by key."""
+    at = next(
+        (i for i, line in enumerate(lines) if _COUNTER in text.split(line, separator) and b":" not in line),
+        None,
+    )
+    if at is None:
+        raise FormatError("bad_table", f"{source} has no header line with {_COUNTER}; export it again.")
+    says = {
+        cells[0].rstrip(": ").lower(): cells[1]
+        for line in lines[:at]
+        if (cells := text.split(line, separator))[1:]
+    }
+    return at, says
+
+
+def _read_clock(
+    table: text.Columns, says: Mapping[str, str], source: str
+) -> tuple[str, Floats, float, tuple[Notice, ...]]:
+    """Kind of clock, its ticks, after how many it starts again, and what is to be said of it."""
+    fine = table.values.get(_FINE)
+    if fine is None or not np.isfinite(fine).any():
+        return "counter", table.values[_COUNTER], float(WRAP_32), ()
+    ticks, wrap = fine * _MICRO, WRAP_32 * _MICRO
+    if not says.get("syncstatus", "").lower().startswith("un"):
+        return "device", ticks, wrap, ()
+    return "device", np.mod(ticks - ticks[np.isfinite(ticks)][0], wrap), wrap, (_unsynchronised(source),)
 
 
 def _device(says: Mapping[str, str], source: str) -> str:

@@ -105,22 +105,11 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> Draft:
     table = text.read_columns(body, source, layout.separator, names, wanted, decimal_comma=comma)
     notices = [*table.notices, *cut_notice(source, cut)]
     acc = table.stack(_ACC) * _factor(ACC_UNITS, spec.acc_unit if spec else None)
-    gyr = table.stack(_GYR) * _factor(GYR_UNITS, spec.gyr_unit if spec else None) if _GYR in groups else None
-    if gyr is None or not np.isfinite(gyr).any():
-        gyr = None
-        notices.append(
-            Notice(
-                "missing_gyro",
-                f"{source} has no gyroscope signal, so nothing can be computed from this sensor; "
-                'export it again with "rate of turn" (Gyr_X, Gyr_Y, Gyr_Z) switched on.',
-                device,
-            )
-        )
+    gyr = _stack_known(table, _GYR, groups, _factor(GYR_UNITS, spec.gyr_unit if spec else None))
+    if gyr is None:
+        notices.append(_no_gyr(source, device))
     if not np.isfinite(acc).any():
         raise _no_acc(source, device, names)
-    mag = table.stack(_MAG) if _MAG in groups else None
-    if mag is not None and not np.isfinite(mag).any():
-        mag = None
     draft = Draft(
         device_id=device,
         source=source,
@@ -128,7 +117,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> Draft:
         ticks=table.values["PacketCounter"],
         acc=acc,
         gyr=gyr,
-        mag=mag,
+        mag=_stack_known(table, _MAG, groups),
         quat=_orientation(table, groups),
         rate_hz=_rate(layout, table, spec),
         notices=tuple(replace(n, sensor=device) for n in notices),
@@ -136,6 +125,25 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> Draft:
     if not np.isfinite(draft.ticks).any():
         raise FormatError("empty", f"{source} has no packet counter values; export it again.", sensor=device)
     return draft
+
+
+def _stack_known(
+    table: text.Columns, group: tuple[str, ...], groups: list[tuple[str, ...]], factor: float = 1.0
+) -> Floats | None:
+    """The columns of a signal side by side; None where the file has none or no value in them."""
+    if group not in groups:
+        return None
+    signal = table.stack(group) * factor
+    return signal if np.isfinite(signal).any() else None
+
+
+def _no_gyr(source: str, device: str) -> Notice:
+    return Notice(
+        "missing_gyro",
+        f"{source} has no gyroscope signal, so nothing can be computed from this sensor; "
+        'export it again with "rate of turn" (Gyr_X, Gyr_Y, Gyr_Z) switched on.',
+        device,
+    )
 
 
 def cut_notice(source: str, cut: bool) -> list[Notice]:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from sagittal.core.body import arms
-from sagittal.core.body.arms import ArmParams, MeasuredArms, measure_arms, report_ahead
+from sagittal.core.body.arm_params import ArmParams
+from sagittal.core.body.arms import MeasuredArms, measure_arms, report_ahead
 from sagittal.core.body.erkf.headings import turn_forward_axes
 from sagittal.core.body.model import BodyModel
 from sagittal.core.body.places import joint_places, sensor_place

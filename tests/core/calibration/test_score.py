@@ -12,13 +12,12 @@ from sagittal.core.agreement import Agreement
 from sagittal.core.calibration import calibrate
 from sagittal.core.calibration.knee_axis import find_knee_axes
 from sagittal.core.calibration.score import (
-    RULES,
     CalibrationCheck,
     CalibrationScore,
-    CheckName,
     judge_together,
     score_calibration,
 )
+from sagittal.core.calibration.score_rules import RULES, CheckName
 from sagittal.core.frames import Floats, Segment
 from sagittal.core.rotation import about, exp, multiply, rotate, to_matrix
 from sagittal.core.signals.calibrated import CalibratedRecording, SegmentCalibration

@@ -1,0 +1,239 @@
+"""How the joints' places beside a sensor turn in its axes, and when they turned for good: the judge of slips.
+
+Equations: docs/science/agreement.md, "Slipped sensors".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numba
+import numpy as np
+
+from sagittal.core.agreement.lags import MAD
+from sagittal.core.agreement.params import SlipParams
+from sagittal.core.agreement.windows import JointWindows
+from sagittal.core.frames import Bools, Floats, Segment
+
+INDEPENDENT: Final = 5.0
+"""More windows side by side than this do not make a median surer: gait changes between them too."""
+
+DOUBT: Final = 2.0
+"""Another sensor's turn counts beyond so many times its own scatter."""
+
+FINEST_S: Final = 0.5
+LIKELY: Final = 0.5
+"""Moments at which even the means differ by less than this share of the smallest slip are passed over."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceTurns:
+    """Turn of the joints' places about the axis across, window by window.
+
+    Parameters
+    ----------
+    t_s, turn : (m,) s, rad. places : (m, joints, 3) across the axis, turned back, m.
+    step_s : between windows.
+    """
+
+    t_s: Floats
+    turn: Floats
+    places: Floats
+    step_s: float
+
+
+@dataclass(frozen=True)
+class PlaceStep:
+    """A turn for good: when, by how much, over its scatter, and that, s and rad."""
+
+    at_s: float
+    size: float
+    z: float
+    sd: float
+
+
+def find_turns(
+    joints: Sequence[JointWindows], axes: Mapping[Segment, Floats], params: SlipParams
+) -> dict[Segment, PlaceTurns]:
+    """How the places beside every sensor turn.
+
+    Parameters
+    ----------
+    joints : with the windows that speak (`is_moving`). axes : sensor → axis it turns about most (3,).
+    """
+    found = {s: _find_place_turns(s, joints, axis, params) for s, axis in axes.items()}
+    return {s: x for s, x in found.items() if x is not None}
+
+
+def judge_turns(
+    turns: Mapping[Segment, PlaceTurns], half: float, params: SlipParams, since_s: float = -np.inf
+) -> dict[Segment, PlaceStep]:
+    """Sensor → when its places turned for good, while those of the others did not.
+
+    Parameters
+    ----------
+    half : of a window's width, s. since_s : moments before are not asked for.
+    """
+    steps: dict[Segment, PlaceStep] = {}
+    for segment, found in turns.items():
+        step = _find_best_step(found, half, params, since_s)
+        if step is None or not _is_alone(segment, step, turns, half, params):
+            continue
+        if _measure_misfit(found, step, half) < params.misfit:
+            steps[segment] = step
+    return steps
+
+
+def _find_place_turns(
+    segment: Segment,
+    joints: Sequence[JointWindows],
+    axis: Floats,
+    params: SlipParams,
+) -> PlaceTurns | None:
+    """Turns of the places from where they typically lie, of windows in which all its joints speak."""
+    own = [w for w in joints if segment in (w.first, w.second)]
+    # one joint alone says too little, except at a foot, which has no other
+    if not own or (len(own) < 2 and not segment.startswith("foot")):
+        return None
+    t = own[0].t_s
+    for w in own[1:]:
+        t = np.intersect1d(t, w.t_s, assume_unique=True)
+    if len(t) < 2 * params.least_windows:
+        return None
+    V = np.stack([w.place_in(segment)[np.isin(w.t_s, t, assume_unique=True)] for w in own], axis=1)
+    turn, back = turn_places(V, axis)
+    return PlaceTurns(t, np.unwrap(turn), back, float(np.median(np.diff(t))))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def turn_places(V, axis):  # type: ignore[no-untyped-def]
+    """Turns (m,) about an axis (3,) of places V (m, joints, 3) from their median, and the places across the
+    axis turned back by them."""
+    m, joints = V.shape[:2]
+    x, y, z = axis
+    across, back = np.empty(V.shape), np.empty(V.shape)
+    for k in range(m):
+        for j in range(joints):
+            along = V[k, j, 0] * x + V[k, j, 1] * y + V[k, j, 2] * z
+            for c in range(3):
+                across[k, j, c] = back[k, j, c] = V[k, j, c] - along * axis[c]
+    turn, typical = np.zeros(m), np.empty((joints, 3))
+    for _ in range(2):
+        for j in range(joints):
+            for c in range(3):
+                typical[j, c] = np.median(back[:, j, c])
+        for k in range(m):
+            sine = cosine = 0.0
+            for j in range(joints):
+                a, b, d = typical[j]
+                p, q, r = across[k, j]
+                sine += x * (b * r - d * q) + y * (d * p - a * r) + z * (a * q - b * p)
+                cosine += a * p + b * q + d * r
+            turn[k] = np.arctan2(sine, cosine)
+            c0, s0 = np.cos(turn[k]), np.sin(turn[k])
+            for j in range(joints):
+                p, q, r = across[k, j]
+                back[k, j, 0] = c0 * p - s0 * (y * r - z * q)
+                back[k, j, 1] = c0 * q - s0 * (z * p - x * r)
+                back[k, j, 2] = c0 * r - s0 * (x * q - y * p)
+    return turn, back
+
+
+def measure_step(
+    found: PlaceTurns, at_s: float, half: float, floor: float, reach: float = np.inf
+) -> tuple[float, float] | None:
+    """Turn between windows wholly before and wholly after a moment, and its standard deviation."""
+    size, sd = _compare_sides(found.t_s, found.turn, found.step_s, at_s, half, floor, reach)
+    return None if np.isnan(size) else (size, sd)
+
+
+def is_lasting(found: PlaceTurns, at_s: float, turn_rad: float, half: float, params: SlipParams) -> bool:
+    """Whether what turned at a moment is still turned; also where no window from before is left."""
+    measured = measure_step(found, at_s, half, params.floor_rad)
+    return measured is None or measured[0] / turn_rad >= params.lasting
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _compare_sides(t_s, turn, step_s, at_s, half, floor, reach):  # type: ignore[no-untyped-def]
+    """Difference of the medians of both sides and its spread; not a number where a side has no window."""
+    before = turn[(t_s <= at_s - half) & (t_s >= at_s - reach)]
+    after = turn[(t_s >= at_s + half) & (t_s <= at_s + reach)]
+    if len(before) == 0 or len(after) == 0:
+        return np.nan, np.nan
+    spread, inverse = floor, 0.0
+    for x in (before, after):
+        spread = max(spread, MAD * np.median(np.abs(x - np.median(x))))
+        inverse += 1.0 / min(max(len(x) * step_s / (2.0 * half), 1.0), INDEPENDENT)
+    return np.median(after) - np.median(before), spread * np.sqrt(inverse)
+
+
+def _find_best_step(found: PlaceTurns, half: float, params: SlipParams, since_s: float) -> PlaceStep | None:
+    """The moment before and after which the places differ most clearly, for good; None below the limits."""
+    best, most = None, 0.0
+    least = params.least_windows
+    first, last = max(found.t_s[least - 1] + half, since_s), found.t_s[-least] - half
+    moments = np.arange(first, last + 0.01, max(FINEST_S, 0.5 * found.step_s))
+    for at in moments[_is_likely(found, moments, half, LIKELY * params.least_rad)]:
+        measured = measure_step(found, float(at), half, params.floor_rad, params.near_s)
+        if measured is None or not is_lasting(found, float(at), measured[0], half, params):
+            continue
+        size, sd = measured
+        z = abs(size) / sd
+        if z * abs(size) > most:
+            best, most = PlaceStep(float(at), size, z, sd), z * abs(size)
+    if best is None or abs(best.size) <= params.least_rad or best.z <= params.z:
+        return None
+    return replace(best, at_s=_find_moment(found, best, half, moments, params))
+
+
+def _find_moment(
+    found: PlaceTurns, step: PlaceStep, half: float, moments: Floats, params: SlipParams
+) -> float:
+    """When the turn was: windows that contain it show a share of it, so that it is a ramp of their width."""
+    best, least = step.at_s, np.inf
+    near = np.abs(found.t_s - step.at_s) <= params.near_s
+    t, x = found.t_s[near], found.turn[near]
+    for at in moments[np.abs(moments - step.at_s) <= 0.5 * params.near_s]:
+        before, after = x[t <= at - half], x[t >= at + half]
+        if not len(before) or not len(after):
+            continue
+        share = np.clip((t - at + half) / (2.0 * half), 0.0, 1.0)
+        ramp = np.median(before) + share * (np.median(after) - np.median(before))
+        left = float(np.abs(x - ramp).sum())
+        if left < least:
+            best, least = float(at), left
+    return best
+
+
+def _is_likely(found: PlaceTurns, moments: Floats, half: float, least: float) -> Bools:
+    """Moments at which the mean turn before and after differs by more than least: quick to tell."""
+    total = np.concatenate(([0.0], np.cumsum(found.turn)))
+    a = np.searchsorted(found.t_s, moments - half + 1e-9)
+    b = np.searchsorted(found.t_s, moments + half - 1e-9)
+    n = len(found.turn)
+    after = (total[n] - total[b]) / np.maximum(n - b, 1)
+    return np.asarray(np.abs(after - total[a] / np.maximum(a, 1)) > least, np.bool_)
+
+
+def _is_alone(
+    segment: Segment, step: PlaceStep, turns: Mapping[Segment, PlaceTurns], half: float, params: SlipParams
+) -> bool:
+    """Whether the other sensors stay where they are at that moment; a change of gait turns several."""
+    others = []
+    for other, found in turns.items():
+        if other == segment:
+            continue
+        measured = measure_step(found, step.at_s, half, params.floor_rad, params.near_s)
+        if measured is not None:
+            others.append(max(0.0, abs(measured[0]) - DOUBT * measured[1]))
+    return len(others) > 1 and max(others) < params.alone * abs(step.size)
+
+
+def _measure_misfit(found: PlaceTurns, step: PlaceStep, half: float) -> float:
+    """What a turn does not carry from before to after, of the size of the places."""
+    before = np.median(found.places[found.t_s <= step.at_s - half], axis=0)
+    after = np.median(found.places[found.t_s >= step.at_s + half], axis=0)
+    size = 0.5 * float(np.linalg.norm(before) + np.linalg.norm(after))
+    return float(np.linalg.norm(before - after) / max(size, 1e-9))

@@ -1,0 +1,64 @@
+"""What a stage lets go of: an analysis without what no stage behind it reads, so that long takes fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sagittal.core.body.poses import figure_precision
+from sagittal.core.events.lumbar import TRUNK
+from sagittal.core.frames import FOOT
+from sagittal.core.fusion.orientations import LastReading
+from sagittal.core.pipeline.analysis import TakeAnalysis, require_stage
+from sagittal.core.signals.recording import UniformRecording
+
+
+def forget_magnetometers(analysis: TakeAnalysis) -> TakeAnalysis:
+    """No magnetometers: behind quality only a comparison of filters reads them."""
+    source, uniform, agreed = analysis.source, analysis.uniform, analysis.agreed
+    streams = {d: s.change(mag=None) for d, s in source.streams.items()}
+    analysis = replace(analysis, source=replace(source, streams=streams))
+    if uniform is not None:
+        analysis = replace(analysis, uniform=_without_magnetometers(uniform))
+    if agreed is not None:
+        whole = None if agreed.whole is None else _without_magnetometers(agreed.whole)
+        kept = replace(agreed, recording=_without_magnetometers(agreed.recording), whole=whole)
+        analysis = replace(analysis, agreed=kept)
+    return analysis
+
+
+def _without_magnetometers(recording: UniformRecording) -> UniformRecording:
+    return replace(recording, sensors={s: x.change(mag=None) for s, x in recording.sensors.items()})
+
+
+def keep_what_poses_read(analysis: TakeAnalysis) -> TakeAnalysis:
+    """Of the orientations before mounting only the feet's, which `measure_walk` falls back on; those behind
+    it for the estimator alone, which lets go of what it refines while it runs."""
+    fused, mounted = require_stage(analysis.fused, "orientation"), require_stage(analysis.mounted, "mounting")
+    fused = replace(fused, q={s: q for s, q in fused.q.items() if s in FOOT.values()})
+    passed = replace(mounted.orientations, q=LastReading(mounted.orientations.q))
+    return replace(analysis, fused=fused, mounted=replace(mounted, orientations=passed))
+
+
+def keep_refined_alone(analysis: TakeAnalysis) -> TakeAnalysis:
+    """No orientations from before the estimator; a foot that it left out keeps what it had.
+
+    `measure_walk` falls back on the feet's where there are no angles: their stage does not fail.
+    """
+    mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
+    fused, refined = require_stage(analysis.fused, "orientation"), posed.orientations
+    fused = replace(fused, q={s: refined.q.get(s, q) for s, q in fused.q.items()})
+    return replace(analysis, fused=fused, mounted=replace(mounted, orientations=refined))
+
+
+def keep_what_is_measured(analysis: TakeAnalysis) -> TakeAnalysis:
+    """Orientations of feet and trunk alone, of which there are parameters; of a long take the figure as it is
+    written."""
+    mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
+    kept = {s: q for s, q in posed.orientations.q.items() if s in (*FOOT.values(), *TRUNK)}
+    orientations, poses = replace(posed.orientations, q=kept), posed.poses
+    kind = figure_precision(len(poses.t_s))
+    turned = {s: q if s in kept else np.asarray(q, kind) for s, q in poses.q.items()}
+    posed = replace(posed, orientations=orientations, poses=replace(poses, q=turned))
+    return replace(analysis, mounted=replace(mounted, orientations=orientations), posed=posed)
