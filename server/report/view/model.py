@@ -31,13 +31,14 @@ from sagittal.server.report.files.bundle import Bundle
 from sagittal.server.report.files.columns import reduce_to_plain
 from sagittal.server.report.view.daily_life import DailyLifeView, daily_life_view
 from sagittal.server.report.view.functional import TEST_NORM_NOTE, FunctionalView, functional_view
-from sagittal.server.report.view.headline import Headline, find_standouts, say_badge
+from sagittal.server.report.view.headline import Headline, say_badge
 from sagittal.server.report.view.level import choose_zero, level_rows
 from sagittal.server.report.view.model_json import panel_json, profile_json, round_curve
 from sagittal.server.report.view.notes import curve_notes, norm_note
 from sagittal.server.report.view.profile import ProfileView, profile_view
 from sagittal.server.report.view.quality_box import QualityBox, quality_box
 from sagittal.server.report.view.squat import NORM_NOTE, UNSURE_FIGURES, SquatView, squat_view
+from sagittal.server.report.view.standouts import find_standouts
 from sagittal.server.report.view.table import ParameterRow, group_rows, parameter_rows
 from sagittal.server.report.words.estimator import (
     EstimatorView,
