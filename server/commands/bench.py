@@ -56,10 +56,23 @@ def bench(
     if folder is None or not folder.is_dir():
         sys.stderr.write(f"sagittal bench {what} needs a folder of recordings with reference, or --list.\n")
         return 2
+    trials = _read_trials(folder)
+    if not trials:
+        sys.stderr.write(
+            f"No recording with reference in {folder} (docs/science/filters.md says the format).\n"
+        )
+        return 1
+    rows = _score_all(trials)
+    if out is not None:
+        _write(out, rows)
+    _print_scores(rows, every)
+    return 0
+
+
+def _read_trials(folder: Path) -> list[ReferenceTrial]:
+    """Recordings of a folder that can be read; of the others what is wrong is said."""
     from sagittal.core.errors import FormatError
     from sagittal.core.fusion.algorithms.benchmark import read_trial
-    from sagittal.core.fusion.algorithms.choice import LABELS, OWN
-    from sagittal.core.fusion.algorithms.listed import ALGORITHMS
 
     trials = []
     for path in sorted(folder.glob("*.npz")):
@@ -67,15 +80,20 @@ def bench(
             trials.append(read_trial(path.stem, path.read_bytes()))
         except FormatError as error:
             sys.stderr.write(f"{error}\n")
-    if not trials:
-        sys.stderr.write(
-            f"No recording with reference in {folder} (docs/science/filters.md says the format).\n"
-        )
-        return 1
+    return trials
+
+
+def _score_all(trials: Sequence[ReferenceTrial]) -> list[Row]:
+    from sagittal.core.fusion.algorithms.choice import OWN
+    from sagittal.core.fusion.algorithms.listed import ALGORITHMS
+
     rows = [_score(algorithm, trial) for algorithm in ALGORITHMS for trial in trials]
-    rows += [_score_own(own, trial) for own in OWN for trial in trials]
-    if out is not None:
-        _write(out, rows)
+    return rows + [_score_own(own, trial) for own in OWN for trial in trials]
+
+
+def _print_scores(rows: Sequence[Row], every: bool) -> None:
+    from sagittal.core.fusion.algorithms.choice import LABELS
+
     shown = rows if every else [_average(rows, x) for x in LABELS.values()]
     sys.stdout.write(
         _table(
@@ -86,7 +104,6 @@ def bench(
         "RMS error over the moving phase; the gyroscope's bias at rest taken off, and left in.\n"
     )
     sys.stdout.flush()
-    return 0
 
 
 def _list_algorithms() -> list[Sequence[str]]:

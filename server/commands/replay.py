@@ -52,37 +52,53 @@ def replay(
     -------
     0 when everything is acknowledged and the take is finished, 1 when not.
     """
-    from sagittal.server.live.client import StreamFaults, stream
-    from sagittal.server.live.pairing import pair
-    from sagittal.server.live.playback import cut, hello_of, pace_batches
+    from sagittal.server.live.playback import cut
 
     try:
         _check(speed, drop, jitter)
         recording = _read(paths, manifest)
         batches = cut(recording, batch)
-        pairing = pair(to, code)
-        hello = hello_of(recording, pairing.take)
-        _say(
-            f"Streaming {len(hello.sensors)} sensors, {batches[-1].at_s:.1f} s in {len(batches)} batches, to "
-            f"{pairing.session_title or 'the session'} of patient {pairing.patient_code}."
-        )
-        if not any(sensor.segment for sensor in hello.sensors):
-            _say("No sensor is assigned to a segment, so nothing can be estimated live; give a --manifest.")
-        report = asyncio.run(
-            stream(
-                pairing.socket,
-                pairing.token,
-                hello,
-                pace_batches(batches, speed),
-                faults=StreamFaults(drop, jitter / 1000.0),
-                hear=_heard,
-            )
-        )
+        report = _stream(recording, batches, to, code, speed=speed, drop=drop, jitter=jitter)
     except SagittalError as error:
         sys.stderr.write(f"Not replayed ({error.code}): {error.message}\n")
         return 1
     _say(_summary(report, batches))
     return 0 if report.problem is None else 1
+
+
+def _stream(
+    recording: Recording,
+    batches: Sequence[DueBatch],
+    to: str,
+    code: str,
+    *,
+    speed: float,
+    drop: float,
+    jitter: float,
+) -> StreamReport:
+    """Pair with the server and stream to the end; `jitter` in ms."""
+    from sagittal.server.live.client import StreamFaults, stream
+    from sagittal.server.live.pairing import pair
+    from sagittal.server.live.playback import hello_of, pace_batches
+
+    pairing = pair(to, code)
+    hello = hello_of(recording, pairing.take)
+    _say(
+        f"Streaming {len(hello.sensors)} sensors, {batches[-1].at_s:.1f} s in {len(batches)} batches, to "
+        f"{pairing.session_title or 'the session'} of patient {pairing.patient_code}."
+    )
+    if not any(sensor.segment for sensor in hello.sensors):
+        _say("No sensor is assigned to a segment, so nothing can be estimated live; give a --manifest.")
+    return asyncio.run(
+        stream(
+            pairing.socket,
+            pairing.token,
+            hello,
+            pace_batches(batches, speed),
+            faults=StreamFaults(drop, jitter / 1000.0),
+            hear=_heard,
+        )
+    )
 
 
 def _check(speed: float, drop: float, jitter: float) -> None:

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from sagittal.server.commands.options import DataDir
-from sagittal.server.settings import load_settings
+from sagittal.server.settings import Settings, load_settings
+
+if TYPE_CHECKING:
+    from sagittal.server.clinic.patients import Patient
+    from sagittal.server.downloads.deidentified import ResearchKey
+    from sagittal.server.storage.db import Database
 
 
 def research(
@@ -43,9 +49,7 @@ def research(
     """
     from sagittal.core.errors import SagittalError
     from sagittal.server.downloads import deidentified
-    from sagittal.server.storage import fs
     from sagittal.server.storage.db import Database
-    from sagittal.server.storage.files.blob_opening import open_blobs
     from sagittal.server.storage.migrate import MigrationError, require_current
 
     settings = load_settings({"data_dir": data_dir})
@@ -58,30 +62,61 @@ def research(
             raise SagittalError("no_key", f"{key} is not there; give the key of the pseudonym.")
         secret = deidentified.open_key(key)
         with closing(Database(settings.database_source)) as db:
-            with db.read() as c:
-                if who is not None:
-                    found = deidentified.find_person(c, secret, who)
-                    sys.stdout.write(f"{who} is {found.code}\n" if found else f"{who} is nobody here\n")
-                    return 0 if found else 1
-                asked = deidentified.list_chosen(c, patients)
-                chosen = [p for p in asked if without_consent or deidentified.has_agreed(c, p.id)]
-            if not chosen:
-                raise SagittalError("nobody", "None of them has agreed to research; see --without-consent.")
+            if who is not None:
+                return _name_person(db, secret, who)
+            chosen, asked = _choose(db, patients, without_consent)
             target = (out or Path()).absolute()
-            fs.make_folder(target.parent)
-            with fs.IncomingFile(target.parent) as incoming:
-                for piece in deidentified.export_deidentified(
-                    db, open_blobs(settings), secret, chosen, with_signals=signals
-                ):
-                    incoming.write(piece)
-                incoming.keep(target)
+            _write_zip(target, settings, db, secret, chosen, signals)
     except (MigrationError, SagittalError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
     if is_new:
         sys.stdout.write(f"{key} is a new key: who has it can lead pseudonyms back. Keep it in the clinic.\n")
-    sys.stdout.write(
-        f"Written: {target}, {len(chosen)} patients; {len(asked) - len(chosen)} have not agreed.\n"
-    )
+    sys.stdout.write(f"Written: {target}, {len(chosen)} patients; {asked - len(chosen)} have not agreed.\n")
     sys.stdout.flush()
     return 0
+
+
+def _name_person(db: Database, secret: ResearchKey, who: str) -> int:
+    """Say whose pseudonym it is; 1 when it is nobody's."""
+    from sagittal.server.downloads import deidentified
+
+    with db.read() as c:
+        found = deidentified.find_person(c, secret, who)
+    sys.stdout.write(f"{who} is {found.code}\n" if found else f"{who} is nobody here\n")
+    return 0 if found else 1
+
+
+def _choose(db: Database, codes: tuple[str, ...], without_consent: bool) -> tuple[list[Patient], int]:
+    """Patients to export, and how many were asked for."""
+    from sagittal.core.errors import SagittalError
+    from sagittal.server.downloads import deidentified
+
+    with db.read() as c:
+        asked = deidentified.list_chosen(c, codes)
+        chosen = [p for p in asked if without_consent or deidentified.has_agreed(c, p.id)]
+    if not chosen:
+        raise SagittalError("nobody", "None of them has agreed to research; see --without-consent.")
+    return chosen, len(asked)
+
+
+def _write_zip(
+    target: Path,
+    settings: Settings,
+    db: Database,
+    secret: ResearchKey,
+    chosen: Sequence[Patient],
+    signals: bool,
+) -> None:
+    """Write the file; it takes its place when it is whole."""
+    from sagittal.server.downloads import deidentified
+    from sagittal.server.storage import fs
+    from sagittal.server.storage.files.blob_opening import open_blobs
+
+    fs.make_folder(target.parent)
+    with fs.IncomingFile(target.parent) as incoming:
+        for piece in deidentified.export_deidentified(
+            db, open_blobs(settings), secret, chosen, with_signals=signals
+        ):
+            incoming.write(piece)
+        incoming.keep(target)

@@ -9,9 +9,13 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import closing
+from typing import TYPE_CHECKING
 
 from sagittal.server.commands.options import DataDir, Whole
 from sagittal.server.settings import Settings, SettingsError, load_settings
+
+if TYPE_CHECKING:
+    from sagittal.server.web_server.listener import ListeningSocket
 
 
 def serve(
@@ -60,58 +64,22 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
     from sagittal.core.errors import SagittalError
     from sagittal.server.app import create_app
     from sagittal.server.log import start_log
-    from sagittal.server.nodes.registry import Nodes
     from sagittal.server.processes.supervisor import Workers
-    from sagittal.server.safekeeping.custody import (
-        StrangersError,
-        refuse_half_restored,
-        refuse_strangers,
-        refuse_wrong_clock,
-    )
+    from sagittal.server.safekeeping.custody import StrangersError
     from sagittal.server.storage import fs
-    from sagittal.server.storage.db import Database
-    from sagittal.server.storage.files.blob_opening import (
-        note_bucket,
-        open_blobs,
-        require_use,
-        warn_of_leftovers,
-    )
-    from sagittal.server.storage.migrate import MigrationError, read_revision, upgrade
+    from sagittal.server.storage.migrate import MigrationError
     from sagittal.server.web_server.build import build_server
     from sagittal.server.web_server.connection import ConnectionLimits
-    from sagittal.server.web_server.listener import make_room, open_listener
+    from sagittal.server.web_server.listener import make_room
     from sagittal.server.worker.backing_up import BackupKeeper
 
     settings.require_private_traffic()
     start_log(settings)
     # what SQLite and libraries make is for the server's user only, as what we make is
     os.umask(0o077)
-    served, holder = contextlib.ExitStack(), f"process {os.getpid()}"
+    served = contextlib.ExitStack()
     try:
-        fs.make_folder(settings.data_dir)
-        served.enter_context(fs.Lock(settings.lock, holder, shared=bool(settings.node_name)))
-        # before anything else is made in a folder that `sagittal restore` wants empty
-        refuse_half_restored(settings)
-        if settings.node_name:
-            fs.make_folder(settings.node_folder)
-            served.enter_context(fs.Lock(settings.node_lock, holder))
-        let_in = require_use(open_blobs(settings))
-        refuse_strangers(settings)
-        read_revision(settings.database_source)  # says why PostgreSQL is not reached
-        if settings.node_name:
-            with closing(Database(settings.database_source)) as db:
-                refuse_wrong_clock(db, settings)
-        # last: who is refused changes nothing
-        listener = served.enter_context(open_listener(settings.host, settings.port))
-        if let_in:
-            note_bucket(settings)
-        warn_of_leftovers(settings)
-        upgrade(settings.database_source, backups=settings.backups)
-        db = served.enter_context(closing(Database(settings.database_source)))
-        if not served.enter_context(db.serve(settings.node_name)):
-            raise StrangersError(_explain_other(settings))
-        if settings.node_name:
-            Nodes(settings, db, lambda: None).refuse_strangers()
+        listener = _take_folder(settings, served)
     except fs.LockedError as error:
         served.close()
         sys.stderr.write(f"Another server ({error.holder}) is running on {error.folder}; stop it first.\n")
@@ -129,10 +97,7 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
     server = build_server(app, settings, limits)
     address = settings.make_public_address(listener.getsockname()[1])
     threading.Thread(target=_when_started, args=(server, lambda: announce(address)), daemon=True).start()
-    # uvicorn stops gracefully and then raises the signal again: without a handler that would end us here,
-    # before the workers have given their jobs back
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: None)
+    _ignore_stop_signals()
     try:
         workers.start()
         keeper.start()
@@ -142,6 +107,61 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
         workers.stop()
         served.close()
     return 0 if server.started else 1
+
+
+def _take_folder(settings: Settings, served: contextlib.ExitStack) -> ListeningSocket:
+    """Lock the data folder, listen and bring the database to this version; `served` holds what is open."""
+    from sagittal.server.nodes.registry import Nodes
+    from sagittal.server.safekeeping.custody import (
+        StrangersError,
+        refuse_half_restored,
+        refuse_strangers,
+        refuse_wrong_clock,
+    )
+    from sagittal.server.storage import fs
+    from sagittal.server.storage.db import Database
+    from sagittal.server.storage.files.blob_opening import (
+        note_bucket,
+        open_blobs,
+        require_use,
+        warn_of_leftovers,
+    )
+    from sagittal.server.storage.migrate import read_revision, upgrade
+    from sagittal.server.web_server.listener import open_listener
+
+    holder = f"process {os.getpid()}"
+    fs.make_folder(settings.data_dir)
+    served.enter_context(fs.Lock(settings.lock, holder, shared=bool(settings.node_name)))
+    # before anything else is made in a folder that `sagittal restore` wants empty
+    refuse_half_restored(settings)
+    if settings.node_name:
+        fs.make_folder(settings.node_folder)
+        served.enter_context(fs.Lock(settings.node_lock, holder))
+    let_in = require_use(open_blobs(settings))
+    refuse_strangers(settings)
+    read_revision(settings.database_source)  # says why PostgreSQL is not reached
+    if settings.node_name:
+        with closing(Database(settings.database_source)) as db:
+            refuse_wrong_clock(db, settings)
+    # last: who is refused changes nothing
+    listener = served.enter_context(open_listener(settings.host, settings.port))
+    if let_in:
+        note_bucket(settings)
+    warn_of_leftovers(settings)
+    upgrade(settings.database_source, backups=settings.backups)
+    db = served.enter_context(closing(Database(settings.database_source)))
+    if not served.enter_context(db.serve(settings.node_name)):
+        raise StrangersError(_explain_other(settings))
+    if settings.node_name:
+        Nodes(settings, db, lambda: None).refuse_strangers()
+    return listener
+
+
+def _ignore_stop_signals() -> None:
+    # uvicorn stops gracefully and then raises the signal again: without a handler that would end us here,
+    # before the workers have given their jobs back
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: None)
 
 
 def _explain_other(settings: Settings) -> str:

@@ -69,8 +69,7 @@ def tune(
 
     def keep(content: bytes, share: float, message: str) -> None:
         fs.write_file(checkpoint, content)
-        sys.stderr.write(f"\r{100 * share:5.1f} %  {message}\x1b[K")
-        sys.stderr.flush()
+        _say_progress(share, message)
 
     try:
         order = TuningOrder(
@@ -84,11 +83,20 @@ def tune(
         sys.stderr.write(f"Not tuned ({error.code}): {error.message}\n")
         return 1
     except KeyboardInterrupt:
-        again = f"The same command with --resume {checkpoint} goes on." if checkpoint.exists() else ""
-        sys.stderr.write(f"\nStopped. {again}\n")
+        _explain_stop(checkpoint)
         return 130
     fs.write_file(out, json.dumps(result.to_json(), indent=1, ensure_ascii=False).encode())
     fs.remove_file(checkpoint)
     sys.stderr.write("\n")
     sys.stdout.write(f"{json.dumps(result.gains)}\n{result.verdict}\nWritten to {out}.\n")
     return 0
+
+
+def _say_progress(share: float, message: str) -> None:
+    sys.stderr.write(f"\r{100 * share:5.1f} %  {message}\x1b[K")
+    sys.stderr.flush()
+
+
+def _explain_stop(checkpoint: Path) -> None:
+    again = f"The same command with --resume {checkpoint} goes on." if checkpoint.exists() else ""
+    sys.stderr.write(f"\nStopped. {again}\n")

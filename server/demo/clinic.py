@@ -24,7 +24,7 @@ from sagittal.server.storage.db import Database
 from sagittal.server.storage.files.blob_opening import open_blobs
 from sagittal.server.storage.files.blobs import BlobStore
 from sagittal.server.storage.schema.tables import now
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 
 if TYPE_CHECKING:
     from sagittal.core.signals.recording import Recording
@@ -190,7 +190,7 @@ def _add(
             c, None, patient_id, title=visit.title, performed_on=day, note=visit.note, **said
         )
     for name, content in files.items():
-        with recordings.receive(db, blobs, settings, None, session.id, name) as upload:
+        with receiving.receive(db, blobs, settings, None, session.id, name) as upload:
             upload.write(content)
             upload.keep()
     with db.write() as c:

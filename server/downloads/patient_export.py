@@ -64,7 +64,7 @@ def list_rows(c: Connection, patient_id: str) -> dict[str, list[dict[str, Any]]]
 
 
 def list_files(rows: dict[str, list[dict[str, Any]]]) -> list[ExportedFile]:
-    """The files that rows refer to; their names were checked when they came (recordings.check_name)."""
+    """The files that rows refer to; their names were checked when they came (receiving.check_name)."""
     found = {}
     for table, its_rows in rows.items():
         for row in its_rows:

@@ -39,7 +39,7 @@ from sagittal.server.live.recorder import open_recorder
 from sagittal.server.live.room import Room
 from sagittal.server.live.rows import Rows
 from sagittal.server.live.take import ActiveTake, TabletLink, describe_unjoined
-from sagittal.server.live_takes import live, live_recordings
+from sagittal.server.live_takes import live, live_events, live_recordings
 from sagittal.server.nodes.registry import Nodes
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings
@@ -149,7 +149,7 @@ class Hub:
             take.note_growth(take.recorder.size)
         if take.recorder.damage is not None:
             _notify(take, "bad", take.recorder.damage.sentence)
-            self._note(take, live.DAMAGED, take.recorder.damage.sentence)
+            self._note(take, live_events.DAMAGED, take.recorder.damage.sentence)
         if take.recorder.end is not None:
             self.note_ended(take, take.recorder.end)
         else:
@@ -187,7 +187,7 @@ class Hub:
         if take is None:
             self.owner.require(row)
             raise Conflict("no_tablet", "No tablet has joined this take yet; enter its code on the tablet.")
-        live.check_value(name, value)
+        live_events.check_value(name, value)
         if name in ("start", "stop"):
             if take.tablet is None:
                 raise Conflict(
@@ -334,7 +334,7 @@ class Hub:
 
     def _note(self, take: ActiveTake, code: str, text: str) -> None:
         """Keep with the take what the server has to say of it."""
-        self.journal.add(take.id, "notice", take.t_s, live.own_notice(code, text))
+        self.journal.add(take.id, "notice", take.t_s, live_events.own_notice(code, text))
 
     # threads and tasks
 

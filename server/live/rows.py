@@ -10,7 +10,7 @@ from sqlalchemy import Connection, update
 from sagittal.server import audit
 from sagittal.server.errors import NodeAway, NotFound
 from sagittal.server.live.intake import TakeEnd
-from sagittal.server.live_takes import live
+from sagittal.server.live_takes import live, live_events
 from sagittal.server.live_takes.live_training import LiveTraining, training_of
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
@@ -55,18 +55,18 @@ class Rows:
         with self._db.read() as c:
             return live.require_open(c, session_id)
 
-    def prepare(self, row: live.LiveTakeRecord) -> tuple[LiveTraining, list[live.LiveEvent]]:
+    def prepare(self, row: live.LiveTakeRecord) -> tuple[LiveTraining, list[live_events.LiveEvent]]:
         """What a take is coached with, and what happened in it so far."""
         training = training_of(self._db, self._reviewed, row)
         with self._db.read() as c:
-            return training, live.events(c, row.id)
+            return training, live_events.events(c, row.id)
 
     def keep_command(
         self, actor: audit.Actor | None, take_id: str, kind: str, t_s: float | None, content: object
     ) -> None:
         """Append what a person did."""
         with self._db.write() as c:
-            live.add_event(c, actor, take_id, kind, t_s, content)
+            live_events.add_event(c, actor, take_id, kind, t_s, content)
 
     def start(self, take_id: str, source: str) -> None:
         """Note the first batch; a take that was erased meanwhile is none."""

@@ -23,7 +23,8 @@ from sagittal.server.live.protocol import ProtocolError
 from sagittal.server.live.recorder import Recorder
 from sagittal.server.live.room import Room
 from sagittal.server.live.sensors import sensor_rows
-from sagittal.server.live_takes.live import LiveEvent, LiveTakeRecord, is_own_notice
+from sagittal.server.live_takes.live import LiveTakeRecord
+from sagittal.server.live_takes.live_events import LiveEvent, is_own_notice
 from sagittal.server.live_takes.live_training import LiveTraining
 
 STEERING: Final = frozenset({"feedback", "level", "pause", "stale", "redo_calibration", "test"})

@@ -30,7 +30,7 @@ from sagittal.server.storage import fs, references, segments
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.files.blobs import BlobStore
 from sagittal.server.storage.schema.tables import now
-from sagittal.server.uploads import recordings, videos
+from sagittal.server.uploads import receiving, recordings, videos
 
 log = logging.getLogger(__name__)
 
@@ -100,7 +100,7 @@ class FilmIntake:
         with self._lock:
             film = self._find(take_id)
             if film is None:
-                recordings.require_room(self._blobs, self._settings, 0)
+                receiving.require_room(self._blobs, self._settings, 0)
                 head = {"began_us": began_us, "consent_at": now().isoformat()}
                 path = film_path(self._settings.live, take_id)
                 film = _OpenFilm(segments.create(path, json.dumps(head).encode()))
@@ -179,7 +179,7 @@ class FilmIntake:
         limit = self._settings.max_file_bytes
         if film.size + len(piece) > limit:
             raise TooLarge("file_too_large", f"A film has at most {limit / 1e6:g} MB here; it ends before.")
-        recordings.require_room(self._blobs, self._settings, len(piece))
+        receiving.require_room(self._blobs, self._settings, len(piece))
         try:
             film.log.append(record("B", piece))
             film.log.sync()

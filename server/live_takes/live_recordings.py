@@ -16,7 +16,7 @@ from sqlalchemy import Connection, insert, select, update
 from sagittal.server import audit
 from sagittal.server.errors import NotFound
 from sagittal.server.jobs.queue import JobQueue
-from sagittal.server.live_takes import live, live_training
+from sagittal.server.live_takes import live, live_events, live_training
 from sagittal.server.results import analyses
 from sagittal.server.settings import Settings
 from sagittal.server.storage import fs, references, segments
@@ -158,11 +158,11 @@ def _set_aside(db: Database, take_id: str, path: Path) -> None:
         return
     original = segments.keep_original(path)
     log.warning("%s: %s Kept as %s.", path.name, damage.sentence, original)
-    notice = live.own_notice(live.DAMAGED, damage.sentence)
+    notice = live_events.own_notice(live_events.DAMAGED, damage.sentence)
     try:
         with db.write() as c:
             live.get(c, take_id)
-            live.add_event(c, None, take_id, "notice", None, notice)
+            live_events.add_event(c, None, take_id, "notice", None, notice)
     except NotFound:
         fs.remove_file(original)  # erased meanwhile
         raise
@@ -202,7 +202,7 @@ def _publish(
     blobs.require(take.patient_id, blob.sha256)
     recording_id, at = new_id(), now()
     said: dict[str, Any] = {"sensors": _sensors(hello)}
-    if (limits := live.read_test_limits(c, take_id)) is not None:
+    if (limits := live_events.read_test_limits(c, take_id)) is not None:
         said["test_limits"] = limits
     manifest = analyses.complete_manifest(c, take.session_id, said)
     # alone in its set: files that were uploaded to this session before are another take

@@ -15,7 +15,7 @@ from sqlalchemy import Connection, select, update
 from sagittal.core.errors import SagittalError
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
-from sagittal.server.live_takes import live
+from sagittal.server.live_takes import live, live_events
 from sagittal.server.results import analyses, prescriptions
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
@@ -55,7 +55,7 @@ def training_of(db: Database, reviewed: ReviewedAnalyses, take: live.LiveTakeRec
             content = _prescribed(c, reviewed, take)
     if begins:
         with db.write() as c:
-            live.add_event(c, None, take.id, KIND, None, content)
+            live_events.add_event(c, None, take.id, KIND, None, content)
             row = update(live_take).where(live_take.c.id == take.id)
             c.execute(row.values(prescription_id=content["id"]))
     height, protocol = said.get("subject", {}).get("height_m"), said["protocol"]

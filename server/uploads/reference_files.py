@@ -14,7 +14,8 @@ from sagittal.server.clinic import sessions
 from sagittal.server.errors import NotFound, TooLarge
 from sagittal.server.storage.files.blobs import Blob, BlobStore
 from sagittal.server.storage.schema.tables import now, reference_file
-from sagittal.server.uploads.recordings import RecordedFile, receive
+from sagittal.server.uploads.receiving import receive
+from sagittal.server.uploads.recordings import RecordedFile
 
 MOST_FILES: Final = 20
 """References of a session (our choice)."""

@@ -22,7 +22,7 @@ from sagittal.server.storage import fs, references
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.files.blobs import Blob, BlobStore
 from sagittal.server.storage.schema.tables import file_upload, new_id, now
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from sagittal.server.uploads.recordings import RecordedFile
 
 ABANDONED: Final = dt.timedelta(days=1)
@@ -59,11 +59,11 @@ def begin(
     ------
     NotFound; InputError bad_file_name; TooLarge; DiskFull.
     """
-    name = recordings.check_name(name)
+    name = receiving.check_name(name)
     if size < 1:
         raise ServiceError("bad_value", f"The file has {size} bytes; an upload in parts has at least 1.")
     if size > settings.max_file_bytes:
-        raise recordings.make_too_large(name, settings.max_file_bytes)
+        raise receiving.make_too_large(name, settings.max_file_bytes)
     with db.write() as c:
         recordings.patient_of(c, session_id)
         others = 0
@@ -74,8 +74,8 @@ def begin(
             others += one.size
         if len(coming) >= settings.max_files:
             raise TooLarge("too_many_files", f"At most {settings.max_files} files come at a time.")
-        recordings.check_set(c, settings, session_id, name, size + others)
-        recordings.require_room(blobs, settings, size)
+        receiving.check_set(c, settings, session_id, name, size + others)
+        receiving.require_room(blobs, settings, size)
         fresh = new_id()
         row = {"id": fresh, "session_id": session_id, "name": name, "size": size, "created_at": now()}
         c.execute(insert(file_upload).values(row))
@@ -123,7 +123,7 @@ def add_part(
             )
         if not data:
             return this
-        recordings.require_room(blobs, settings, len(data))
+        receiving.require_room(blobs, settings, len(data))
         path = blobs.part(upload_id)
         if not path.exists():
             fs.keep_private(path)
@@ -175,7 +175,7 @@ def finish(
             )
         with db.read() as c:
             space = recordings.patient_of(c, session_id)
-            recordings.check_set(c, settings, session_id, this.name, this.size)
+            receiving.check_set(c, settings, session_id, this.name, this.size)
         # before the transaction: into a bucket it takes a while
         blobs.adopt(space, path, sha256)
         try:
@@ -201,7 +201,7 @@ def _publish(
     with db.write() as c:
         _find(c, session_id, this.id)
         blobs.require(recordings.patient_of(c, session_id), sha256)
-        recordings.check_set(c, settings, session_id, this.name, this.size)
+        receiving.check_set(c, settings, session_id, this.name, this.size)
         stored = recordings.add_file(c, actor, session_id, this.name, Blob(sha256, this.size))
         mine = file_upload.c.id == this.id
         c.execute(update(file_upload).where(mine).values(finished_sha256=sha256))

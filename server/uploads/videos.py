@@ -18,7 +18,8 @@ from sagittal.server.clinic import sessions
 from sagittal.server.errors import NotFound, ServiceError
 from sagittal.server.storage.files.blobs import Blob, BlobStore
 from sagittal.server.storage.schema.tables import now, session_video
-from sagittal.server.uploads.recordings import RecordedFile, receive
+from sagittal.server.uploads.receiving import receive
+from sagittal.server.uploads.recordings import RecordedFile
 
 BEGINS: Final = 12
 """Bytes that tell what a file is."""

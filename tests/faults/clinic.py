@@ -20,7 +20,7 @@ from sagittal.server.storage.db import Database
 from sagittal.server.storage.files.blob_opening import open_blobs
 from sagittal.server.storage.high_water import set_mark
 from sagittal.server.storage.schema.tables import job
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from tests.helpers.databases import write_database
 from tests.helpers.engines import choose_url
 from tests.helpers.postgres import make_lasting_database
@@ -86,7 +86,7 @@ class Clinic:
         with self.db.write() as c:
             self.patient = patients.create(c, None, code="P-1")
             self.session = sessions.create(c, None, self.patient.id)
-        with recordings.receive(self.db, self.blobs, self.settings, None, self.session.id, "a.txt") as upload:
+        with receiving.receive(self.db, self.blobs, self.settings, None, self.session.id, "a.txt") as upload:
             upload.write(b"signals")
             upload.keep()
         if isinstance(self.db.source, str):

@@ -26,7 +26,7 @@ from sagittal.server.storage.db import Database
 from sagittal.server.storage.files.trash import KEPT, FolderTrash
 from sagittal.server.storage.high_water import raise_mark
 from sagittal.server.storage.migrate import copy_database, exists, upgrade
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from sagittal.server.worker.task import load
 from sagittal.server.worker.worker import Worker
 from tests.data import ROOT
@@ -44,7 +44,7 @@ STEP = {"sqlite": 1, "postgresql": 4}
 
 
 def upload(clinic: Clinic, name: str, content: bytes) -> None:
-    with recordings.receive(
+    with receiving.receive(
         clinic.db, clinic.blobs, clinic.settings, None, clinic.session.id, name
     ) as incoming:
         incoming.write(content)

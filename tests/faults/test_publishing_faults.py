@@ -13,7 +13,7 @@ from sagittal.core.errors import SagittalError
 from sagittal.server.safekeeping import checks
 from sagittal.server.safekeeping.sweep import sweep
 from sagittal.server.storage import fs
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from sagittal.server.worker.task import load
 from sagittal.server.worker.worker import Worker
 from tests.faults.clinic import Clinic
@@ -44,7 +44,7 @@ def test_an_upload_that_fails_anywhere_leaves_no_row_and_can_be_sent_again(
 ) -> None:
     def upload() -> bool:
         try:
-            with recordings.receive(
+            with receiving.receive(
                 clinic.db, clinic.blobs, clinic.settings, None, clinic.session.id, "b.txt"
             ) as incoming:
                 incoming.write(b"first half, ")
@@ -94,7 +94,7 @@ def test_a_result_that_cannot_be_stored_fails_its_job_with_a_reason(
 
 @on_both_engines
 def test_a_file_swept_before_its_row_was_written_is_noticed(clinic: Clinic) -> None:
-    with recordings.receive(
+    with receiving.receive(
         clinic.db, clinic.blobs, clinic.settings, None, clinic.session.id, "b.txt"
     ) as upload:
         upload.write(b"content")

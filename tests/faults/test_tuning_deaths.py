@@ -22,7 +22,7 @@ from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.safekeeping import erasure
 from sagittal.server.storage.references import list_referenced
 from sagittal.server.storage.schema.tables import job
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving
 from tests.core.fusion.algorithms.motion import trial_bytes
 from tests.faults.clinic import Clinic, until
 from tests.helpers.engines import on_both_engines
@@ -43,7 +43,7 @@ def tuning_clinic(tmp_path: Path) -> Iterator[Clinic]:
         job_timeout_s=60.0,
     )
     for name, seconds in TRIALS.items():
-        with recordings.receive(
+        with receiving.receive(
             made.db, made.blobs, made.settings, None, made.session.id, f"{name}.npz"
         ) as upload:
             upload.write(trial_bytes(seconds))

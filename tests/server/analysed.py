@@ -35,7 +35,7 @@ from sagittal.server.report.files.exports import analysis_files
 from sagittal.server.report.files.filter_files import filter_run_files
 from sagittal.server.report.view.sensitivity import sensitivity_files, summarise_sensitivity
 from sagittal.server.results import analyses, filter_runs, sensitivities
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from tests.helpers.clinic import Clinic
 from tests.server import walk
 
@@ -104,7 +104,7 @@ def finish(
 ) -> str:
     """Do what upload and worker do, with given results; returns the id of the analysis."""
     state = clinic.app.state
-    with recordings.receive(clinic.db, state.blobs, clinic.settings, None, session_id, "walk.txt") as upload:
+    with receiving.receive(clinic.db, state.blobs, clinic.settings, None, session_id, "walk.txt") as upload:
         upload.write(b"recording")
         upload.keep()
     with clinic.db.write() as c:

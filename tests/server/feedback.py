@@ -8,7 +8,7 @@ from typing import Any
 
 from sagittal.core.feedback import Cue
 from sagittal.server.clinic import patients, sessions
-from sagittal.server.live_takes import live, live_training
+from sagittal.server.live_takes import live, live_events, live_training
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.files.blobs import BlobStore
@@ -65,7 +65,7 @@ def ended_take(
     with db.write() as c:
         live.note_start(c, made.id, "replay")
         for cue in cues:
-            live.add_event(c, None, made.id, "cue", cue.t_s, {"type": "cue", **cue.to_json()})
+            live_events.add_event(c, None, made.id, "cue", cue.t_s, {"type": "cue", **cue.to_json()})
         live.end(c, None, made.id, "finished", count=1)
         c.execute(live_take.update().where(live_take.c.id == made.id).values(recording_id=recording))
     return begun, made.id

@@ -16,7 +16,7 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.clinic import sessions
 from sagittal.server.context import Db, Failures, Id, LiveHub, OpenTrail, address_of
 from sagittal.server.http.json_body import StrictJsonRoute
-from sagittal.server.live_takes import live
+from sagittal.server.live_takes import live, live_events
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["live"])
 Therapist = Annotated[Identity, require(Action.RUN_LIVE)]
@@ -81,12 +81,12 @@ async def close_take(session_id: Id, hub: LiveHub, who: Therapist) -> schemas.Ta
     return make_answer(schemas.TakeAnswer, await hub.close(who, session_id))
 
 
-@router.get("/sessions/{session_id}/live/events", response_model=list[live.LiveEvent])
-def list_events(session_id: Id, db: Db, trail: OpenTrail, who: Therapist) -> list[live.LiveEvent]:
+@router.get("/sessions/{session_id}/live/events", response_model=list[live_events.LiveEvent])
+def list_events(session_id: Id, db: Db, trail: OpenTrail, who: Therapist) -> list[live_events.LiveEvent]:
     """What happened in the session's takes, in order."""
     with db.read() as c:
         sessions.get(c, session_id)
-        found = [event for take in live.takes_of(c, session_id) for event in live.events(c, take.id)]
+        found = [event for take in live.takes_of(c, session_id) for event in live_events.events(c, take.id)]
     trail.record_watched(who, "live.events_opened", "session", session_id)
     return found
 

@@ -20,7 +20,7 @@ from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
 from sagittal.server.context import Blobs, Config, Db, Id, OpenTrail
 from sagittal.server.http.problems import Problem
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 
 router = APIRouter(prefix="/sessions/{session_id}/files", tags=["files"])
 
@@ -60,7 +60,7 @@ async def put_file(
 ) -> recordings.RecordedFile:
     """Add a file to the current recording, the raw body as its content; the same name replaces it."""
     size = read_size(request, settings.max_file_bytes)
-    upload = await run_in_threadpool(recordings.receive, db, blobs, settings, who, session_id, name, size)
+    upload = await run_in_threadpool(receiving.receive, db, blobs, settings, who, session_id, name, size)
     return await receive_body(request, upload)
 
 
@@ -88,7 +88,7 @@ async def post_files(
     size = read_size(request, settings.max_set_bytes + 1000 * settings.max_files)
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise Problem(422, "no_form", "Expected multipart/form-data with the field 'files'.")
-    await run_in_threadpool(recordings.require_room, blobs, settings, size)
+    await run_in_threadpool(receiving.require_room, blobs, settings, size)
     parser = MultiPartParser(
         request.headers, request.stream(), max_files=settings.max_files, max_fields=settings.max_files
     )
@@ -106,7 +106,7 @@ async def post_files(
         stored = []
         for part in parts:
             upload = await run_in_threadpool(
-                recordings.receive, db, blobs, settings, who, session_id, part.filename or ""
+                receiving.receive, db, blobs, settings, who, session_id, part.filename or ""
             )
             with upload:
                 while chunk := await part.read(CHUNK_BYTES):
@@ -147,7 +147,7 @@ def delete_file(
         return schemas.make_answer(schemas.RecordingAnswer, recordings.remove_file(c, who, session_id, name))
 
 
-async def receive_body(request: Request, upload: recordings.receive) -> recordings.RecordedFile:
+async def receive_body(request: Request, upload: receiving.receive) -> recordings.RecordedFile:
     """Keep the raw body of a request as a file."""
     with upload:
         try:

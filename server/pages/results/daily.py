@@ -13,13 +13,8 @@ from sagittal.server.report.view.daily_charts import (
     ribbon_svg,
     steps_svg,
 )
-from sagittal.server.report.view.daily_life import (
-    EVENTS_SHOWN,
-    KIND_LABELS,
-    KIND_WORDS,
-    DailyLifeView,
-    format_hours,
-)
+from sagittal.server.report.view.daily_life import EVENTS_SHOWN, DailyLifeView
+from sagittal.server.report.words.daily_words import KIND_LABELS, KIND_WORDS, format_hours
 
 DAYS_A_SHEET: Final = 7
 """Days on one sheet of the printed report."""

@@ -10,7 +10,7 @@ from starlette.responses import RedirectResponse
 
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.clinic.sessions import Session
-from sagittal.server.live_takes import live
+from sagittal.server.live_takes import live, live_events
 from sagittal.server.pages.job_views import find_newest_job, view_job
 from sagittal.server.pages.words import TEST_NAMES
 from sagittal.server.results import analyses, controls
@@ -55,7 +55,7 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
         "job": None if job is None else view_job(job),
         "stages": list((STAGES_OF_DAYS if session.protocol == "activity" else STAGE_NAMES).items()),
         "live_now": take.state if take is not None and take.is_open else None,
-        "damages": live.list_damages(c, session_id),
+        "damages": live_events.list_damages(c, session_id),
         "report": None,
     }
 

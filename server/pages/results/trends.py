@@ -28,8 +28,8 @@ from sagittal.server.report.history.trends import (
     follow_figures,
     names_in,
 )
-from sagittal.server.report.view.daily_life import format_hours
 from sagittal.server.report.words.change_words import SCORE_TERMS, change_words, find_term
+from sagittal.server.report.words.daily_words import format_hours
 from sagittal.server.report.words.wording import GROUPS, format_number
 from sagittal.server.results import histories
 from sagittal.server.results.histories import PatientHistory

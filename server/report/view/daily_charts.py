@@ -16,17 +16,8 @@ import numpy as np
 from sagittal.core.activity.result import KINDS, ActivityKind, ActivityResult
 from sagittal.core.frames import Floats
 from sagittal.server.report.charts.svg import PlotArea, find_round_ticks, format_coordinate, make_label
-from sagittal.server.report.view.daily_life import (
-    COURSE_S,
-    DASH,
-    DAY_S,
-    KIND_LABELS,
-    TOTALS,
-    BoutBin,
-    DayTotals,
-    format_hours,
-    inclination_course,
-)
+from sagittal.server.report.view.daily_life import COURSE_S, BoutBin, DayTotals, inclination_course
+from sagittal.server.report.words.daily_words import DASH, DAY_S, KIND_LABELS, TOTALS, format_hours
 from sagittal.server.report.words.wording import format_number
 
 RIBBON_PX: Final = 52

@@ -1,11 +1,11 @@
 """A recording of daily life in words: days, hours, transitions, walking bouts and trunk inclination.
 
-What the monitor found is core/activity/result.py; the drawings are server/report/view/daily_charts.py.
+What the monitor found is core/activity/result.py; the drawings are server/report/view/daily_charts.py,
+names of kinds and days server/report/words/daily_words.py.
 """
 
 from __future__ import annotations
 
-import datetime as dt
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,69 +24,23 @@ from sagittal.core.activity.result import (
     PosturalTransition,
     TransitionCandidate,
     TransitionKind,
-    TransitionRefusal,
 )
 from sagittal.core.frames import Floats
 from sagittal.core.plurals import plural
+from sagittal.server.report.words.daily_words import (
+    DASH,
+    DAY_S,
+    KIND_LABELS,
+    REFUSALS,
+    TOTALS,
+    TRANSITION_LABELS,
+    clock_label,
+    day_label,
+    find_day_label,
+    find_midnight,
+    format_hours,
+)
 from sagittal.server.report.words.wording import format_number
-
-DAY_S: Final = 86400.0
-HOUR_S: Final = 3600.0
-
-DASH: Final = "–"
-
-KIND_LABELS: Final[Mapping[ActivityKind, str]] = {
-    "lying": "Lying",
-    "sitting": "Sitting",
-    "standing": "Standing",
-    "walking": "Walking",
-    "stairs_up": "Stairs up",
-    "stairs_down": "Stairs down",
-    "unknown": "Unknown",
-    "non_wear": "Not worn",
-    "gap": "Not recorded",
-}
-
-KIND_WORDS: Final[Mapping[ActivityKind, str]] = {
-    "lying": "the trunk is more than 70° from upright and holds still",
-    "sitting": "after a stand-to-sit or before a sit-to-stand, no steps",
-    "standing": "after a sit-to-stand, before a stand-to-sit, or between walks, no steps",
-    "walking": "steps in a row, on the level",
-    "stairs_up": "experimental: walking with the trunk leaning forward and rocking",
-    "stairs_down": "experimental: walking with the trunk rocking strongly; most are missed",
-    "unknown": "worn, but the signals contradict each other or say nothing",
-    "non_wear": "no movement for half an hour or longer, not even breathing",
-    "gap": "the device stored no samples",
-}
-"""How each kind is told, in the words of its definition (docs/science/activity.md)."""
-
-WALKED: Final[tuple[ActivityKind, ...]] = ("walking", "stairs_up", "stairs_down")
-
-TOTALS: Final[Mapping[str, tuple[ActivityKind, ...]]] = {
-    "Lying": ("lying",),
-    "Sitting": ("sitting",),
-    "Standing": ("standing",),
-    "Walking": WALKED,
-    "Unknown": ("unknown",),
-    "Not worn": ("non_wear",),
-    "Not recorded": ("gap",),
-}
-"""Columns of the totals → what they add up."""
-
-TRANSITION_LABELS: Final[Mapping[TransitionKind, str]] = {
-    "sit_to_stand": "Sit to stand",
-    "stand_to_sit": "Stand to sit",
-    "sit_to_lie": "Sit to lie",
-    "lie_to_sit": "Lie to sit",
-}
-
-REFUSALS: Final[Mapping[TransitionRefusal, str]] = {
-    "lean_below_limit": "below the limit: the trunk leaned less than 20°",
-    "chest_did_not_rise": "a bow: the chest did not rise or fall enough",
-    "direction_unclear": "up or down is not clear",
-    "near_lying": "belongs to lying down or getting up",
-    "while_walking": "amid walking",
-}
 
 BIN_EDGES_S: Final = (10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 """Ends of the bins of walking bouts, s; the last bin is open."""
@@ -238,7 +192,7 @@ def daily_life_view(found: ActivityResult | None) -> DailyLifeView | None:
         mean=_average(found.days),
         hours=tuple(
             HourTotals(
-                _day_of(found, h.start_s),
+                find_day_label(found, h.start_s),
                 clock_label(found, h.start_s),
                 h.steps,
                 {c: format_number(_sum(h.minutes, TOTALS[c]), 0) for c in shown},
@@ -256,23 +210,6 @@ def daily_life_view(found: ActivityResult | None) -> DailyLifeView | None:
         leans=leans,
         lean_reason=None if leans else "not known: no lean of the trunk showed which way is forward",
     )
-
-
-def format_hours(minutes: float) -> str:
-    """Format minutes as h:min, "7:40"."""
-    whole = round(minutes)
-    return f"{whole // 60}:{whole % 60:02d}"
-
-
-def find_midnight(found: ActivityResult, at_s: float) -> float:
-    """Where the day of a moment begins, s from the first sample (below 0 on the first day of a clock)."""
-    return float(np.floor((at_s + _since_midnight(found)) / DAY_S) * DAY_S - _since_midnight(found))
-
-
-def clock_label(found: ActivityResult, at_s: float) -> str:
-    """Time of day as "14:05", or hours and minutes since the first sample without a clock."""
-    minutes = int((at_s + _since_midnight(found)) // 60)
-    return f"{minutes // 60 % 24:02d}:{minutes % 60:02d}"
 
 
 def bin_bouts(bouts: Sequence[ActivityBout]) -> tuple[BoutBin, ...]:
@@ -308,29 +245,13 @@ def _bin_label(low: float, high: float) -> str:
     return f"{low / size:.0f}–{high / size:.0f}\u202f{unit}"
 
 
-def _since_midnight(found: ActivityResult) -> float:
-    at = found.started_at
-    return 0.0 if at is None else at.hour * HOUR_S + at.minute * 60.0 + at.second + at.microsecond * 1e-6
-
-
-def _day_of(found: ActivityResult, at_s: float) -> str:
-    for i, d in enumerate(found.days):
-        if d.start_s <= at_s < d.end_s:
-            return _day_label(i, d.date)
-    return ""
-
-
-def _day_label(number: int, date: dt.date | None) -> str:
-    return f"Day {number + 1}" if date is None else f"{date:%a} {date.day} {date:%b}"
-
-
 def _describe_day(found: ActivityResult, i: int, d: ActivityDay) -> DayTotals:
     begins = f"{clock_label(found, d.start_s)}–" if found.started_at is not None else ""
     whole = d.end_s - d.start_s > DAY_S - 60.0
     ends = clock_label(found, d.end_s) if begins else f"first {format_hours((d.end_s - d.start_s) / 60)} h"
     worn = d.worn_h > 0.0
     return DayTotals(
-        label=_day_label(i, d.date),
+        label=day_label(i, d.date),
         part="" if whole else begins + (ends if ends != "00:00" else "24:00"),
         midnight_s=find_midnight(found, d.start_s),
         start_s=d.start_s,
@@ -384,7 +305,7 @@ def _count_transitions(found: ActivityResult, kind: TransitionKind) -> Transitio
 
 
 def _describe_event(found: ActivityResult, e: PosturalTransition | TransitionCandidate) -> TransitionEvent:
-    when = f"{_day_of(found, e.time_s)} {clock_label(found, e.time_s)}"
+    when = f"{find_day_label(found, e.time_s)} {clock_label(found, e.time_s)}"
     lean = format_number(e.lean_deg, 0)
     rise = DASH if e.rise_m is None else format_number(e.rise_m, 2)
     if isinstance(e, TransitionCandidate):

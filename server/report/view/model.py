@@ -23,7 +23,6 @@ from sagittal.core.norms.profile import CurveReference
 from sagittal.core.norms.scores import Scores, score_curves
 from sagittal.core.parameters import cycle_curves
 from sagittal.core.parameters.anatomical_zero import anatomical_variables
-from sagittal.core.parameters.catalogue import require_entries
 from sagittal.core.parameters.result import CycleCurves, Parameter
 from sagittal.core.parameters.uncertainty import mark_estimated
 from sagittal.server.report.charts.panels import CurvePanel, curve_panels
@@ -31,13 +30,15 @@ from sagittal.server.report.files.bundle import Bundle
 from sagittal.server.report.files.columns import reduce_to_plain
 from sagittal.server.report.view.daily_life import DailyLifeView, daily_life_view
 from sagittal.server.report.view.functional import TEST_NORM_NOTE, FunctionalView, functional_view
-from sagittal.server.report.view.headline import Headline, find_standouts, say_badge
+from sagittal.server.report.view.headline import Headline, say_badge
+from sagittal.server.report.view.key_numbers import KeyNumber, choose_key_numbers
 from sagittal.server.report.view.level import choose_zero, level_rows
 from sagittal.server.report.view.model_json import panel_json, profile_json, round_curve
 from sagittal.server.report.view.notes import curve_notes, norm_note
 from sagittal.server.report.view.profile import ProfileView, profile_view
 from sagittal.server.report.view.quality_box import QualityBox, quality_box
 from sagittal.server.report.view.squat import NORM_NOTE, UNSURE_FIGURES, SquatView, squat_view
+from sagittal.server.report.view.standouts import find_standouts
 from sagittal.server.report.view.table import ParameterRow, group_rows, parameter_rows
 from sagittal.server.report.words.estimator import (
     EstimatorView,
@@ -50,46 +51,9 @@ from sagittal.server.report.words.wording import explain_exclusion, place_words,
 
 Sex = Literal["female", "male"]
 
-KEY_NUMBERS: Final = (
-    "gait_speed_mps",
-    "cadence_spm",
-    "step_length_m",
-    "knee_flexion_rom_deg",
-    "stride_time_s",
-    "stance_pct",
-    "squat_depth_deg",
-    "squat_knee_valgus_deg",
-    "squat_hip_drop_m",
-    "squat_duration_s",
-    "daily_step_count",
-    "daily_walking_min",
-    "daily_sitting_min",
-    "daily_rise_count",
-)
-"""Parameters for the overview, in this order of preference."""
-
-require_entries(KEY_NUMBERS, "sagittal.server.report.view.model")
-
-SHOWN_LARGE: Final = 4
-"""So many of them are shown, those that were measured."""
-
 KEY_CURVE: Final = "knee_flexion"
 
 _KINDS: Final = {"error": "bad", "warning": "warn", "info": "info"}
-
-
-@dataclass(frozen=True)
-class KeyNumber:
-    """One large number, or a left-right pair, with its meaning in words."""
-
-    name: str
-    title: str
-    unit: str
-    pair: bool
-    text: str
-    left: str
-    right: str
-    words: str
 
 
 @dataclass(frozen=True)
@@ -279,8 +243,7 @@ def report_model(
     norms = look_up_norms(age, sex, speed_mps, height_m, treadmill=treadmill, contacts_s=contacts_s)
     own = None if controls is None else controls.norms(speed_mps, height_m)
     if own is not None:
-        compared = {name: v for name, v in norms.values.items() if v.comparable or name not in own.values}
-        norms = replace(norms, values={**own.values, **compared})
+        norms = _add_own_norms(norms, own)
     rows = parameter_rows(_mark_unsure(bundle), norms, affected)
     curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
     panels = curve_panels(bundle, curves, norms, own)
@@ -288,40 +251,56 @@ def report_model(
     if curves is not None and standing:
         level = look_up_norms(age, sex, speed_mps, height_m, anatomical_variables(standing))
         rows += level_rows(curves, standing, level, list_estimated_variables(bundle.estimator))
-    stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
-    angles = bundle.angles
     quality = quality_box(bundle)
     flags = _judge_limits(bundle, curves, height_m, age, own)
-    by_trunk = bundle.functional is not None and not bundle.strides.strides
     return ReportModel(
-        problem=None if stopped is None else speak_places(stopped),
+        problem=_find_problem(bundle),
         quality=quality,
         warnings=tuple(_warning(n) for n in bundle.warnings),
-        kpis=_key_numbers(rows),
+        kpis=choose_key_numbers(rows),
         groups=group_rows(rows),
         panels=panels,
         strides=tuple(_stride_row(s) for s in bundle.strides.strides),
         duration_s=_duration(bundle),
-        norm_note=TEST_NORM_NOTE
-        if by_trunk
-        else _norm_note(bundle) or norm_note(rows, panels, norms, controls),
+        norm_note=_norm_note(bundle) or norm_note(rows, panels, norms, controls),
         norm_source=next((p.norm.source for p in panels if p.norm is not None), None),
         curve_notes=curve_notes(bundle, panels),
-        angle_zero=None if angles is None else angles.zero,
-        zero_offset_deg={}
-        if angles is None
-        else {k: float(np.degrees(v)) for k, v in angles.zero_offset.items() if k in angles.angles},
+        angle_zero=None if bundle.angles is None else bundle.angles.zero,
+        zero_offset_deg=_zero_offsets(bundle),
         provenance=bundle.provenance,
         estimator=estimator_view(bundle.estimator),
         squats=squat_view(bundle),
         functional=functional_view(bundle, age, sex),
         limits=limits_view(flags) if flags else None,
-        headline=None
-        if bundle.repetitions is not None or bundle.activity is not None or by_trunk
-        else _headline(bundle, quality, choose_zero(rows, _list_anatomical(panels)), norms, flags),
+        headline=_headline(bundle, quality, choose_zero(rows, _list_anatomical(panels)), norms, flags),
         daily=daily_life_view(bundle.activity),
         profile=None if curves is None else _profile(bundle, curves, age, norms),
     )
+
+
+def _add_own_norms(norms: Norms, own: Norms) -> Norms:
+    """The clinic's own norms, where no published one compares."""
+    compared = {name: v for name, v in norms.values.items() if v.comparable or name not in own.values}
+    return replace(norms, values={**own.values, **compared})
+
+
+def _find_problem(bundle: Bundle) -> str | None:
+    """What stopped the analysis, in words."""
+    stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
+    return None if stopped is None else speak_places(stopped)
+
+
+def _zero_offsets(bundle: Bundle) -> dict[str, float]:
+    """What was subtracted from every angle that there is, in degrees."""
+    angles = bundle.angles
+    if angles is None:
+        return {}
+    return {k: float(np.degrees(v)) for k, v in angles.zero_offset.items() if k in angles.angles}
+
+
+def _is_told_by_trunk(bundle: Bundle) -> bool:
+    """Whether this is a functional test without a sensor that gives strides."""
+    return bundle.functional is not None and not bundle.strides.strides
 
 
 def _mark_unsure(bundle: Bundle) -> tuple[Parameter, ...]:
@@ -378,8 +357,10 @@ def _headline(
     rows: Sequence[ParameterRow],
     norms: Norms,
     flags: Sequence[Flag],
-) -> Headline:
-    """Poor data say nothing of the person: then the badge alone speaks."""
+) -> Headline | None:
+    """Poor data say nothing of the person: then the badge alone speaks. None where there is no walk."""
+    if bundle.repetitions is not None or bundle.activity is not None or _is_told_by_trunk(bundle):
+        return None
     badge = say_badge(quality.kind, bundle.strides)
     if quality.kind == "bad":
         return Headline(badge)
@@ -395,6 +376,8 @@ def _duration(bundle: Bundle) -> float:
 
 def _norm_note(bundle: Bundle) -> str | None:
     """What is said where nobody has a norm for the movement, None of walking."""
+    if _is_told_by_trunk(bundle):
+        return TEST_NORM_NOTE
     if bundle.activity is not None:
         return "Daily life is held against no norm."
     return NORM_NOTE if bundle.repetitions is not None else None
@@ -411,37 +394,3 @@ def _warning(n: Notice) -> ReportWarning:
         sensor=n.sensor,
         t_s=n.t_s,
     )
-
-
-def _key_numbers(rows: Sequence[ParameterRow]) -> tuple[KeyNumber, ...]:
-    """The first of KEY_NUMBERS that were measured well enough."""
-    found = (r for name in KEY_NUMBERS for r in rows if r.name == name)
-    return tuple(_key_number(r) for r in found if r.reason is None and not r.low_confidence)[:SHOWN_LARGE]
-
-
-def _key_number(row: ParameterRow) -> KeyNumber:
-    pair = row.both is None
-    norm = f"norm {row.norm}" if row.norm else ""
-    cells = {"": row.both} if row.both is not None else {" left": row.left, " right": row.right}
-    few = ", ".join(f"{c.few}{side}" for side, c in cells.items() if c is not None and c.few)
-    return KeyNumber(
-        name=row.name,
-        title=row.title,
-        unit=row.unit,
-        pair=pair,
-        text="" if row.both is None else row.both.text,
-        left="–" if row.left is None else row.left.text,
-        right="–" if row.right is None else row.right.text,
-        words=", ".join(w for w in (_plus_minus(row), few, row.difference, norm) if w),
-    )
-
-
-def _plus_minus(row: ParameterRow) -> str:
-    """What the numbers are known to: "± 0.02", of two sides "± 4 | 5" where they differ, "± 4 | –" of one."""
-    cells = (row.both,) if row.both is not None else (row.left, row.right)
-    found = ["" if c is None else c.plus_minus for c in cells]
-    if not any(found):
-        return ""
-    if len(set(found)) == 1:
-        return found[0]
-    return f"± {' | '.join(x.removeprefix('± ') or '–' for x in found)}"

@@ -15,7 +15,7 @@ from sagittal.server.api.documents import openapi
 from sagittal.server.app import create_app
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.settings import Settings
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from tests.helpers.clinic import Clinic
 from tests.helpers.databases import write_database
 from tests.helpers.marks import sweep_after
@@ -50,7 +50,7 @@ class Target:
         with clinic.db.write() as c:
             patient = patients.create(c, None, code=f"P{next(self._numbers)}")
             session = sessions.create(c, None, patient.id)
-        with recordings.receive(
+        with receiving.receive(
             clinic.db, clinic.app.state.blobs, clinic.settings, None, session.id, "a.csv"
         ) as upload:
             upload.write(b"t,x\n0,1\n")

@@ -20,7 +20,7 @@ from sagittal.server.clinic.devices import recall_places
 from sagittal.server.report.words.device_words import judge_device
 from sagittal.server.safekeeping import erasure
 from sagittal.server.storage.schema.tables import device_check, now
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from tests.helpers.clinic import Clinic, open_clinic
 from tests.server.pages.uploads.test_upload import device
 
@@ -50,7 +50,7 @@ def visit(clinic: Clinic, *, code: str = CODE, days_ago: int = 0) -> str:
         pid = known.get(code) or patients.create(c, None, code=code).id
         sid = sessions.create(c, None, pid, performed_on=TODAY - dt.timedelta(days=days_ago)).id
     state = clinic.app.state
-    with recordings.receive(clinic.db, state.blobs, clinic.settings, None, sid, "walk.txt") as upload:
+    with receiving.receive(clinic.db, state.blobs, clinic.settings, None, sid, "walk.txt") as upload:
         upload.write(b"x")
         upload.keep()
     return sid

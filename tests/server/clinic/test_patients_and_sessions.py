@@ -23,7 +23,7 @@ from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database, Source
 from sagittal.server.storage.files.blob_folder import FolderBlobs
 from sagittal.server.storage.schema import tables
-from sagittal.server.uploads import recordings, reference_files
+from sagittal.server.uploads import receiving, recordings, reference_files
 
 NO_TRIGGERS = {
     "sqlite": ("DROP TRIGGER audit_no_update", "DROP TRIGGER audit_no_delete"),
@@ -61,7 +61,7 @@ class Clinic:
     def upload(
         self, session_id: str, name: str = "a.txt", content: bytes = b"signals"
     ) -> recordings.RecordedFile:
-        with recordings.receive(self.db, self.blobs, self.settings, self.who, session_id, name) as upload:
+        with receiving.receive(self.db, self.blobs, self.settings, self.who, session_id, name) as upload:
             upload.write(content)
             return upload.keep()
 

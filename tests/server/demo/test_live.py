@@ -11,7 +11,7 @@ from sagittal.core.subject.condition import USUAL
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.demo.clinic import PRESCRIBED
 from sagittal.server.demo.live import open_take, plan_training, stream_walk
-from sagittal.server.live_takes import live
+from sagittal.server.live_takes import live, live_events
 from sagittal.server.results import prescriptions
 from sagittal.server.storage.schema.tables import session
 from tests.helpers.clinic import open_clinic
@@ -39,7 +39,7 @@ async def test_the_demo_s_live_patient_walks_is_told_how_and_becomes_a_recording
             while True:
                 with clinic.db.read() as c:
                     take = live.current(c, sid)
-                    cues = [e for e in live.events(c, take.id) if e.kind == "cue"] if take else []
+                    cues = [e for e in live_events.events(c, take.id) if e.kind == "cue"] if take else []
                     walked = sessions.get(c, sid).walked()
                 if take is not None and take.recording_id is not None and len(cues) > 10:
                     break

@@ -17,7 +17,7 @@ from sagittal.server.storage.archive import PIECE
 from sagittal.server.storage.references import list_referenced
 from sagittal.server.storage.schema.live_tables import live_event, live_take
 from sagittal.server.storage.schema.tables import new_id, now
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving
 from tests.faults.clinic import Clinic
 
 
@@ -26,7 +26,7 @@ def test_everything_of_one_patient_and_nothing_else(tmp_path: Path) -> None:
     clinic = Clinic(tmp_path, lease_s=5.0)
     visit, take = clinic.session.id, new_id()
     for name, content in (("left/walk.csv", b"outside"), ("big.bin", bytes(3 * PIECE + 7))):
-        with recordings.receive(clinic.db, clinic.blobs, clinic.settings, None, visit, name) as upload:
+        with receiving.receive(clinic.db, clinic.blobs, clinic.settings, None, visit, name) as upload:
             upload.write(content)
             upload.keep()
     with clinic.db.write() as c:

@@ -16,7 +16,7 @@ from starlette.types import Receive, Scope, Send
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.http.compression import LONG_BYTES, Compression, accepts
 from sagittal.server.results import analyses
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving
 from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed
 from tests.server.serving import serve
@@ -58,7 +58,7 @@ async def visit(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) ->
             patient_id = patients.create(c, None, code="Z-1").id
             done, waiting = (sessions.create(c, None, patient_id).id for _ in range(2))
         analysis_id = analysed.finish(clinic, patient_id, done, analysed.files())
-        with recordings.receive(clinic.db, state.blobs, clinic.settings, None, waiting, "b.txt") as upload:
+        with receiving.receive(clinic.db, state.blobs, clinic.settings, None, waiting, "b.txt") as upload:
             upload.write(b"recording")
             upload.keep()
         with clinic.db.write() as c:

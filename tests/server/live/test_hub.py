@@ -34,7 +34,7 @@ from sagittal.server.live.messages import (
 )
 from sagittal.server.live.messages import Report as Told
 from sagittal.server.live.take import STEERING
-from sagittal.server.live_takes import live
+from sagittal.server.live_takes import live, live_events
 from sagittal.server.live_takes.live_recordings import log_path
 from sagittal.server.results import prescriptions
 from sagittal.server.storage.schema.live_tables import live_event
@@ -192,7 +192,7 @@ async def test_what_was_told_live_is_what_the_recording_says_commands_and_a_kill
     log = tmp_path / "take.log"
     log.write_bytes(bytes_of(clinic, v.session))
     with clinic.db.read() as c:
-        events = live.events(c, v.take)
+        events = live_events.events(c, v.take)
     commands = [
         Command(v.take, e.content["before"], e.kind, e.content["value"]) for e in events if e.kind in STEERING
     ]

@@ -14,7 +14,7 @@ from sagittal.server.errors import Conflict
 from sagittal.server.live.hub import Hub
 from sagittal.server.live.room import Room
 from sagittal.server.live.take import ActiveTake
-from sagittal.server.live_takes import live, live_logs, live_recordings
+from sagittal.server.live_takes import live, live_events, live_logs, live_recordings
 from sagittal.server.main import main
 from sagittal.server.safekeeping import checks
 from sagittal.server.settings import Settings
@@ -211,6 +211,6 @@ async def test_a_log_without_a_readable_sample_is_not_thrown_away(tmp_path: Path
         assert not path.exists()
         assert path.with_name(f"{take}.1.damaged").read_bytes() == hurt
         with clinic.db.read() as c:
-            [text] = live.list_damages(c, session)
+            [text] = live_events.list_damages(c, session)
         assert "damaged on the server's disk" in text
         assert any(".1.damaged" in said for said in findings(clinic.settings))

@@ -17,7 +17,7 @@ from sagittal.server.pages.job_views import (
 )
 from sagittal.server.results import filter_runs
 from sagittal.server.storage.schema.tables import now
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from tests.helpers.clinic import Clinic
 from tests.server import analysed
 
@@ -62,7 +62,7 @@ async def test_what_runs_beside_an_analysis_is_no_news_of_the_session(clinic: Cl
         assert newest is not None
         assert (newest.kind, newest.state) == (recordings.ANALYSE, "done")
         assert find_active_jobs(c, [patient], lambda j: j.session_id) == {}
-    with recordings.receive(clinic.db, state.blobs, clinic.settings, None, session, "more.txt") as upload:
+    with receiving.receive(clinic.db, state.blobs, clinic.settings, None, session, "more.txt") as upload:
         upload.write(b"more")
         upload.keep()
     with clinic.db.write() as c:

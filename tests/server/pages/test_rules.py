@@ -30,7 +30,8 @@ from sagittal.server.pages import shell
 from sagittal.server.pages.sharing import paper
 from sagittal.server.report.files.exports import analysis_files
 from sagittal.server.report.pdf import render_pdf
-from sagittal.server.report.view.headline import MOST, Headline, HeadlineSentence, find_standouts
+from sagittal.server.report.view.headline import MOST, Headline, HeadlineSentence
+from sagittal.server.report.view.standouts import find_standouts
 from sagittal.server.report.words.limits import limits_view
 from sagittal.server.storage.schema.tables import new_id
 from sagittal.web.language import LANGUAGES

@@ -12,7 +12,7 @@ from sqlalchemy import insert, select
 
 from sagittal.core.feedback import Baseline, Cue
 from sagittal.server.clinic import identities, patients, programmes, sessions
-from sagittal.server.live_takes import live
+from sagittal.server.live_takes import live_events
 from sagittal.server.pages.routes import ROUTERS
 from sagittal.server.pages.shell import FRAGMENT
 from sagittal.server.results import prescriptions
@@ -114,8 +114,8 @@ def _train(clinic: Clinic, earlier: list[str], last: str) -> None:
                     **row, recording_id=became, created_at=of.created_at, finished_at=of.created_at
                 )
             )
-            live.add_event(c, None, take, "prescription", None, began)
-            live.add_event(c, None, take, "cue", cue.t_s, {"type": "cue", **cue.to_json()})
+            live_events.add_event(c, None, take, "prescription", None, began)
+            live_events.add_event(c, None, take, "cue", cue.t_s, {"type": "cue", **cue.to_json()})
 
 
 async def asked(

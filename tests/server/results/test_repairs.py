@@ -11,7 +11,7 @@ from sagittal.server.results import analyses
 from sagittal.server.results.analyses import AnalysisRecord
 from sagittal.server.results.analysing import REPAIRED
 from sagittal.server.results.repairs import _list_changes, read_proposal, read_without_limits, take_setup
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from tests.helpers.clinic import Clinic
 from tests.server import analysed, feedback
 
@@ -102,7 +102,7 @@ def test_a_proposal_is_evidence_changes_and_the_manifest_of_the_session_with_tha
 def test_files_that_are_no_longer_the_sessions_propose_nothing(stored: Clinic) -> None:
     found = proposing(stored)
     state = (stored.db, stored.app.state.blobs, stored.settings)
-    with recordings.receive(*state, None, found.session_id, "walk.txt") as upload:
+    with receiving.receive(*state, None, found.session_id, "walk.txt") as upload:
         upload.write(b"another recording")
         upload.keep()
     with stored.db.read() as c:

@@ -35,7 +35,7 @@ from sagittal.server.storage.schema.person_tables import patient_identity
 from sagittal.server.storage.schema.report_tables import report_file, signed_report
 from sagittal.server.storage.schema.tables import audit as audit_table
 from sagittal.server.storage.schema.tables import login_session, now, user
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving
 from tests.faults.clinic import Clinic, find_room
 from tests.helpers.engines import on_both_engines, tell_commands
 
@@ -78,7 +78,7 @@ def key(request: pytest.FixtureRequest, tmp_path: Path) -> ClinicKey | None:
 
 
 def upload(clinic: Clinic, session_id: str, name: str, content: bytes) -> None:
-    with recordings.receive(clinic.db, clinic.blobs, clinic.settings, None, session_id, name) as incoming:
+    with receiving.receive(clinic.db, clinic.blobs, clinic.settings, None, session_id, name) as incoming:
         incoming.write(content)
         incoming.keep()
 

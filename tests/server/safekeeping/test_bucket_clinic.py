@@ -25,7 +25,7 @@ from sagittal.server.storage.files.blob_folder import FolderBlobs
 from sagittal.server.storage.files.blob_opening import open_blobs
 from sagittal.server.storage.files.blobs import StoreAway
 from sagittal.server.storage.schema.tables import recording_file
-from sagittal.server.uploads import recordings, uploads
+from sagittal.server.uploads import receiving, uploads
 from tests.faults.clinic import Clinic, until
 from tests.helpers.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixtures
 
@@ -51,9 +51,7 @@ def sweep_now(clinic: Clinic) -> int:
 
 
 def upload(clinic: Clinic, name: str, content: bytes) -> None:
-    with recordings.receive(
-        clinic.db, clinic.blobs, clinic.settings, None, clinic.session.id, name
-    ) as coming:
+    with receiving.receive(clinic.db, clinic.blobs, clinic.settings, None, clinic.session.id, name) as coming:
         coming.write(content)
         coming.keep()
 

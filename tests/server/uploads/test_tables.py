@@ -10,7 +10,7 @@ import pytest
 from sagittal.core.errors import ManifestError
 from sagittal.core.frames import GRAVITY
 from sagittal.server.errors import NotFound
-from sagittal.server.uploads import recordings, tables
+from sagittal.server.uploads import receiving, tables
 from sagittal.server.uploads.tables import TableShape
 from tests.core.formats.making import signals
 from tests.helpers.clinic import Clinic
@@ -28,7 +28,7 @@ def uploaded(stored: Clinic, files: dict[str, bytes]) -> str:
     session = feedback.visit(stored, feedback.person(stored), 0)
     state = (stored.db, stored.app.state.blobs, stored.settings)
     for name, content in files.items():
-        with recordings.receive(*state, None, session, name) as upload:
+        with receiving.receive(*state, None, session, name) as upload:
             upload.write(content)
             upload.keep()
     return session

@@ -12,7 +12,7 @@ import pytest
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.report.files.exports import poses_parquet
 from sagittal.server.results import analyses
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from sagittal.server.viewer.motion import ReplayMotion, prepare_motion
 from tests.helpers.clinic import Clinic, open_clinic
 from tests.server import analysed, walk
@@ -84,7 +84,7 @@ def served(loop: asyncio.AbstractEventLoop, tmp_path_factory: pytest.TempPathFac
 def _finish_analysis(clinic: Clinic, patient_id: str, session_id: str, files: Mapping[str, bytes]) -> None:
     """Do what upload and worker do, with poses whose truth is known instead of a computed result."""
     state = clinic.app.state
-    with recordings.receive(clinic.db, state.blobs, clinic.settings, None, session_id, "walk.txt") as upload:
+    with receiving.receive(clinic.db, state.blobs, clinic.settings, None, session_id, "walk.txt") as upload:
         upload.write(b"recording")
         upload.keep()
     with clinic.db.write() as c:

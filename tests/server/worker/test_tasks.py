@@ -14,7 +14,7 @@ from sagittal.server.jobs.queue import BESIDE, COMPARE_FILTERS, EXPORT, SENSITIV
 from sagittal.server.results import tunings
 from sagittal.server.settings import Settings
 from sagittal.server.storage.files.blob_source import open_source
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from sagittal.server.worker import tasks
 from sagittal.server.worker.task import TASKS, load
 from tests.faults.clinic import Clinic
@@ -74,7 +74,7 @@ def test_what_was_found_in_files_that_were_changed_since_is_not_kept(clinic: Cli
         recordings.inspect(c, clinic.queue, None, clinic.session.id)
     claim = clinic.queue.claim("test", [recordings.INSPECT])
     assert claim is not None
-    with recordings.receive(
+    with receiving.receive(
         clinic.db, clinic.blobs, clinic.settings, None, clinic.session.id, "b.txt"
     ) as upload:
         upload.write(b"more signals")

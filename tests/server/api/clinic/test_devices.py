@@ -13,7 +13,7 @@ from sagittal.core.frames import GRAVITY
 from sagittal.core.quality.devices import DeviceCheck
 from sagittal.server.api.clinic.devices import COLUMNS
 from sagittal.server.clinic import devices, patients, sessions
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from tests.helpers.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
@@ -37,7 +37,7 @@ def publish(clinic: Clinic, day: dt.date, checks: dict[str, DeviceCheck]) -> Non
         pid = known.get("P-1") or patients.create(c, None, code="P-1").id
         sid = sessions.create(c, None, pid, performed_on=day).id
     state = clinic.app.state
-    with recordings.receive(clinic.db, state.blobs, clinic.settings, None, sid, "walk.txt") as upload:
+    with receiving.receive(clinic.db, state.blobs, clinic.settings, None, sid, "walk.txt") as upload:
         upload.write(b"x")
         upload.keep()
     found = [{**x.to_json(), "segment": segment, "exchanged": False} for segment, x in checks.items()]

@@ -11,7 +11,7 @@ from sagittal.server.auth.roles import Role
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.jobs.queue import BESIDE, JobState
 from sagittal.server.pages.clinic.jobs import JOB_WORDS, KIND_WORDS, list_jobs
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving, recordings
 from tests.helpers.clinic import Clinic
 from tests.server import analysed
 
@@ -29,7 +29,7 @@ async def test_jobs_are_listed_newest_first_with_visit_and_time(clinic: Clinic) 
         patient = patients.create(c, None, code="JO-1").id
         session = sessions.create(c, None, patient, title="First walk").id
     analysed.finish(clinic, patient, session, analysed.files())
-    with recordings.receive(clinic.db, state.blobs, clinic.settings, None, session, "more.txt") as upload:
+    with receiving.receive(clinic.db, state.blobs, clinic.settings, None, session, "more.txt") as upload:
         upload.write(b"more")
         upload.keep()
     with clinic.db.write() as c:

@@ -16,7 +16,7 @@ from sagittal.server.live_takes import live
 from sagittal.server.pages.clinic.patients import FILTERS, list_patients
 from sagittal.server.storage.schema.live_tables import live_take
 from sagittal.server.storage.schema.tables import now
-from sagittal.server.uploads import recordings
+from sagittal.server.uploads import receiving
 from tests.helpers.clinic import Clinic
 from tests.server import analysed
 from tests.server.pages.results.test_patient import API, rows_of, text_of, walked
@@ -89,7 +89,7 @@ async def test_a_row_says_what_it_is_looked_for_by(clinic: Clinic) -> None:
 
     assert kinds() == {here: {"today"}, planned: {"programme"}, nobody: set()}
     state = clinic.app.state
-    with recordings.receive(clinic.db, state.blobs, clinic.settings, None, visit, "walk.txt") as upload:
+    with receiving.receive(clinic.db, state.blobs, clinic.settings, None, visit, "walk.txt") as upload:
         upload.write(b"x")
         upload.keep()
     assert kinds()[here] == {"today", "check"}, "sensors are to be checked"

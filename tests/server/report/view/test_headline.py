@@ -15,8 +15,9 @@ from sagittal.core.norms.lookup import Norms
 from sagittal.core.norms.values import NormValue
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.core.parameters.result import Parameter
-from sagittal.server.report.view.headline import LARGEST, MOST, Headline, find_changes, find_standouts
+from sagittal.server.report.view.headline import LARGEST, MOST, Headline, find_changes
 from sagittal.server.report.view.level import choose_zero
+from sagittal.server.report.view.standouts import find_standouts
 from sagittal.server.report.view.table import ParameterRow, parameter_rows
 from sagittal.server.report.words.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
 

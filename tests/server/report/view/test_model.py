@@ -17,7 +17,8 @@ from sagittal.core.parameters.result import Parameter
 from sagittal.server.report.charts.panels import FEW_BAND
 from sagittal.server.report.files.bundle import Bundle
 from sagittal.server.report.tables import curves_csv, parameters_csv
-from sagittal.server.report.view.model import _plus_minus, report_model
+from sagittal.server.report.view.key_numbers import say_plus_minus
+from sagittal.server.report.view.model import report_model
 from sagittal.server.report.view.table import FEW_NOTE, ParameterRow, parameter_rows
 from sagittal.server.report.words.wording import VARIABLES, difference_words, parameter_term, place_words
 from tests.helpers.pairs import in_pairs, plain_python
@@ -135,11 +136,11 @@ def test_a_take_of_few_strides_shows_no_norm_anywhere(bundle: Bundle) -> None:
 def test_a_large_number_says_what_each_side_is_known_to() -> None:
     left, right = both("knee_flexion_rom_deg", 70.0, 71.0, "deg")
     (found,) = parameter_rows([replace(left, n=2, uncertainty=30.8), replace(right, n=1, sd=None)])
-    assert _plus_minus(found) == "± 30.8 | –"
+    assert say_plus_minus(found) == "± 30.8 | –"
     (found,) = parameter_rows([replace(left, uncertainty=4.0), replace(right, uncertainty=5.0)])
-    assert _plus_minus(found) == "± 4.0 | 5.0"
+    assert say_plus_minus(found) == "± 4.0 | 5.0"
     (found,) = parameter_rows([left, right])
-    assert _plus_minus(found) == ""
+    assert say_plus_minus(found) == ""
 
 
 def test_no_number_is_known_to_nothing() -> None:

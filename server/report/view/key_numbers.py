@@ -1,0 +1,81 @@
+"""Large numbers of the overview: which figures they are, and each with its meaning in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from sagittal.core.parameters.catalogue import require_entries
+from sagittal.server.report.view.table import ParameterRow
+
+KEY_NUMBERS: Final = (
+    "gait_speed_mps",
+    "cadence_spm",
+    "step_length_m",
+    "knee_flexion_rom_deg",
+    "stride_time_s",
+    "stance_pct",
+    "squat_depth_deg",
+    "squat_knee_valgus_deg",
+    "squat_hip_drop_m",
+    "squat_duration_s",
+    "daily_step_count",
+    "daily_walking_min",
+    "daily_sitting_min",
+    "daily_rise_count",
+)
+"""Parameters for the overview, in this order of preference."""
+
+require_entries(KEY_NUMBERS, "sagittal.server.report.view.key_numbers")
+
+SHOWN_LARGE: Final = 4
+"""So many of them are shown, those that were measured."""
+
+
+@dataclass(frozen=True)
+class KeyNumber:
+    """One large number, or a left-right pair, with its meaning in words."""
+
+    name: str
+    title: str
+    unit: str
+    pair: bool
+    text: str
+    left: str
+    right: str
+    words: str
+
+
+def choose_key_numbers(rows: Sequence[ParameterRow]) -> tuple[KeyNumber, ...]:
+    """The first of KEY_NUMBERS that were measured well enough."""
+    found = (r for name in KEY_NUMBERS for r in rows if r.name == name)
+    return tuple(_key_number(r) for r in found if r.reason is None and not r.low_confidence)[:SHOWN_LARGE]
+
+
+def _key_number(row: ParameterRow) -> KeyNumber:
+    pair = row.both is None
+    norm = f"norm {row.norm}" if row.norm else ""
+    cells = {"": row.both} if row.both is not None else {" left": row.left, " right": row.right}
+    few = ", ".join(f"{c.few}{side}" for side, c in cells.items() if c is not None and c.few)
+    return KeyNumber(
+        name=row.name,
+        title=row.title,
+        unit=row.unit,
+        pair=pair,
+        text="" if row.both is None else row.both.text,
+        left="–" if row.left is None else row.left.text,
+        right="–" if row.right is None else row.right.text,
+        words=", ".join(w for w in (say_plus_minus(row), few, row.difference, norm) if w),
+    )
+
+
+def say_plus_minus(row: ParameterRow) -> str:
+    """What the numbers are known to: "± 0.02", of two sides "± 4 | 5" where they differ, "± 4 | –" of one."""
+    cells = (row.both,) if row.both is not None else (row.left, row.right)
+    found = ["" if c is None else c.plus_minus for c in cells]
+    if not any(found):
+        return ""
+    if len(set(found)) == 1:
+        return found[0]
+    return f"± {' | '.join(x.removeprefix('± ') or '–' for x in found)}"

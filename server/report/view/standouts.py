@@ -1,0 +1,215 @@
+"""Figures of a take that stand out: each against its norm, a limit or the other side, in one sentence.
+
+What becomes of the sentences says server/report/view/headline.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import hypot
+from typing import Final
+
+from sagittal.core.flags import Flag
+from sagittal.core.frames import SIDES, Side
+from sagittal.core.norms.lookup import Norms
+from sagittal.core.parameters.flats import OTHER
+from sagittal.core.parameters.variability import NORMAL_95
+from sagittal.server.report.view.headline import (
+    LARGEST,
+    HeadlineSentence,
+    choose_digits,
+    make_sentence,
+    take_largest,
+)
+from sagittal.server.report.view.level import from_standing
+from sagittal.server.report.view.table import BEYOND_SD, ParameterRow, TableCell
+from sagittal.server.report.words.headline_phrases import (
+    PELVIS_RISES,
+    PHRASES,
+    SHORT_AND_QUICK,
+    Family,
+    Phrases,
+)
+from sagittal.server.report.words.wording import format_number, parameter_term, round_difference
+
+NEARLY: Final = 0.8
+"""A difference of the sides is told before one from the norm unless that is larger by more than this."""
+
+AT_SPEED: Final = "people at this speed"
+
+
+def find_standouts(
+    rows: Sequence[ParameterRow], norms: Norms, flags: Sequence[Flag] = ()
+) -> tuple[tuple[HeadlineSentence, ...], int]:
+    """Figures beyond the norm, a limit or the other side, largest first, and how many could have been.
+
+    Parameters
+    ----------
+    rows : of the parameter table, every angle from the zero of its curve (`level.choose_zero`).
+    norms : they were held against.
+    flags : values against limits.
+    """
+    told = [row for row in rows if _phrases(row.name) is not None and not row.low_confidence]
+    found = [s for row in told for s in _of_row(row, norms)]
+    found = _join_steps(found, {row.name: row for row in told})
+    found += _of_flags(flags)
+    looked_at = sum(
+        any(c is not None and c.z is not None for c in (row.both, row.left, row.right))
+        or row.symmetry is not None
+        for row in told
+    )
+    return take_largest(found), looked_at
+
+
+def _phrases(name: str) -> Phrases | None:
+    return PHRASES.get(from_standing(name) or name)
+
+
+def _of_row(row: ParameterRow, norms: Norms) -> Iterator[HeadlineSentence]:
+    """At most one sentence: whichever comparison says most of the figure."""
+    p = _phrases(row.name)
+    if p is None:
+        return
+    if row.both is not None:
+        z = _certain_z(row, row.both)
+        if z is not None and abs(z) > BEYOND_SD:
+            yield from _against_norm(row, p.both_low if z < 0 else p.both_high, None, abs(z), p)
+        return
+    z_of = {side: z for side in SIDES if (z := _certain_z(row, _cell(row, side))) is not None}
+    apart = _of_sides(row, p, norms)
+    if len(z_of) == len(SIDES) and (apart is None or apart.size <= 1.0):
+        # sides that cannot be told apart speak together
+        mean = sum(z_of.values()) / len(SIDES)
+        if abs(mean) > BEYOND_SD:
+            yield from _against_norm(row, p.both_low if mean < 0 else p.both_high, None, abs(mean), p)
+        return
+    far = {side: z for side, z in z_of.items() if abs(z) > BEYOND_SD}
+    size = max((abs(z) for z in far.values()), default=0.0) / BEYOND_SD
+    if apart is not None and apart.size > 1.0 and apart.size >= NEARLY * min(size, LARGEST):
+        yield apart
+    elif far:
+        side: Side = max(far, key=lambda s: abs(far[s]))
+        yield from _against_norm(row, p.side_low if far[side] < 0 else p.side_high, side, abs(far[side]), p)
+
+
+def _certain_z(row: ParameterRow, cell: TableCell | None) -> float | None:
+    """Deviations from the norm's mean, of people and of the measurement together; None without a norm."""
+    if cell is None or cell.z is None or row.norm_sd is None:
+        return None
+    measured = 0.0 if cell.uncertainty is None else cell.uncertainty / NORMAL_95
+    return cell.z * row.norm_sd / hypot(row.norm_sd, measured)
+
+
+def _against_norm(
+    row: ParameterRow, pattern: str, side: Side | None, z: float, p: Phrases
+) -> Iterator[HeadlineSentence]:
+    if not pattern or row.norm_mean is None or row.norm_sd is None:
+        return
+    words = {
+        "a": _number(row, row.norm_mean - row.norm_sd),
+        "b": _number(row, row.norm_mean + row.norm_sd),
+        **{key: _number(row, c.value) for key, c in (("l", row.left), ("r", row.right)) if c is not None},
+    }
+    spoken = row.both if row.both is not None else _cell(row, side)
+    if spoken is not None:
+        words["v"] = _number(row, spoken.value)
+    yield make_sentence(
+        row.name, p.family, "norm", z / BEYOND_SD, pattern, words, side, _people(row, p.family)
+    )
+
+
+def _people(row: ParameterRow, family: Family) -> str:
+    """Of whom a norm is: speed itself cannot be held against people at this speed."""
+    if family == "speed":
+        return "people of this age"
+    return AT_SPEED if family == "step" or row.comfortable is not None else "healthy people"
+
+
+def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence | None:
+    """The sides against each other, of the one further from its norm.
+
+    None where strides and measurement leave open which is larger, and where both are within the norm.
+    """
+    s = row.symmetry
+    if s is None or not s.clear or s.low is None or s.high is None or not (p.smaller or p.larger):
+        return None
+    if row.left is None or row.right is None:
+        return None
+    name = from_standing(row.name) or row.name
+    norm = norms.values.get(name) or norms.comfortable.get(name)
+    healthy = BEYOND_SD * norm.difference_sd if norm is not None and norm.difference_sd else 0.0
+    share = p.apart * 0.5 * (abs(row.left.value) + abs(row.right.value))
+    size = abs(s.difference) / max(0.5 * (s.high - s.low), healthy, share, p.least)
+    larger: Side = s.first if s.difference > 0.0 else OTHER[s.first]
+    side = _side_off_norm(row) if _has_norm(row) else larger if p.names_larger else OTHER[larger]
+    if side is None:
+        return None
+    apart = round_difference(row.left.value, row.right.value, parameter_term(name))
+    words = {"d": _number(row, apart), "cm": format_number(100.0 * apart, 0)}
+    return make_sentence(
+        row.name, p.family, "sides", size, p.larger if side == larger else p.smaller, words, side
+    )
+
+
+def _has_norm(row: ParameterRow) -> bool:
+    return any(c is not None and c.z is not None for c in (row.left, row.right))
+
+
+def _side_off_norm(row: ParameterRow) -> Side | None:
+    """The side further from its norm; None where both are within it, as their row shows them.
+
+    The uncertainty of a level is mostly common to both sides (the definition of a contact); whether the sides
+    differ is judged by the interval of their difference.
+    """
+    z = {side: c.z for side in SIDES if (c := _cell(row, side)) is not None and c.z is not None}
+    furthest = max(z, key=lambda side: abs(z[side]))
+    return furthest if abs(z[furthest]) > BEYOND_SD else None
+
+
+def _join_steps(found: list[HeadlineSentence], rows: Mapping[str, ParameterRow]) -> list[HeadlineSentence]:
+    """Short steps and a quick cadence are one sentence."""
+    steps, cadence = rows.get("step_length_m"), rows.get("cadence_spm")
+    if steps is None or cadence is None or cadence.both is None or steps.norm_mean is None:
+        return found
+    z = [z for c in (steps.left, steps.right) if (z := _certain_z(steps, c)) is not None]
+    quick = _certain_z(cadence, cadence.both)
+    if len(z) < len(SIDES) or max(z) >= -BEYOND_SD or quick is None or quick <= BEYOND_SD:
+        return found
+    low, high = steps.norm_mean - (steps.norm_sd or 0.0), steps.norm_mean + (steps.norm_sd or 0.0)
+    mean = sum(c.value for c in (steps.left, steps.right) if c is not None) / len(SIDES)
+    words = {
+        "l": _number(steps, mean),
+        "c": _number(cadence, cadence.both.value),
+        "a": _number(steps, low),
+        "b": _number(steps, high),
+    }
+    size = max(-min(z), quick) / BEYOND_SD
+    others = [s for s in found if s.name not in ("step_length_m", "cadence_spm")]
+    told = make_sentence("step_length_m", "step", "norm", size, SHORT_AND_QUICK, words, None, AT_SPEED)
+    return [*others, told]
+
+
+def _of_flags(flags: Sequence[Flag]) -> list[HeadlineSentence]:
+    """What only a limit judges: the pelvis that a side lifts in swing."""
+    return [
+        make_sentence(
+            f.measure,
+            "trunk",
+            "limit",
+            1.0 + (f.value - f.limit) / f.spread,
+            PELVIS_RISES,
+            {"v": format_number(f.value, 0), "b": format_number(f.limit, 0)},
+            f.side,
+        )
+        for f in flags
+        if f.name == "hip_hiking" and f.exceeded and f.certain and f.verified
+        if f.value is not None and f.limit is not None and f.spread is not None and f.side is not None
+    ]
+
+
+def _cell(row: ParameterRow, side: Side | None) -> TableCell | None:
+    return {"left": row.left, "right": row.right}[side] if side is not None else None
+
+
+def _number(row: ParameterRow, value: float) -> str:
+    return format_number(value, choose_digits(from_standing(row.name) or row.name))

@@ -1,0 +1,107 @@
+"""What daily life is called: its kinds and transitions in words, durations, times of day and days.
+
+Without a clock hours and days count from the first sample.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from sagittal.core.activity.result import ActivityKind, ActivityResult, TransitionKind, TransitionRefusal
+
+DAY_S: Final = 86400.0
+HOUR_S: Final = 3600.0
+
+DASH: Final = "–"
+
+KIND_LABELS: Final[Mapping[ActivityKind, str]] = {
+    "lying": "Lying",
+    "sitting": "Sitting",
+    "standing": "Standing",
+    "walking": "Walking",
+    "stairs_up": "Stairs up",
+    "stairs_down": "Stairs down",
+    "unknown": "Unknown",
+    "non_wear": "Not worn",
+    "gap": "Not recorded",
+}
+
+KIND_WORDS: Final[Mapping[ActivityKind, str]] = {
+    "lying": "the trunk is more than 70° from upright and holds still",
+    "sitting": "after a stand-to-sit or before a sit-to-stand, no steps",
+    "standing": "after a sit-to-stand, before a stand-to-sit, or between walks, no steps",
+    "walking": "steps in a row, on the level",
+    "stairs_up": "experimental: walking with the trunk leaning forward and rocking",
+    "stairs_down": "experimental: walking with the trunk rocking strongly; most are missed",
+    "unknown": "worn, but the signals contradict each other or say nothing",
+    "non_wear": "no movement for half an hour or longer, not even breathing",
+    "gap": "the device stored no samples",
+}
+"""How each kind is told, in the words of its definition (docs/science/activity.md)."""
+
+WALKED: Final[tuple[ActivityKind, ...]] = ("walking", "stairs_up", "stairs_down")
+
+TOTALS: Final[Mapping[str, tuple[ActivityKind, ...]]] = {
+    "Lying": ("lying",),
+    "Sitting": ("sitting",),
+    "Standing": ("standing",),
+    "Walking": WALKED,
+    "Unknown": ("unknown",),
+    "Not worn": ("non_wear",),
+    "Not recorded": ("gap",),
+}
+"""Columns of the totals → what they add up."""
+
+TRANSITION_LABELS: Final[Mapping[TransitionKind, str]] = {
+    "sit_to_stand": "Sit to stand",
+    "stand_to_sit": "Stand to sit",
+    "sit_to_lie": "Sit to lie",
+    "lie_to_sit": "Lie to sit",
+}
+
+REFUSALS: Final[Mapping[TransitionRefusal, str]] = {
+    "lean_below_limit": "below the limit: the trunk leaned less than 20°",
+    "chest_did_not_rise": "a bow: the chest did not rise or fall enough",
+    "direction_unclear": "up or down is not clear",
+    "near_lying": "belongs to lying down or getting up",
+    "while_walking": "amid walking",
+}
+
+
+def format_hours(minutes: float) -> str:
+    """Format minutes as h:min, "7:40"."""
+    whole = round(minutes)
+    return f"{whole // 60}:{whole % 60:02d}"
+
+
+def find_midnight(found: ActivityResult, at_s: float) -> float:
+    """Where the day of a moment begins, s from the first sample (below 0 on the first day of a clock)."""
+    return float(np.floor((at_s + _since_midnight(found)) / DAY_S) * DAY_S - _since_midnight(found))
+
+
+def clock_label(found: ActivityResult, at_s: float) -> str:
+    """Time of day as "14:05", or hours and minutes since the first sample without a clock."""
+    minutes = int((at_s + _since_midnight(found)) // 60)
+    return f"{minutes // 60 % 24:02d}:{minutes % 60:02d}"
+
+
+def find_day_label(found: ActivityResult, at_s: float) -> str:
+    """Name of the day of a moment, empty outside all days."""
+    for i, d in enumerate(found.days):
+        if d.start_s <= at_s < d.end_s:
+            return day_label(i, d.date)
+    return ""
+
+
+def day_label(number: int, date: dt.date | None) -> str:
+    """Name a day by its date, "Mon 16 Nov", or by its number."""
+    return f"Day {number + 1}" if date is None else f"{date:%a} {date.day} {date:%b}"
+
+
+def _since_midnight(found: ActivityResult) -> float:
+    at = found.started_at
+    return 0.0 if at is None else at.hour * HOUR_S + at.minute * 60.0 + at.second + at.microsecond * 1e-6

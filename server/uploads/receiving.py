@@ -1,0 +1,156 @@
+"""One file on its way into the upload set of a session: its name, its size and the room for it.
+
+with receiving.receive(db, blobs, settings, actor, sid, "left.csv") as upload:
+    upload.write(chunk)          # as often as there are chunks; constant memory
+    stored = upload.keep()       # file on disk first, then the row
+"""
+
+from __future__ import annotations
+
+import shutil
+import unicodedata
+from typing import Final, Self
+
+from sqlalchemy import Connection
+
+from sagittal.core.errors import InputError
+from sagittal.server import audit
+from sagittal.server.errors import ServiceError, TooLarge
+from sagittal.server.settings import Settings
+from sagittal.server.storage.db import Database
+from sagittal.server.storage.files.blobs import Blob, BlobStore
+from sagittal.server.storage.fs import SizeLimitError
+from sagittal.server.storage.refusal import Refusal
+from sagittal.server.uploads.recordings import RecordedFile, add_file, current, patient_of
+
+
+class receive:  # noqa: N801 - a verb: with receive(...) as upload
+    """One file on its way into the current set; leaving without `keep` leaves nothing behind.
+
+    Parameters
+    ----------
+    size : bytes that are announced, 0 = not known; room for them is asked for before the first comes.
+
+    Raises
+    ------
+    NotFound
+        no such session.
+    ServiceError
+        bad_file_name, disk_full. TooLarge: file_too_large, set_too_large, too_many_files.
+    """
+
+    def __init__(
+        self,
+        db: Database,
+        blobs: BlobStore,
+        settings: Settings,
+        actor: audit.Actor | None,
+        session_id: str,
+        name: str,
+        size: int = 0,
+    ) -> None:
+        self._db, self._blobs, self._settings, self._actor = db, blobs, settings, actor
+        self._session_id = session_id
+        self._name = check_name(name)
+        with db.read() as c:
+            self._space = patient_of(c, session_id)
+            self._check_set(c, 0)
+        require_room(blobs, settings, size)
+        self._receiver = blobs.receive(self._space, settings.max_file_bytes)
+
+    def write(self, data: bytes) -> None:
+        """Append bytes; raises TooLarge file_too_large, DiskFull."""
+        require_room(self._blobs, self._settings, len(data))
+        try:
+            self._receiver.write(data)
+        except SizeLimitError as error:
+            raise make_too_large(self._name, error.limit) from None
+
+    def keep(self) -> RecordedFile:
+        """Store the file and its row; a file of the same name in the set is replaced."""
+        blob = self._receiver.keep()
+        with self._db.write() as c:
+            self._blobs.require(patient_of(c, self._session_id), blob.sha256)
+            self._check_set(c, blob.size)
+            return self._add(c, blob)
+
+    def _check_set(self, c: Connection, size: int) -> None:
+        check_set(c, self._settings, self._session_id, self._name, size)
+
+    def _add(self, c: Connection, blob: Blob) -> RecordedFile:
+        return add_file(c, self._actor, self._session_id, self._name, blob)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._receiver.__exit__(*error)
+
+
+def check_set(c: Connection, settings: Settings, session_id: str, name: str, size: int) -> None:
+    """Raise TooLarge set_too_large, too_many_files unless a file of this size has room beside the others."""
+    this = current(c, session_id)
+    others = [f for f in this.files if f.name != name] if this else []
+    if len(others) + 1 > settings.max_files:
+        raise TooLarge("too_many_files", f"A recording has at most {settings.max_files} files.")
+    total = sum(f.size for f in others) + size
+    if total > settings.max_set_bytes:
+        raise TooLarge(
+            "set_too_large",
+            f"With '{name}' the recording has {total / 1e6:.0f} MB, "
+            f"at most {settings.max_set_bytes / 1e6:g} MB are allowed. Remove files first.",
+        )
+
+
+def make_too_large(name: str, limit: int) -> TooLarge:
+    """What is answered to a file beyond the limit of one file, in bytes."""
+    return TooLarge(
+        "file_too_large",
+        f"'{name}' is larger than {limit / 1e6:g} MB, the limit of this installation. "
+        "Split the recording or ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
+    )
+
+
+class DiskFull(ServiceError):  # noqa: N818 - the name of the HTTP status
+    """There is too little free space to take a file, and to go on working."""
+
+    status = 507
+
+    def __init__(self) -> None:
+        super().__init__(Refusal.FULL.value, Refusal.FULL.sentence)
+
+
+def require_room(blobs: BlobStore, settings: Settings, size: int) -> None:
+    """Raise DiskFull when the disk cannot take so many bytes and keep the free space of the settings."""
+    if shutil.disk_usage(blobs.incoming).free - size < settings.min_free_bytes:
+        raise DiskFull
+
+
+def check_name(name: str) -> str:
+    """A file's name as we keep it: forward slashes, composed Unicode; raises InputError bad_file_name."""
+    plain = unicodedata.normalize("NFC", name).replace("\\", "/").strip("/")
+    parts = plain.split("/")
+    if (
+        not plain
+        or len(plain) > 500
+        or any(p.strip() in {"", ".", ".."} for p in parts)
+        or _unprintable(plain)
+    ):
+        raise InputError(
+            "bad_file_name", "A file's name has 1 to 500 printable characters and no '..' among its folders."
+        )
+    return plain
+
+
+def _unprintable(name: str) -> bool:
+    # control characters, lone surrogates, marks that turn the direction of writing and so show another
+    # ending, and what stands for bytes that were no text; joiners stay, emoji are made of them
+    return any(
+        unicodedata.category(c) in {"Cc", "Cs"}
+        or unicodedata.bidirectional(c) in _TURNING
+        or c in "\u200e\u200f\u061c\ufffd"
+        for c in name
+    )
+
+
+_TURNING: Final = frozenset(("LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"))
