@@ -44,6 +44,9 @@ COMMANDS: Final = {
 }
 """Command → what it does, as `sagittal --help` says without loading it."""
 
+SCIENCE: Final = frozenset({"bench", "sensitivity", "simulate", "stairs", "study", "tune"})
+"""Commands whose module is in server/commands/science."""
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
@@ -100,9 +103,14 @@ def make_app() -> App:
         default_parameter=Parameter(consume_multiple=True, negative=(), show_default=False),
     )
     for name, text in COMMANDS.items():
-        function = name.replace("-", "_")
-        app.command(f"sagittal.server.commands.{function}:{function}", name=name, help=text)
+        app.command(f"{find_module(name)}:{name.replace('-', '_')}", name=name, help=text)
     return app
+
+
+def find_module(command: str) -> str:
+    """Name of the module of a command, whose function has the module's name."""
+    room = "commands.science" if command in SCIENCE else "commands"
+    return f"sagittal.server.{room}.{command.replace('-', '_')}"
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ from sagittal.core.functional_tests.sway import STANDING_QUIETLY, measure_sway
 from sagittal.core.functional_tests.trunk import TRUNK, follow_trunk
 from sagittal.core.functional_tests.tug import measure_tug
 from sagittal.core.functional_tests.walks import LENGTH, measure_six_minutes, measure_ten_metres
-from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.core.parameters.measure import MeasuredGait
 from sagittal.core.signals.recording import GivenLimits, Subject, UniformRecording
 from sagittal.core.signals.rest import QuietParams, find_rest_windows, measure_quietness

@@ -36,9 +36,9 @@ from sagittal.core.fusion.attitude import AttitudeParams
 from sagittal.core.fusion.live_attitude import AttitudeTracker
 from sagittal.core.fusion.live_drift import HeadingHold
 from sagittal.core.online.calibrated import LiveCalibration
-from sagittal.core.parameters.live_history import MOST, SampleHistory
-from sagittal.core.parameters.live_stride import LiveStride
-from sagittal.core.parameters.live_strides import HistoryColumns, LiveStrides
+from sagittal.core.parameters.live.live_history import MOST, SampleHistory
+from sagittal.core.parameters.live.live_stride import LiveStride
+from sagittal.core.parameters.live.live_strides import HistoryColumns, LiveStrides
 from sagittal.core.parameters.spatial import Surface
 from sagittal.core.signals.rest import index_window
 from sagittal.core.timeline.columns import find_columns, take_columns, take_mask

@@ -17,7 +17,7 @@ from sagittal.core.errors import Notice
 from sagittal.core.estimators import NO_FIGURE, LiveMethod
 from sagittal.core.events.result import GaitEvent
 from sagittal.core.frames import Floats, Segment, Side
-from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.live.live_stride import LiveStride
 
 if TYPE_CHECKING:
     from sagittal.core.calibration.score import CalibrationScore

@@ -31,7 +31,7 @@ from sagittal.core.frames import SIDES, Protocol, Side
 from sagittal.core.functional_tests.result import GuidedTestView
 from sagittal.core.online import OnlineSession
 from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame
-from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.core.signals.recording import Subject
 from sagittal.server.live import wire
 from sagittal.server.live.messages import (

@@ -19,7 +19,7 @@ from sagittal.core.feedback import Cue, FeedbackState
 from sagittal.core.frames import SIDES, SUFFIX, Floats, Side
 from sagittal.core.functional_tests.result import GuidedTestView, TimedSegment
 from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame, SensorHealth
-from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.core.parameters.result import Parameter
 from sagittal.server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
 from sagittal.server.report.view.calibration_checks import say_verdict

@@ -22,7 +22,7 @@ from sagittal.core.online.frame import (
     SensorHealth,
     Stage,
 )
-from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.server.live import wire
 
 SEGMENTS = ("pelvis", "thigh_l", "shank_l", "foot_l", "thigh_r", "shank_r", "foot_r")

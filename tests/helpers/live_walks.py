@@ -13,7 +13,7 @@ from sagittal.core.formats.live_log import Hello, SampleBatch, SensorInfo, Strea
 from sagittal.core.frames import Floats, Side
 from sagittal.core.online import LiveFrame, LiveStride, OnlineSession
 from sagittal.core.online.chain import LiveChain
-from sagittal.core.parameters.live_history import SampleHistory
+from sagittal.core.parameters.live.live_history import SampleHistory
 from sagittal.core.signals.recording import UniformRecording
 
 

@@ -29,7 +29,7 @@ from sagittal.core.rotation import about
 from sagittal.core.signals.calibrated import CalibratedRecording, Calibration, SegmentCalibration
 from sagittal.core.signals.recording import Recording, SensorSignals, Subject, UniformRecording
 from sagittal.server.clinic import sessions
-from sagittal.server.commands.sensitivity import analyse_simulated
+from sagittal.server.commands.science.sensitivity import analyse_simulated
 from sagittal.server.jobs.queue import COMPARE_FILTERS, SENSITIVITY
 from sagittal.server.report.files.exports import analysis_files
 from sagittal.server.report.files.filter_files import filter_run_files

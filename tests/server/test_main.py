@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from sagittal.server.main import COMMANDS, main, make_app
+from sagittal.server.main import COMMANDS, find_module, main, make_app
 
 HEAVY = ("numba", "numpy", "pyarrow", "pydantic", "sqlalchemy", "fastapi", "docutils")
 
@@ -40,7 +40,7 @@ def test_every_command_says_what_it_takes(name: str, capsys: pytest.CaptureFixtu
     said = re.sub(r"\s+", " ", capsys.readouterr().out)
     assert COMMANDS[name] in said
     function = name.replace("-", "_")
-    module = importlib.import_module(f"sagittal.server.commands.{function}")
+    module = importlib.import_module(find_module(name))
     for parameter in inspect.signature(getattr(module, function)).parameters.values():
         is_option = parameter.kind is inspect.Parameter.KEYWORD_ONLY
         assert ("--" in said) if is_option else (parameter.name.upper() in said)

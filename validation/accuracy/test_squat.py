@@ -21,7 +21,7 @@ from sagittal.core.simulate.squat_chain import measure_leg, place_as_agreed, pla
 from sagittal.core.squat.joints import JOINTS
 from sagittal.core.squat.sensitivity import LENGTHS, TURNS, SensitivityTable, analyse_sensitivity
 from sagittal.core.timeline import synchronise
-from sagittal.server.commands.sensitivity import simulate_case
+from sagittal.server.commands.science.sensitivity import simulate_case
 from sagittal.server.report.view.sensitivity import COLUMNS
 from tests.core.body.chain.squats import HEIGHT_M, run, squat_on
 from tests.core.calibration.test_table_top import QUIET, WORN, carry, errors_deg, take, worn_on

@@ -24,7 +24,7 @@ from sagittal.core.events.live_contacts import ContactDetector
 from sagittal.core.formats.live_log import SampleBatch
 from sagittal.core.frames import Segment
 from sagittal.core.online import LiveStride, OnlineSession, compile_live_kernels
-from sagittal.core.parameters.live_strides import LiveStrides
+from sagittal.core.parameters.live.live_strides import LiveStrides
 from sagittal.core.signals.recording import UniformRecording
 from tests.helpers.live_walks import batches, hello_of
 from tests.helpers.walks import only, simulated

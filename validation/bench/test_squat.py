@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from sagittal.core.squat.sensitivity import analyse_sensitivity
-from sagittal.server.commands.sensitivity import simulate_case
+from sagittal.server.commands.science.sensitivity import simulate_case
 from tests.helpers.pairs import in_pairs, plain_python
 
 MOST_PIECES = 300.0

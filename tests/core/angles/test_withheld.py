@@ -21,7 +21,7 @@ from sagittal.core.events.result import Stride, Strides
 from sagittal.core.frames import Segment
 from sagittal.core.parameters.catalogue import list_curve_figures
 from sagittal.core.parameters.kinematic import cycle_curves, summarise_angles
-from sagittal.core.parameters.live_figures import StrideSpan, early_figures
+from sagittal.core.parameters.live.live_figures import StrideSpan, early_figures
 from sagittal.core.parameters.measure import measure_gait
 from sagittal.core.parameters.spatial import GROUND, NAMES
 from sagittal.core.parameters.temporal import per_stride, summarise_times

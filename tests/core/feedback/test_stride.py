@@ -6,7 +6,7 @@ from dataclasses import fields
 from typing import get_type_hints
 
 from sagittal.core.feedback.stride import StrideLike
-from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.live.live_stride import LiveStride
 from tests.helpers.feedback import Walked
 
 

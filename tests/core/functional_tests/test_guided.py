@@ -17,7 +17,7 @@ from sagittal.core.functional_tests.result import FunctionalTest, GuidedTestView
 from sagittal.core.functional_tests.sway import measure_sway
 from sagittal.core.functional_tests.trunk import follow_trunk
 from sagittal.core.functional_tests.tug import measure_tug
-from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.core.signals.recording import GivenLimits, UniformRecording
 from sagittal.core.timeline.live import UniformBlock
 from tests.core.functional_tests.test_timed_tests import rises, tug, wear

@@ -19,7 +19,7 @@ from sagittal.core.frames import FOOT, SIDES, Segment
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.online import LiveFrame, LiveStride, OnlineSession
 from sagittal.core.online.chain import COURSES
-from sagittal.core.parameters.live_stride import NOT_YET
+from sagittal.core.parameters.live.live_stride import NOT_YET
 from sagittal.core.parameters.measure import MeasuredGait, Tracks, measure_gait
 from sagittal.core.signals.recording import UniformRecording
 from tests.helpers.live_walks import Run, batches, hello_of, live, recorded

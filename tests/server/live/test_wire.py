@@ -14,7 +14,7 @@ import pytest
 from sagittal.core.calibration.score import CalibrationCheck, CalibrationScore
 from sagittal.core.errors import Notice
 from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame, SegmentCheck, SensorHealth
-from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.server.live import wire
 from sagittal.server.live.room import KEPT, QUEUE, Room
 

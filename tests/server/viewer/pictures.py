@@ -10,7 +10,7 @@ import numpy as np
 from sagittal.core.body.poses import Poses
 from sagittal.core.frames import FOOT, SIDES, SUFFIX, Side
 from sagittal.core.online.frame import LiveFrame
-from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.server.live import wire
 from sagittal.server.live.messages import Picture
 from tests.server import walk

@@ -23,7 +23,7 @@ from sagittal.core.parameters.kinematic import (
     stride_figures,
     turning_angle,
 )
-from sagittal.core.parameters.live_stride import NOT_YET
+from sagittal.core.parameters.live.live_stride import NOT_YET
 from sagittal.core.parameters.phases import measure_phases
 from sagittal.core.parameters.plausible import IMPOSSIBLE, is_impossible
 from sagittal.core.parameters.rows import Value, read_row

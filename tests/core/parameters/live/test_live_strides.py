@@ -14,9 +14,9 @@ from sagittal.core.events.live_contacts import KnownContact
 from sagittal.core.events.result import GaitEvent
 from sagittal.core.frames import SIDES, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
-from sagittal.core.parameters.live_history import SampleHistory
-from sagittal.core.parameters.live_stride import NOT_YET, LiveStride
-from sagittal.core.parameters.live_strides import HistoryColumns, LiveStrides
+from sagittal.core.parameters.live.live_history import SampleHistory
+from sagittal.core.parameters.live.live_stride import NOT_YET, LiveStride
+from sagittal.core.parameters.live.live_strides import HistoryColumns, LiveStrides
 from sagittal.core.parameters.measure import MeasuredGait, Tracks, measure_gait
 from sagittal.core.parameters.spatial import NAMES as SPATIAL
 from sagittal.core.parameters.spatial import Surface

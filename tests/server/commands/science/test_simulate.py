@@ -8,7 +8,7 @@ import pytest
 
 from sagittal.core.formats import SourceFile, read_recording
 from sagittal.core.simulate import MOVEMENTS, SCRIPTS
-from sagittal.server.commands.simulate import simulate
+from sagittal.server.commands.science.simulate import simulate
 
 
 def _rows(file: Path) -> list[dict[str, str]]:

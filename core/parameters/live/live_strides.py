@@ -27,9 +27,9 @@ from sagittal.core.events.strides import NEAR_S, side_strides
 from sagittal.core.frames import FOOT, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
 from sagittal.core.parameters.flats import OTHER
-from sagittal.core.parameters.live_figures import StrideSpan, early_figures, late_figures
-from sagittal.core.parameters.live_history import KEPT_S, SampleHistory
-from sagittal.core.parameters.live_stride import LiveStride
+from sagittal.core.parameters.live.live_figures import StrideSpan, early_figures, late_figures
+from sagittal.core.parameters.live.live_history import KEPT_S, SampleHistory
+from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.core.parameters.rows import Value
 from sagittal.core.parameters.spatial import NAMES as SPATIAL
 from sagittal.core.parameters.spatial import Surface

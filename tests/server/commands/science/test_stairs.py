@@ -11,7 +11,7 @@ from sagittal.core.formats import write_recording
 from sagittal.core.simulate.chest import Day, PostureHold, simulate_day
 from sagittal.core.simulate.setup import RecordingSetup
 from sagittal.server.commands.analyse import analyse
-from sagittal.server.commands.stairs import stairs
+from sagittal.server.commands.science.stairs import stairs
 
 WALKED: Day = (
     PostureHold("stand", 10.0),

@@ -1,0 +1,1 @@
+"""Parameters of a walk as it streams."""

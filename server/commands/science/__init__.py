@@ -1,0 +1,1 @@
+"""Commands of science: simulate, study, bench, tune, stairs, sensitivity."""
