@@ -9,6 +9,10 @@ import pytest
 
 from tests.lint.references import mentions, missing
 
+ABOVE: Final = ".."
+HOME: Final = "/" + "home"
+"""Put together here, so that this file itself mentions nothing outside."""
+
 GOOD: Final = {
     "core/a.py": '"""docs/page.md, "One" and\n# "Two `b`"; docs/page.md, *One*, "Two `b`"."""\n',
     "docs/page.md": "# Page\n\n## One\n\n[here](#one) [a](../core/a.py) [out](https://a.org/x)\n\n"
@@ -47,7 +51,7 @@ def plant(root: Path, name: str, text: str) -> None:
         ("docs/page.md", "[a](gone.md)"),
         ("docs/page.md", "[a](#three)"),
         ("docs/page.md", "![a](gone.png)"),
-        ("docs/page.md", "[a](../../outside.md)"),
+        ("docs/page.md", f"[a]({ABOVE}/{ABOVE}/outside.md)"),
         ("docs/page.md", "[a](page.md), *Three*"),
         ("docs/page.md", "[a](page.md): *One*, *Three*"),
         ("docs/page.md", "`core/gone.py`"),
@@ -68,8 +72,8 @@ def test_a_planted_reference_that_leads_nowhere_is_found(small: Path, name: str,
         ("core/a.py", "# (clinic.md, 4)"),
         ("core/a.py", "# spec §3"),
         ("docs/page.md", "DESIGN.md"),
-        ("docs/page.md", "in ../shared"),
-        ("tests/a.py", "A = '/home/anna/sagittal'"),
+        ("docs/page.md", f"in {ABOVE}/shared"),
+        ("tests/a.py", f"A = '{HOME}/anna/sagittal'"),
     ],
 )
 def test_a_planted_mention_of_what_is_outside_is_found(small: Path, name: str, text: str) -> None:
