@@ -35,8 +35,7 @@ def read(*paths: str | Path, manifest: Mapping[str, Any] | str | Path | None = N
 
     Raises
     ------
-    SagittalError
-        `file_not_found`, or the files or the manifest are invalid; the message states the reason.
+    SagittalError `file_not_found`, or the files or the manifest are invalid; the message states the reason.
     """
     declared = None
     if isinstance(manifest, Mapping):
@@ -68,8 +67,7 @@ def analyse(
 
     Raises
     ------
-    SagittalError
-        No common time axis can be constructed, or a parameter is unknown.
+    SagittalError No common time axis can be constructed, or a parameter is unknown.
     """
     if not isinstance(recording, Recording):
         recording = read(recording, manifest=manifest)

@@ -130,8 +130,7 @@ def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
     Returns
     -------
     PoseEstimate with the reasons in `feet.withheld` and a notice `distances_withheld` naming the feet. On a
-    single
-    chain one wrong joint displaces both feet.
+    single chain one wrong joint displaces both feet.
     """
     feet = posed.feet
     if feet is None:

@@ -138,8 +138,8 @@ class _Walk:
 
     Parameters
     ----------
-    rate : (n, 3) rad/s, without bias. force : (n, 3) m/s². part : averaged samples. weights : of these. level
-    : (3,) mean force at rest, m/s².
+    rate : (n, 3) rad/s, without bias. force : (n, 3) m/s². part : averaged samples. weights : of these.
+    level : (3,) mean force at rest, m/s².
     """
 
     rate: Floats
