@@ -103,9 +103,9 @@ class StairParams:
     ----------
     rocks_rad, lean_rad : ascent: the inclination has at least this standard deviation and its mean differs by
     this much from the person's level walking. down_rocks_rad : descent: minimum standard deviation.
-    window_s : length of the classification windows; a shorter walk is level.
-    A guess: above the values of level walking with turns in three recordings, favouring missed stairs over
-    false detections (docs/science/activity.md, "Stairs").
+    window_s : length of the classification windows; a shorter walk is level. A guess: above the values of
+    level walking with turns in three recordings, favouring missed stairs over false detections
+    (docs/science/activity.md, "Stairs").
     """
 
     rocks_rad: float = 0.03

@@ -100,6 +100,10 @@ def find_anterior_axis(
     Parameters
     ----------
     q : (n, 4) sensor to its rest frame. declared : placement text, "" if not declared.
+
+    Raises
+    ------
+    CalibrationError `no_walking`, `pelvis_heading_unknown`, `not_single_axis`, `calibration_sign_conflict`.
     """
     R_vertical = vertical_frame(standing.up)
     written = read_declared_angle(declared, R_vertical, segment)

@@ -1,12 +1,12 @@
 """The direction of walking in each sensor's own world frame, from its accelerometer and gyroscope alone.
 
-Horizontal vectors are complex numbers x + iy. Every sensor has its own z-up world frame with arbitrary heading;
-the direction of walking is what all sensors have in common
-(docs/science/calibration.md, "Direction of walking").
+Horizontal vectors are complex numbers x + iy. Every sensor has its own z-up world frame with arbitrary
+heading; the direction of walking is what all sensors have in common (docs/science/calibration.md, "Direction
+of walking").
 
 Measures, all over the straight parts of a walk, each rotated back by the change of direction since the first:
-- rest-to-rest velocity with linear drift removal: ≤ 2° on a short walk out and back; for a foot every stride is
-  from rest to rest;
+- rest-to-rest velocity with linear drift removal: ≤ 2° on a short walk out and back; for a foot every stride
+  is from rest to rest;
 - principal axis of the horizontal acceleration below 4 Hz: legs ≤ 3.4°, any length of walk, without a sign.
 """
 

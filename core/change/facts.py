@@ -73,7 +73,10 @@ def name_fact(name: str, side: Side | None) -> Fact:
 
 
 def sort_changes(changes: Sequence[Change]) -> SortedChanges:
-    """Sort changes by their verdict; a group is real if any parameter in it is."""
+    """Sort changes by their verdict; a group is real if any parameter in it is.
+
+    Changes without a difference are omitted.
+    """
     facts: dict[Fact, list[Change]] = {}
     for c in changes:
         if c.difference is not None:

@@ -64,6 +64,8 @@ class Repeatability:
 def estimate_repeatability(values: Sequence[Sequence[float]]) -> Repeatability | None:
     """Estimate measurement error from one list of values per person; None with fewer than five people
     measured twice.
+
+    SEM² = pooled variance within people (Weir 2005, J Strength Cond Res 19:231).
     """
     repeated = [np.asarray(v, np.float64) for v in values if len(v) > 1]
     if len(repeated) < FEWEST:
