@@ -1,4 +1,4 @@
-"""`sagittal backup`: one file with everything, while the service runs."""
+"""`sagittal backup`: back up everything into one file while the service runs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def backup(
     prune: bool = False,
     data_dir: DataDir = None,
 ) -> int:
-    """Make one backup; 1 when there is none, or when a stored file was already gone or damaged.
+    """Create one backup; 1 on failure, or if a stored file was already missing or damaged.
 
     Parameters
     ----------

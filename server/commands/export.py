@@ -1,4 +1,4 @@
-"""`sagittal export`: the results of an analysis as a file for another program."""
+"""`sagittal export`: convert the results of an analysis to another program's file format."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def export(
     out: Path | None = None,
     code: str = "",
 ) -> int:
-    """Write the results in `folder` in one format; 1 = not possible.
+    """Write the results in `folder` in one format; 1 if not possible.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`sagittal replay`: a recording streamed to a server as a tablet would, with troubles made on purpose."""
+"""`sagittal replay`: stream a recording to a server like a tablet, optionally with simulated faults."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def replay(
     jitter: Annotated[float, Parameter(metavar="MS")] = 0.0,
     batch: Whole = 10,
 ) -> int:
-    """Pair by code and stream files, folders or zips of one take.
+    """Pair by code and stream files, folders or zips of one trial.
 
     Parameters
     ----------

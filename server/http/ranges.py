@@ -1,4 +1,4 @@
-"""Answering a request for a part of something long, such as a player's for a video (RFC 9110 §14)."""
+"""Range requests for long content, such as those of video players (RFC 9110 §14)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def answer_range(
     read: Callable[[int, int], bytes],
     media_type: str,
 ) -> Response:
-    """Answer with the one range that is asked for, or with all; several at once get all.
+    """Respond with the requested range, or the whole content if none or several are requested.
 
     Parameters
     ----------

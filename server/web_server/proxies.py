@@ -1,4 +1,4 @@
-"""Whose word about the client we take: the proxies that the operator names, and nobody else's."""
+"""Trusts forwarded client addresses only from the proxies configured by the operator."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FORWARDED_FOR: Final = b"x-forwarded-for"
 
 
 class TrustedProxies:
-    """ASGI middleware that puts the client's address and scheme in place of the proxy's.
+    """ASGI middleware that replaces the proxy's address and scheme by the client's.
 
     Parameters
     ----------

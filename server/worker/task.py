@@ -1,4 +1,4 @@
-"""A kind of job: what the child computes, and how the worker publishes what came out."""
+"""Kinds of jobs: computation in the child, and publication of results by the worker."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def _nothing() -> None:
-    """Nothing to warm."""
+    """No-op for kinds without warm-up."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ TASKS: dict[str, Task] = {}
 
 
 def register(task: Task) -> Task:
-    """Add a kind; the same kind twice is a mistake."""
+    """Register a kind; registering it twice is an error."""
     if TASKS.setdefault(task.kind, task) is not task:
         raise ValueError(f"Two tasks are named {task.kind}.")
     return task

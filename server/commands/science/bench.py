@@ -1,4 +1,4 @@
-"""`sagittal bench fusion`: published orientation filters, listed or scored on recordings with a reference."""
+"""`sagittal bench fusion`: list published orientation filters, or score them on reference recordings."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def bench(
 
 
 def _read_trials(folder: Path) -> list[ReferenceTrial]:
-    """Recordings of a folder that can be read; of the others what is wrong is said."""
+    """Read the recordings of a folder; errors are printed for unreadable ones."""
     from sagittal.core.errors import FormatError
     from sagittal.core.fusion.algorithms.benchmark import read_trial
 

@@ -1,4 +1,4 @@
-"""`sagittal stairs`: a person's own limits of stairs, as overrides that `sagittal analyse --config` takes."""
+"""`sagittal stairs`: individual stair limits, as overrides for `sagittal analyse --config`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def stairs(
     out: Annotated[Path, Parameter(metavar="JSON")],
     manifest: Manifest = None,
 ) -> int:
-    """Measure the limits on walks of one recording and write them into `out`.
+    """Measure the limits on walks of one recording and write them to `out`.
 
     Parameters
     ----------
