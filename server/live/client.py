@@ -1,6 +1,7 @@
-"""A client of the live protocol: keeps every batch until it is acknowledged, resumes, finishes with a hash.
+"""Client of the live protocol: buffers batches until acknowledged, resumes, and finishes with a hash.
 
-What a tablet's page does in JavaScript, for `sagittal replay`, the demo, tests and load generators.
+Python counterpart of the tablet page's JavaScript, for `sagittal replay`, the demo, tests and load
+generators.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ async def stream(
     seed: int | None = None,
     report: StreamReport | None = None,
 ) -> StreamReport:
-    """Stream a take and finish it.
+    """Stream a trial and finish it.
 
     Parameters
     ----------
