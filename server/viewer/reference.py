@@ -1,7 +1,8 @@
-"""A walk made of curves over the gait cycle, on the body of the person: the norm, or one's own better side.
+"""Reference walk defined by curves over the gait cycle, on the patient's body: the norm or the better
+side.
 
-Both legs follow the same curves, each at its own phase. Everything that does not depend on the moment is laid
-out once, so that a moment is a look-up, one rotation and the floor.
+Both legs follow the same curves, each at its own phase. Everything independent of time is precomputed,
+so a frame requires only a look-up, one rotation and the floor contact.
 """
 
 from __future__ import annotations
@@ -55,7 +56,8 @@ class ReferenceWalk:
         self._turns, self._points = ([list(of) for of in both] for both in (turn, points))
 
     def at(self, phases: Phases, place: tuple[float, float], heading: float) -> tuple[Floats, Floats] | None:
-        """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS`, the lower sole on the floor.
+        """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS`, with the lower sole on the
+        floor.
 
         Parameters
         ----------
@@ -70,7 +72,7 @@ class ReferenceWalk:
     def pose(
         self, left: int, right: int, place: tuple[float, float], heading: float
     ) -> tuple[Floats, Floats]:
-        """As `at`, by the rows of the curves that the legs are at."""
+        """Like `at`, with the curve rows of the legs."""
         pelvis = turn_about_z(heading, self._pelvis[left if self.lead == "left" else right])
         q, p = np.empty((len(SEGMENTS), 4)), np.zeros((len(SEGMENTS), 3))
         q[0] = pelvis
@@ -109,7 +111,7 @@ def _row(phases: Phases, side: Side, last: int) -> int | None:
 def add_standing_angles(
     curves: Mapping[str, Floats], zero: Mapping[str, float], side: Side
 ) -> dict[str, Floats]:
-    """Put the standing angles back into the mean curves of a side, so that both legs can follow them.
+    """Add the standing angles to the mean curves of a side, so that both legs can follow them.
 
     Parameters
     ----------
@@ -128,10 +130,10 @@ def add_standing_angles(
 
 
 def find_better_side(curves: Mapping[Side, Mapping[str, Floats]], norm: Mapping[str, Floats]) -> Side | None:
-    """Return the side whose sagittal curves are more like the norm's in shape, their means removed; rad.
+    """Return the side whose sagittal curves are closer in shape to the norm, with means removed; rad.
 
-    The mean of root mean squares as in `gps_sagittal`, levels left out since ours are from standing. None
-    without both sides and the norm; then there is nothing to choose by.
+    Uses the mean of root mean squares as in `gps_sagittal`, without offsets since our angles are
+    relative to standing. None without both sides and the norm, as there is no basis for a choice.
     """
     found: dict[Side, float] = {
         side: sum(_unlike(own[name], norm[name]) for name in SAGITTAL)

@@ -1,8 +1,8 @@
-"""The open 3D views: one viser server each, on its own socket, stopped when nobody has looked for a while.
+"""Open 3D views: one viser server each, on its own socket, stopped after a time without viewers.
 
-Separate server objects keep patients apart by structure: nothing is ever drawn into a shared scene. A view
-of a replay belongs to the sign-in that opened it; that of a live session is shared by all who may look at it.
-The registry lives in memory; each of several web servers has those whose id leads to it (nodes/pins.py).
+Separate servers isolate patients by design: there is no shared scene. A replay view belongs to the
+sign-in that opened it; a live view is shared by all users with access. The registry is in memory; each
+of several web servers has the views assigned to it by their ids (nodes/pins.py).
 """
 
 from __future__ import annotations
@@ -51,13 +51,13 @@ def new_id() -> str:
 
 @dataclass(eq=False)
 class FigureView(Generic[Drawn]):
-    """One figure in one viser server.
+    """One avatar in one viser server.
 
     Parameters
     ----------
-    id : unguessable, part of the address. key : what is shown, to whom. session_id : whose it is.
-    login_id : who may look, None = all whose role allows `action`. viewers : open connections. left_at :
-    monotonic time since when there are none. let_go : called once at its end.
+    id : unguessable, part of the URL. key : content and audience. session_id : its session.
+    login_id : permitted sign-in, None = all whose role permits `action`. viewers : open connections.
+    left_at : monotonic time since when there are none. let_go : called once at its end.
     """
 
     id: str
@@ -73,12 +73,12 @@ class FigureView(Generic[Drawn]):
 
     @property
     def socket(self) -> Path:
-        """Where the viser server listens."""
+        """Socket of the viser server."""
         return socket_of(self.server)
 
     @contextlib.contextmanager
     def keep_open(self) -> Iterator[None]:
-        """Keep the view open while a connection lasts."""
+        """Keep the view open during a connection."""
         self.viewers += 1
         try:
             yield
@@ -88,11 +88,11 @@ class FigureView(Generic[Drawn]):
 
 
 class FigureViews:
-    """Registry of the open views of this process; used from its event loop only.
+    """Registry of this process's open views; used from its event loop only.
 
     Parameters
     ----------
-    idle_s : life of a view that nobody watches. limit : views at most. make_id : gives their ids.
+    idle_s : lifetime of a view without viewers. limit : maximum number of views. make_id : generates ids.
     """
 
     def __init__(
@@ -108,14 +108,14 @@ class FigureViews:
         return len(set(self._views.values()))
 
     def find(self, view_id: str, login_id: str, role: Role) -> FigureView[Any] | None:
-        """Return a view to those who may look at it, None to everybody else."""
+        """Return a view to users with access, None to others."""
         view = self._views.get(view_id)
         if view is None or view.login_id not in (None, login_id) or not is_permitted(role, view.action):
             return None
         return view
 
     async def find_soon(self, view_id: str, login_id: str, role: Role) -> FigureView[Any] | None:
-        """As `find`, but wait a while for a view that nobody has opened yet."""
+        """Like `find`, but wait for a view that is not open yet, up to a timeout."""
         if view_id not in self._views:
             opened = self._awaited.setdefault(view_id, asyncio.Event())
             with contextlib.suppress(TimeoutError):
@@ -135,7 +135,7 @@ class FigureViews:
         t_s: float = 0.0,
         name: str | None = None,
     ) -> FigureView[ReplayFigure]:
-        """Return the view of one browser tab on one source, made at need.
+        """Return the view of one browser tab on one source, creating it if necessary.
 
         Parameters
         ----------
@@ -174,16 +174,16 @@ class FigureViews:
         draw: Callable[[viser.ViserServer], LiveFigure],
         attend: Callable[[FigureView[LiveFigure]], None],
     ) -> FigureView[LiveFigure]:
-        """Return the shared view of a live session, made at need.
+        """Return the shared view of a live session, creating it if necessary.
 
         Parameters
         ----------
-        draw : makes its figure; called in a thread. attend : told of a new view, on the event loop.
+        draw : creates the avatar; called in a thread. attend : called with a new view, on the event loop.
 
         Raises
         ------
         EstimationError
-            `too_many_views`, as `open`.
+            `too_many_views`, like `open`.
         """
         async with self._opening:
             key = ("live", session_id, theme)
@@ -196,7 +196,7 @@ class FigureViews:
             return view
 
     async def sweep(self) -> None:
-        """Stop every view that nobody has watched for the idle time."""
+        """Stop all views that have been idle for too long."""
         now = time.monotonic()
         for view in set(self._views.values()):
             if view.viewers == 0 and now - view.left_at >= self._idle_s:
@@ -209,7 +209,7 @@ class FigureViews:
 
     @contextlib.asynccontextmanager
     async def run(self) -> AsyncIterator[FigureViews]:
-        """Sweep in the background; stop everything at the end."""
+        """Sweep in the background; stop all views at the end."""
         sweeper = asyncio.create_task(self._sweep_for_ever())
         try:
             yield self
@@ -244,7 +244,7 @@ class FigureViews:
         return view
 
     def _enter(self, name: str | None, view: FigureView[Any]) -> None:
-        """Let a view be found by a name, unless another has it."""
+        """Register a view under a name, unless it is in use."""
         if name is None or self._views.setdefault(name, view) is not view:
             return
         names = [known for known, other in self._views.items() if other is view and known != view.id]
@@ -272,7 +272,7 @@ class FigureViews:
 
 
 def _start(draw: Callable[[viser.ViserServer], Drawn]) -> tuple[viser.ViserServer, Drawn]:
-    """Start a viser server and draw the figure in it."""
+    """Start a viser server and draw the avatar in it."""
     server = start_scene_server()
     try:
         return server, draw(server)

@@ -1,4 +1,4 @@
-"""One moment of a live figure."""
+"""One frame of a live avatar."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sagittal.core.frames import Floats, Segment, Side
 
 @dataclass(frozen=True, eq=False)
 class FigureMoment:
-    """Poses at one time of a take.
+    """Poses at one time of a trial.
 
     Parameters
     ----------
