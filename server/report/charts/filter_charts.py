@@ -28,7 +28,7 @@ AGREEMENT_HEIGHT: Final = 240
 
 
 def draw_spread(title: str, lines: Mapping[Side | None, Floats], top: float, end: float, over: Over) -> str:
-    """Draw the standard deviation between filters in degrees, by side or (None) of both.
+    """Draw the standard deviation between filters in degrees, by side, or (None) for both.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def draw_spread(title: str, lines: Mapping[Side | None, Floats], top: float, end
 
 
 def _path(plot: PlotArea, values: Floats) -> str:
-    """A curve over the whole width, interrupted where it has no value."""
+    """A curve over the full width, interrupted where it has no value."""
     x = np.linspace(0.0, 1000.0, len(values))
     return "".join(
         "M"
@@ -62,7 +62,8 @@ def _path(plot: PlotArea, values: Floats) -> str:
 def draw_agreement(
     title: str, middle: Sequence[float], difference: Sequence[float], levels: Sequence[float]
 ) -> str:
-    """Draw a Bland–Altman plot in degrees: differences over the mean of both, bias and its limits as lines.
+    """Draw a Bland–Altman plot in degrees: difference over mean, with bias and limits of agreement as
+    lines.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""Angles from the anatomical zero: rows beside those from standing, where a goniometer was used."""
+"""Angles relative to the anatomical zero, in addition to those relative to standing, if measured by
+goniometer.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +31,12 @@ _SUFFIX: Final = "_anatomical_deg"
 
 
 def from_standing(name: str) -> str | None:
-    """Name of the same figure from standing; None for any other row."""
+    """Name of the same parameter relative to standing; None for other rows."""
     return f"{name.removesuffix(_SUFFIX)}_deg" if name.endswith(_SUFFIX) else None
 
 
 def define_parameter(name: str) -> str:
-    """What a figure is, in a sentence, "" where the catalogue has none; from the anatomical zero too."""
+    """Definition of a parameter, "" if not in the catalogue; also for the anatomical zero."""
     entry = find_entry(from_standing(name) or name)
     if entry is None or from_standing(name) is None:
         return "" if entry is None else entry.definition
@@ -42,7 +44,7 @@ def define_parameter(name: str) -> str:
 
 
 def label_parameter(name: str) -> str:
-    """What a figure is called, the name itself where the catalogue has none; a level says its zero."""
+    """Label of a parameter, or its name if not in the catalogue; angles include their zero."""
     standing = from_standing(name)
     entry = find_entry(standing or name)
     if entry is None:
@@ -53,7 +55,9 @@ def label_parameter(name: str) -> str:
 def level_column(
     name: str, strides: Strides, columns: Mapping[str, Column], standing_deg: Mapping[str, float]
 ) -> Column | None:
-    """The figure of every stride from the anatomical zero: that from standing plus what was read."""
+    """Values of all strides relative to the anatomical zero: value relative to standing plus goniometer
+    reading.
+    """
     column = columns.get(from_standing(name) or "")
     if column is None:
         return None
@@ -72,7 +76,7 @@ def level_column(
 def level_parameters(
     curves: CycleCurves, standing_deg: Mapping[str, float], estimated: Collection[str] = ()
 ) -> tuple[Parameter, ...]:
-    """Figures of the variables and sides whose standing angle was entered, named "…_anatomical_deg".
+    """Parameters of variables and sides with a goniometer reading, named "…_anatomical_deg".
 
     Parameters
     ----------
@@ -100,7 +104,7 @@ def level_rows(
 
 
 def choose_zero(rows: Iterable[ParameterRow], anatomical: Collection[str]) -> tuple[ParameterRow, ...]:
-    """Rows of a page: every joint angle once, measured from the zero of its curve.
+    """Rows of a page: every joint angle once, with the zero of its curve.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
-"""Sentences of the headline: which figures speak, in which family, and in what words.
+"""Sentences of the headline: parameters, families and phrases.
 
-A pattern has one marked part, between asterisks: the number and what it says. `{side}` and `{other}` are the
-leg spoken of and its opposite, `{d}` the difference, `{v}` the value of one side, `{l}` and `{r}` those of
+A pattern has one bold part, between asterisks: the number and its meaning. `{side}` and `{other}` are the
+leg concerned and the opposite one, `{d}` the difference, `{v}` the value of one side, `{l}` and `{r}`
+those of
 both, `{a}` and `{b}` the norm's mean − 1 SD and + 1 SD.
 """
 
@@ -22,19 +23,22 @@ Family = Literal[
 
 @dataclass(frozen=True)
 class Phrases:
-    """How one figure speaks.
+    """Phrases for one parameter.
 
     Parameters
     ----------
-    family : of which one figure speaks.
-    least : smallest difference of the sides worth saying, in the figure's unit; our choice.
-    apart : healthy sides differ by less, as a share of their mean; 0 where the norm says it or nobody.
-    smaller, larger : of two sides that differ, with the side of the smaller or of the larger value named. The
-        side further from the norm is named.
-    names_larger : without a norm the side of the larger value is named, else that of the smaller.
-    both_low, both_high : both sides, or the whole take, beyond the norm.
-    side_low, side_high : one side beyond the norm.
-    up, down : of a change since the visit before.
+    family : group from which one parameter is reported.
+    least : smallest reported difference of the sides, in the parameter's unit; our choice.
+    apart : upper limit of the difference in healthy subjects, as a fraction of the mean; 0 if the norm
+        covers it or
+        it is unknown.
+    smaller, larger : for different sides, naming that with the smaller or larger value. The side further
+        from the
+        norm is named.
+    names_larger : without a norm, name the side with the larger value, otherwise the smaller.
+    both_low, both_high : both sides, or the whole trial, outside the norm.
+    side_low, side_high : one side outside the norm.
+    up, down : change since the previous visit.
     """
 
     family: Family
