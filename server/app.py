@@ -1,4 +1,4 @@
-"""Assembles the web application; contains no logic of its own."""
+"""Assembles the web application; contains no other logic."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def create_app(settings: Settings) -> FastAPI:
     UndeclaredRouteError
         a route declares no action.
     UnknownViserError
-        the installed viser lacks what the 3D views need.
+        the installed viser is incompatible with the 3D views.
     """
     # the web stack and its routes take seconds to import: only who builds an application waits for them
     from fastapi import FastAPI

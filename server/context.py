@@ -1,7 +1,7 @@
 """Typed dependencies through which endpoints access the running application.
 
-The dependencies are asynchronous: FastAPI runs each synchronous one in a thread, and on a busy
-machine a page would wait for all of them in turn.
+The dependencies are asynchronous: FastAPI runs each synchronous one in a thread, and on a busy machine a page
+would wait for all of them in turn.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Errors of use cases, in addition to those of core; `status` is the corresponding HTTP status.
 
-403 not_yours
-404 not_found · 409 code_taken, name_taken, no_files, not_confirmed · 413 file_too_large, set_too_large,
-too_many_files · 422 bad_value · 503 node_away, blob_damaged, blob_missing · 507 disk_full
+403 not_yours 404 not_found · 409 code_taken, name_taken, no_files, not_confirmed · 413 file_too_large,
+set_too_large, too_many_files · 422 bad_value · 503 node_away, blob_damaged, blob_missing · 507 disk_full
 """
 
 from __future__ import annotations

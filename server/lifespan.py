@@ -76,9 +76,7 @@ def _say_estimators(state: State) -> str:
 
 @contextlib.asynccontextmanager
 async def run_installation(app: FastAPI) -> AsyncIterator[None]:
-    """Open database, files, queue and live trials of `app.state.settings` for the duration of the
-    context.
-    """
+    """Open database, files, queue and live trials of `app.state.settings` for the duration of the context."""
     state = cast("State", app.state)
     settings = state.settings
     refuse_strangers(settings)

@@ -1,7 +1,7 @@
 """Logging to standard error: text, or one JSON object per line (SAGITTAL_LOG_FORMAT=json).
 
-Lines logged within a request carry its id (`X-Request-ID` of the response). Logs refer to rows by id,
-never to patients by name.
+Lines logged within a request carry its id (`X-Request-ID` of the response). Logs refer to rows by id, never
+to patients by name.
 """
 
 from __future__ import annotations

@@ -63,14 +63,13 @@ class Settings:
     retention_years : patients without a visit for longer are listed on the System page, 0 = off.
     log_format : "text" or "json", one object per line including one for each request.
     database_url : a PostgreSQL database instead of the file in the data folder, as
-        postgresql://user:password@host:port/database; omitted parts, such as the
-        password, are taken from libpq's usual sources (PGPASSFILE). "" = the file.
+        postgresql://user:password@host:port/database; omitted parts, such as the password, are taken from
+        libpq's usual sources (PGPASSFILE). "" = the file.
     bucket : S3-compatible object store used instead of the data folder: s3://name or s3://name/prefix.
-        Endpoint, region and keys come from the standard variables
-        (AWS_ENDPOINT_URL, AWS_REGION, AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY). "" = the folder.
+        Endpoint, region and keys come from the standard variables (AWS_ENDPOINT_URL, AWS_REGION,
+        AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY). "" = the folder.
     node_name, node_address : of this web server if several share one PostgreSQL database: the name is
-        permanent
-        and names its folder; the others reach it at the address. "" = single server.
+        permanent and names its folder; the others reach it at the address. "" = single server.
     task_modules : modules whose import registers kinds of jobs and their displays.
     """
 

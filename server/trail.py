@@ -131,8 +131,8 @@ class AuditTrail:
     def record_refused(self, action: str, resource: str, resource_id: str | None, address: str) -> None:
         """Record a failed sign-in from an address; does not raise for disk errors.
 
-        The input is not stored, as users type passwords into the name field. At most MOST_REFUSED
-        rows are written per hour; the next row gives the number of suppressed ones in `more`.
+        The input is not stored, as users type passwords into the name field. At most MOST_REFUSED rows are
+        written per hour; the next row gives the number of suppressed ones in `more`.
         """
         at = self._clock()
         with self._guard:
@@ -148,9 +148,7 @@ class AuditTrail:
             self._add(_Row(None, action, resource, resource_id, detail))
 
     def flush(self) -> bool:
-        """Write the queued rows; return whether the queue is empty. Raises SQLAlchemyError unless
-        writing is refused.
-        """
+        """Write the queued rows; return whether all are written. Raises errors other than disk failures."""
         self._is_refused()
         return not self._waiting
 

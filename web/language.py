@@ -1,10 +1,8 @@
 """Languages of the pages: English in the sources, others as catalogues in web/texts.
 
 A message is an English text with `{placeholders}` from a template, a page module or `core`. A sentence
-formatted
-from it, now or in a stored result, is recognized by the pattern of the message; the values of its
-placeholders
-are translated separately, numbers and dates by locale (docs/how-to/languages.md).
+formatted from it, now or in a stored result, is recognized by the pattern of the message; the values of its
+placeholders are translated separately, numbers and dates by locale (docs/how-to/languages.md).
 """
 
 from __future__ import annotations
@@ -99,7 +97,7 @@ class Catalogue:
 
     Parameters
     ----------
-    messages : English text with {placeholders} → text of the language with the same, or some of them.
+    messages : English text with {placeholders} → translation with the same placeholders, or some of them.
     """
 
     def __init__(self, language: str, messages: Mapping[str, str]) -> None:
@@ -293,8 +291,8 @@ class Catalogue:
         )
 
     def _by_sentences(self, sentences: list[str], *, partly: bool) -> str | None:
-        """Translate consecutive sentences, jointly if they form one message; `partly` = some may stay
-        English.
+        """Translate consecutive sentences, jointly if they form one message; `partly` = allow unknown
+        ones.
         """
         said: list[str] = []
         found = False

@@ -1,8 +1,8 @@
 """Translatable texts of templates, between tags and in user-visible attributes.
 
-Templates are written in English without markers. For other languages `speak_template` wraps every text
-and displayed value in a call; `list_texts` lists the same messages for the catalogue. User input is
-`UserText` and is displayed unchanged.
+Templates are written in English without markers. For other languages `speak_template` wraps every text and
+displayed value in a call; `list_texts` lists the same messages for the catalogue. User input is `UserText`
+and is displayed unchanged.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ class UserText(str):
     """Text entered or uploaded by a user; never translated, nor are its numbers localised.
 
     Parts of it, changes of case and sums with other texts are user text too. An f-string, `format` and
-    `str.join` return a plain `str`: within a sentence, quote the text with `quote` or
-    pass it to a message as a value.
+    `str.join` return a plain `str`: within a sentence, quote the text with `quote` or pass it to a message as
+    a value.
 
     >>> [type(text).__name__ for text in (UserText("Left knee")[:4], "Of " + UserText("Left"))]
     ['UserText', 'UserText']

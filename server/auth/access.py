@@ -1,6 +1,4 @@
-"""Access control for routes: a dependency that declares the action of a route and enforces its
-permission.
-"""
+"""Access control for routes: a dependency that declares the action of a route and enforces its permission."""
 
 from __future__ import annotations
 
@@ -32,8 +30,7 @@ class RouteAccess:
     def __call__(self, connection: HTTPConnection) -> Identity | None:
         """Return the identity of the caller; raise Problem 401 if not signed in, 403 if not permitted.
 
-        Raises 404 if the clinic has care teams and the path refers to a patient outside the caller's
-        teams.
+        Raises 404 if the clinic has care teams and the path refers to a patient outside the caller's teams.
         """
         counts = self.action is not Action.WATCH_SIGN_IN
         identity = identify(connection, connection.path_params, counts=counts)
@@ -51,9 +48,7 @@ class RouteAccess:
 
 
 def _note_try(connection: HTTPConnection, who: Identity) -> None:
-    """Record an attempt to open a patient outside the care team; the response is the same as for an
-    unknown id.
-    """
+    """Record an attempt to open a patient outside the care team; the response is as for an unknown id."""
     db: Database = connection.app.state.db
     trail: AuditTrail = connection.app.state.trail
     with db.read() as c:
@@ -70,8 +65,7 @@ def require(action: Action) -> Any:
 
 
 def identify(connection: HTTPConnection, parts: Mapping[str, str], *, counts: bool = True) -> Identity | None:
-    """Return the identity on this connection, including access to the given path parameters; None if
-    anonymous.
+    """Return the identity on this connection with its access to the path parameters; None if anonymous.
 
     Parameters
     ----------
@@ -95,11 +89,10 @@ def opens(connection: HTTPConnection, who: Identity, parts: Mapping[str, str]) -
 
 
 def find_end(connection: HTTPConnection, **parts: str) -> str | None:
-    """Reason why a long-lived connection must close: `not_signed_in`, or `not_found` if access was
-    withdrawn.
+    """Reason why a long-lived connection must close: `not_signed_in`, or `not_found` if access was withdrawn.
 
-    Returns None while the sign-in is valid and still grants access; the check does not count as
-    activity. `parts` default to the path parameters of the connection.
+    Returns None while the sign-in is valid and still grants access; the check does not count as activity.
+    `parts` default to the path parameters of the connection.
     """
     who = identify(connection, parts or connection.path_params, counts=False)
     if who is None:
@@ -112,8 +105,8 @@ async def wait_for_end(find: Callable[[], str | None]) -> str:
 
     Parameters
     ----------
-    find : such as `find_end`, called in a thread every `CHECK_EVERY_S`. Database errors are ignored
-        and the check is repeated.
+    find : such as `find_end`, called in a thread every `CHECK_EVERY_S`. Database errors are ignored and the
+        check is repeated.
     """
     while True:
         await asyncio.sleep(CHECK_EVERY_S)

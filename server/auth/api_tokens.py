@@ -2,9 +2,9 @@
 
     Authorization: Bearer sgt_…
 
-The token is shown once; the database stores its hash. It is accepted only in this header and only on
-/api/v1 and /metrics, never in a URL, a cookie or a websocket. It becomes invalid when it expires, is
-revoked or its account is closed; restricting the user's role restricts the token too.
+The token is shown once; the database stores its hash. It is accepted only in this header and only on /api/v1
+and /metrics, never in a URL, a cookie or a websocket. It becomes invalid when it expires, is revoked or its
+account is closed; restricting the user's role restricts the token too.
 """
 
 from __future__ import annotations
@@ -78,8 +78,8 @@ SCOPES: Final[Mapping[Scope, frozenset[Action]]] = {
 def issue(
     c: Connection, user_id: str, name: str, scopes: Collection[Scope], days: int
 ) -> tuple[Row[Any], str]:
-    """Issue a token; return its row and the token itself, which is not stored. Raises Problem 409 beyond
-    50.
+    """Issue a token; return its row and the token, which is not stored. Raises Problem 409 for more
+    than 50.
     """
     if len(list_tokens(c, user_id)) >= MOST_TOKENS:
         raise Problem(

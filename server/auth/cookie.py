@@ -1,6 +1,4 @@
-"""Session cookie: `__Host-sid` over TLS, plain `sid` for HTTP on loopback (`Secure` is unavailable
-there).
-"""
+"""Session cookie: `__Host-sid` over TLS, plain `sid` for HTTP on loopback (`Secure` is unavailable there)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Password hashing with argon2id: at most two at a time, in equal time whether or not the account
-exists.
-"""
+"""Password hashing with argon2id: at most two at a time, in equal time whether or not the account exists."""
 
 from __future__ import annotations
 
@@ -54,9 +52,7 @@ def verify_password(password: str, stored: str | None) -> bool:
 
 @functools.cache
 def _nobody() -> str:
-    """Return the hash that unknown names are checked against, computed at the first sign-in rather than
-    at import.
-    """
+    """Return the hash that unknown names are checked against, computed at the first sign-in."""
     with _slot():
         return _HASHER.hash("no account has this password")
 

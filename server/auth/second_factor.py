@@ -1,9 +1,9 @@
 """Two-factor authentication: a six-digit code that changes every 30 s (TOTP, RFC 6238).
 
-Secrets are stored encrypted. The key is a file next to the database, so a copy of the database alone
-is not enough to decrypt them. The key is created with the first secret; if secrets exist, a missing
-key is an error. Each code is accepted once: the time step of the newest accepted code is stored, and
-only later ones are valid. Recovery codes are stored as hashes and can be used once.
+Secrets are stored encrypted. The key is a file next to the database, so a copy of the database alone is not
+enough to decrypt them. The key is created with the first secret; if secrets exist, a missing key is an error.
+Each code is accepted once: the time step of the newest accepted code is stored, and only later ones are
+valid. Recovery codes are stored as hashes and can be used once.
 """
 
 from __future__ import annotations
@@ -73,9 +73,7 @@ class KeyOfFactorsUnusable(Problem):
 
 @dataclass(frozen=True)
 class SecondFactorSetUp:
-    """Enrolment data for an authenticator, shown once: the secret, its otpauth URI and a QR code of
-    that.
-    """
+    """Enrolment data for an authenticator, shown once: the secret, its otpauth URI and a QR code of that."""
 
     secret: str
     address: str
@@ -87,7 +85,7 @@ def begin(c: Connection, key_file: Path, user_id: str, name: str) -> SecondFacto
 
     Raises
     ------
-    Problem 409 if a second factor is active; KeyOfFactorsUnusable, also if secrets exist but no key.
+    Problem 409 if a second factor is active; KeyOfFactorsUnusable, also if secrets exist without a key.
     """
     if is_on(c, user_id):
         raise Problem(409, "second_factor_on", "There is a second factor already. Remove it first.")
@@ -101,9 +99,7 @@ def begin(c: Connection, key_file: Path, user_id: str, name: str) -> SecondFacto
 
 
 def confirm(c: Connection, key_file: Path, user_id: str, code: str, at_s: float | None = None) -> list[str]:
-    """Activate the second factor; return the recovery codes, which are shown only once. Raises
-    CodeWrong.
-    """
+    """Activate the second factor; return the recovery codes, which are shown only once. Raises CodeWrong."""
     if is_on(c, user_id) or not _take_code(c, key_file, user_id, code, at_s):
         raise CodeWrong(403)
     codes = ["-".join(_random_group() for _ in range(_GROUPS)) for _ in range(RECOVERY_CODES)]
@@ -138,8 +134,8 @@ def use(c: Connection, key_file: Path, user_id: str, code: str, at_s: float | No
 
 
 def takes_keys_only(c: Connection, user_id: str) -> bool:
-    """Whether codes of an authenticator are rejected for this account, as a phishing page could request
-    them.
+    """Whether codes of an authenticator are rejected for this account, as a phishing page could
+    request them.
     """
     query = select(second_factor.c.keys_only).where(second_factor.c.user_id == user_id)
     return bool(c.execute(query).scalar())
@@ -195,9 +191,7 @@ def _random_group() -> str:
 
 
 def find_problems(c: Connection, key_file: Path) -> list[str]:
-    """One sentence for each user whose secret cannot be decrypted, or a single one if the key is
-    unusable.
-    """
+    """One sentence for each user whose secret cannot be decrypted, or a single one if the key is unusable."""
     rows = c.execute(select(second_factor.c.user_id, second_factor.c.secret)).all()
     if not rows:
         return []

@@ -93,7 +93,9 @@ def list_usable(c: Connection, site: Site, user_id: str) -> Sequence[Row[Any]]:
 
 
 def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> dict[str, Any]:
-    """Options for registering a key; raises Problem 409 without a second factor, or beyond ten keys."""
+    """Options for registering a key; raises Problem 409 without a second factor, or for more than ten
+    keys.
+    """
     from webauthn import generate_registration_options, options_to_json
     from webauthn.helpers.structs import PublicKeyCredentialDescriptor
 
@@ -153,7 +155,7 @@ def register(
 ) -> Row[Any]:
     """Store a key from its response to a challenge of `take_challenge`, which must be committed first.
 
-    Raises KeyRefused 403, Problem 409 beyond MOST_KEYS.
+    Raises KeyRefused 403, Problem 409 for more than MOST_KEYS.
     """
     from webauthn import verify_registration_response
 

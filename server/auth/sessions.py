@@ -38,14 +38,14 @@ class _Login:
 class Logins:
     """Open sign-ins.
 
-    While the disk is not writable, users can still sign in, work and sign out: sessions are then held
-    in memory and end with the process.
+    While the disk is not writable, users can still sign in, work and sign out: sessions are then held in
+    memory and end with the process.
 
     Parameters
     ----------
     db : the database.
-    idle, absolute : life without activity, and life in all (docs/how-to/operations.md, "Settings").
-    clock : aware time now.
+    idle, absolute : lifetime without activity, and in total (docs/how-to/operations.md, "Settings").
+    clock : returns the current time, aware.
     """
 
     def __init__(

@@ -1,9 +1,8 @@
 """Access to patients in clinics with care teams: the rule applied to every read.
 
-Administrators see all patients; other users see the patients of their care teams, and those they have
-opened in an emergency until that access ends. A route whose path refers to a patient's data is
-checked by its dependency (server/auth/access.py); lists use `only_seen`, which their services
-require.
+Administrators see all patients; other users see the patients of their care teams, and those they have opened
+in an emergency until that access ends. A route whose path refers to a patient's data is checked by its
+dependency (server/auth/access.py); lists use `only_seen`, which their services require.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ class Throttle:
 
     Parameters
     ----------
-    clock : seconds; of all web servers the same where they count together.
+    clock : seconds; common to all web servers that share counts.
     """
 
     def __init__(
@@ -82,8 +82,7 @@ class Throttle:
         self._store: FailureStore = FailuresInMemory() if store is None else store
 
     def begin(self, account: str, address: str) -> float:
-        """Check the limit and count this attempt as a failure before the password is verified; return
-        its time.
+        """Check the limit, count this attempt as a failure before verification, and return its time.
 
         Counting first keeps a burst of guesses from passing before the first of them has failed.
         """

@@ -1,7 +1,7 @@
 """Consents of patients: purpose, date, evidence and withdrawal.
 
-Consents are never overwritten: a withdrawal is recorded with its date, and consent can be given again
-later. They are deleted only together with the patient.
+Consents are never overwritten: a withdrawal is recorded with its date, and consent can be given again later.
+They are deleted only together with the patient.
 """
 
 from __future__ import annotations

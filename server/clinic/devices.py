@@ -1,7 +1,7 @@
 """The clinic's sensors by serial number: quality checks from their trials, and their last placement.
 
-Rows are written with the analysis they come from and deleted with its recording (services/erasure.py).
-They identify no patient and no visit, only days, so reading them is not audited.
+Rows are written with the analysis they come from and deleted with its recording (services/erasure.py). They
+identify no patient and no visit, only days, so reading them is not audited.
 """
 
 from __future__ import annotations
@@ -107,8 +107,8 @@ def recall_places(
 ) -> LastPlaces:
     """Placement of devices in the clinic's latest trial with each.
 
-    If two devices claim the same segment, the more recently used one takes it. Trials with swapped
-    sensors and those older than `REMEMBERED_DAYS` are ignored.
+    If two devices claim the same segment, the more recently used one takes it. Trials with swapped sensors
+    and those older than `REMEMBERED_DAYS` are ignored.
 
     Parameters
     ----------

@@ -1,11 +1,9 @@
-"""Patient identities: name, date of birth, record numbers and contact, encrypted and linked to the
-pseudonym.
+"""Patient identities: name, date of birth, record numbers and contact, encrypted and linked to the pseudonym.
 
 Disabled until the operator creates a key (`sagittal identity-key make`). The key is a file outside the
-database; if identities exist, a missing key is an error and never replaced. The database records which
-key encrypts, so that of several computers none uses a different key. Names cannot be searched: an index
-that finds a name without decrypting every row would reveal to anyone with the database which rows are
-equal.
+database; if identities exist, a missing key is an error and never replaced. The database records which key
+encrypts, so that of several computers none uses a different key. Names cannot be searched: an index that
+finds a name without decrypting every row would reveal to anyone with the database which rows are equal.
 """
 
 from __future__ import annotations
@@ -132,12 +130,12 @@ def discard_unreadable(db: Database, key_file: Path, *, really: bool, without_ke
 
     Parameters
     ----------
-    without_key : the key that sealed is lost for good: remove all names, another key seals from now on.
+    without_key : the key in use is permanently lost: delete all identities and use another key from now on.
 
     Raises
     ------
     KeyUnusable
-        something would be removed only because the right key is not in its place.
+        identities would be deleted only because the correct key is missing.
     """
     with db.write() as c:
         if not are_kept(c, key_file):
@@ -171,8 +169,8 @@ def change_key(db: Database, key_file: Path) -> tuple[str, int]:
     """Re-encrypt all identities with a new key; return its name and the number of rows.
 
     The file contains both keys until every row has been rewritten, so all rows remain readable; an
-    interrupted change is resumed by running it again. The file is written in writing transactions only,
-    which serializes concurrent changes.
+    interrupted change is resumed by running it again. The file is written in writing transactions only, which
+    serializes concurrent changes.
 
     Raises
     ------

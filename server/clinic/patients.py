@@ -35,8 +35,8 @@ class Patient:
     Parameters
     ----------
     code : the clinic's pseudonym, unique. sex : female, male or None. height_m : metres or None.
-    affected_side : left, right, or None for none or both. is_control : healthy, and consented to serve as
-        a reference in this clinic.
+    affected_side : left, right, or None for none or both. is_control : healthy, and consented to serve as a
+        reference in this clinic.
     sessions : number of visits. last_visit : date of the latest, None without one.
     running : a job of one of the visits is queued or running.
     """
@@ -161,7 +161,7 @@ def list_patients(
 
     Parameters
     ----------
-    who : only those this person may open; None = the system, which sees everybody.
+    who : only those accessible to this user; None = the system, which sees all.
     """
     return make_all(Patient, c.execute(_search(who, search).limit(limit).offset(offset)))
 

@@ -29,8 +29,8 @@ class PlannedVisit:
 
     Parameters
     ----------
-    week : of the programme, 1 = that of the first training, 0 = before. session_id : what took place.
-    performed_on : day of that session. state : done, missing (its day has passed), next, or planned.
+    week : of the programme, 1 = that of the first training, 0 = before. session_id : linked session.
+    performed_on : date of that session. state : done, missing (overdue), next, or planned.
     """
 
     id: str
@@ -81,7 +81,7 @@ class Plans:
 
     Parameters
     ----------
-    kinds : as `list_kinds`. running : who is on a programme that has a visit to come.
+    kinds : see `list_kinds`. running : patients with upcoming visits in a programme.
     """
 
     kinds: Mapping[str, VisitKind]

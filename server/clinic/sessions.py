@@ -112,7 +112,7 @@ def create(
 
     Parameters
     ----------
-    condition : pace, aid, orthosis, shoes, feedback as of `Session`; not stated without them.
+    condition : pace, aid, orthosis, shoes, feedback as in `Session`; not recorded if omitted.
     """
     if c.execute(select(patient.c.id).where(patient.c.id == patient_id)).first() is None:
         raise NotFound("patient", patient_id)
@@ -171,8 +171,8 @@ def search(
 
     Parameters
     ----------
-    who : None = the system, which sees everybody.
-    since, until : days, both included, None = open. ids : only these of them; empty = all.
+    who : None = the system, which sees all.
+    since, until : dates, inclusive, None = open. ids : restrict to these; empty = all.
     """
     query = only_seen(_QUERY, who).order_by(
         patient.c.code, session.c.performed_on, session.c.created_at, session.c.id

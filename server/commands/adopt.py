@@ -15,9 +15,9 @@ def adopt(take: str | None = None, /, *, session: str | None = None, data_dir: D
     Parameters
     ----------
     take
-        one of the list
+        id of a listed log
     session
-        the session's page, or its id
+        the session's URL or id
     """
     from sagittal.server.errors import ServiceError
     from sagittal.server.storage.migrate import MigrationError, require_current

@@ -30,7 +30,7 @@ def backup(
     key
         encrypt it (`sagittal keygen`)
     prune
-        then keep 7 days, 4 weeks and 12 months of that folder
+        then retain 7 daily, 4 weekly and 12 monthly backups in that folder
     """
     from sagittal.server.safekeeping import backups
     from sagittal.server.safekeeping.tombstones import TombstoneError

@@ -29,9 +29,9 @@ def export(
     kind
         xlsx, csv … (docs/reference/exports.md)
     out
-        file to write (default: export-<format>.<ending> there)
+        file to write (default: export-<format>.<extension> in that folder)
     code
-        pseudonym of the person, letters and digits
+        pseudonym of the subject, letters and digits
     """
     from sagittal.server.export.content import VisitFacts, open_content
     from sagittal.server.export.kinds import EXPORTED, find_kind, write_export

@@ -10,7 +10,7 @@ from sagittal.server.settings import load_settings
 
 
 def trash(*, restore: bool = False, data_dir: DataDir = None) -> int:
-    """List the trash, or restore what the database refers to; 1 if the database cannot be used.
+    """List the trash, or restore referenced files; 1 if the database cannot be used.
 
     Parameters
     ----------

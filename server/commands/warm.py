@@ -16,8 +16,8 @@ from sagittal.server.storage.compile_cache import VARIABLE
 def warm() -> int:
     """Compile every filter for walks, offline and live, into the folder of compiled filters; 0 when done.
 
-    Filters already in the folder are only loaded. Compiled code depends on the processor: run this on
-    the machine that will analyse.
+    Filters already in the folder are only loaded. Compiled code depends on the processor: run this on the
+    machine that will analyse.
     """
     steps: tuple[tuple[str, Callable[[], None]], ...] = (
         ("filters of takes and of live sessions, two at a time", compile_filters),

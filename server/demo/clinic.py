@@ -1,7 +1,7 @@
 """Simulated clinic of `sagittal demo`: visits of virtual patients, uploaded like real recordings.
 
-Run as a module, it fills the data folder of its environment; it runs in its own process because
-simulating takes seconds of CPU time.
+Run as a module, it fills the data folder of its environment; it runs in its own process because simulating
+takes seconds of CPU time.
 """
 
 from __future__ import annotations

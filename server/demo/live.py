@@ -1,7 +1,7 @@
 """Live patient of `sagittal demo`: a training with feedback, streamed as from a tablet.
 
-Run as a module with the server's address after the visits are analysed. Only the walk is simulated:
-pairing code, socket, acknowledgements and finish are those of any tablet.
+Run as a module with the server's address after the visits are analysed. Only the walk is simulated: pairing
+code, socket, acknowledgements and finish are those of any tablet.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
     for piece in export_deidentified(db, blobs, key, chosen): ...        # streamed
 
-Pseudonyms and the shift of days are HMAC-SHA256 (RFC 2104) of the ids under the clinic's key: the same
-key reproduces them, so later exports match earlier ones, and without it ids cannot be tested. All dates of a
+Pseudonyms and the shift of days are HMAC-SHA256 (RFC 2104) of the ids under the clinic's key: the same key
+reproduces them, so later exports match earlier ones, and without it ids cannot be tested. All dates of a
 patient are shifted by the same number of days, which preserves intervals; ages above 89 are given as 89. Free
 text is omitted except for our own codes (docs/reference/exports.md, "For research").
 """

@@ -48,8 +48,7 @@ class ExportOffer:
     Parameters
     ----------
     kind : name. label, what : title and description. job : the export job, None = not requested since the
-        last
-        change.
+        last change.
     analysis_id, file : location for the download, file None until it is written.
     """
 
@@ -66,8 +65,8 @@ def list_offers(
 ) -> list[ExportOffer]:
     """All formats in which an analysis of a session can be exported, and their progress.
 
-    An export is offered again after an edit or a correction of patient or visit; formats that contain
-    the signed report also after it was signed, reopened or printed.
+    An export is offered again after an edit or a correction of patient or visit; formats that contain the
+    signed report also after it was signed, reopened or printed.
     """
     possible = kinds.list_possible(found.files)
     params = _collect_params(c, patient, session, found, possible)
@@ -112,12 +111,12 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
 
     Parameters
     ----------
-    files : result files of the analysis, and documents of the signed report where the format hands it on.
+    files : result files of the analysis, and documents of the signed report if the format includes it.
 
     Raises
     ------
     SagittalError
-        it cannot be written; the code and the sentence say why.
+        it cannot be written; code and message give the reason.
     """
     readers = {file.name: file.read for file in files if not file.name.startswith(SIGNED)}
     edits = [read_edit(e) for e in params["edits"]]

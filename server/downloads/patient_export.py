@@ -2,10 +2,10 @@
 
     for piece in export_patient(db, blobs, patient_id, key_file): ...        # streamed
 
-`patient.json` has every row that belongs to the patient, by table, with the
-authors' names; the identity is included in clear text if the user may read it, otherwise omitted.
-`audit.json` lists access and changes, `files/<table>/<id>/<name>` are the files, recordings as uploaded.
-Rows of a patient are found through foreign keys, so new tables are included automatically.
+`patient.json` has every row that belongs to the patient, by table, with the authors' names; the identity is
+included in clear text if the user may read it, otherwise omitted. `audit.json` lists access and changes,
+`files/<table>/<id>/<name>` are the files, recordings as uploaded. Rows of a patient are found through foreign
+keys, so new tables are included automatically.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def export_patient(
 
     Parameters
     ----------
-    identity_key : file with the key of patients' names; None = the user may not read identities.
+    identity_key : file with the key of identities; None = the user may not read identities.
     """
     missing = []
     with db.read() as c:

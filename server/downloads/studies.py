@@ -1,8 +1,8 @@
 """Studies: the selected visits and their current analyses as two tables.
 
-Nothing is recomputed or stored: the tables are built from stored analyses and users' edits, in a
-separate process (study_child.py). Patients and visits are identified by the pseudonyms of the other
-exports; dates and notes are omitted.
+Nothing is recomputed or stored: the tables are built from stored analyses and users' edits, in a separate
+process (study_child.py). Patients and visits are identified by the pseudonyms of the other exports; dates and
+notes are omitted.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class StudyChoice:
 
     Parameters
     ----------
-    search : part of a patient's code or note. protocol : None = any. since, until : days, both included.
-    visits : only these of them; None = all.
+    search : part of a patient's code or note. protocol : None = any. since, until : dates, inclusive. visits
+        : restrict to these; None = all.
     """
 
     search: str = ""

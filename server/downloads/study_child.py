@@ -1,5 +1,4 @@
-"""Process that builds the tables of one study, so that reading hundreds of results does not block the
-server.
+"""Process that builds the tables of one study, so that reading hundreds of results does not block the server.
 
 Started by server/downloads/study_maker.py as `python -m sagittal.server.downloads.study_child <socket>
 <parent pid>`. It reads the database and writes nothing.

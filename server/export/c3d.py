@@ -107,9 +107,7 @@ def _joints(angles: JointAngles) -> dict[str, Floats]:
 
 
 def _pelvis(angles: JointAngles) -> dict[str, Floats]:
-    """Tilt, upward obliquity and rotation; the latter is the heading in the world, as there is no walkway
-    axis.
-    """
+    """Tilt, upward obliquity and rotation; rotation is the heading in the world, without a walkway axis."""
     given, heading = angles.angles, angles.headings.get("pelvis")
     if "pelvis_tilt" not in given or heading is None:
         return {}

@@ -68,8 +68,8 @@ class SignedForm:
     Parameters
     ----------
     version : of the report, from 1. language : of its text. signed_at : ISO date and time.
-    of_these_numbers : False where something was analysed or changed after it was signed.
-    documents : media type and bytes, the printable one first.
+    of_these_numbers : False if the results changed after signing.
+    documents : media type and content, the printable one first.
     """
 
     version: int
@@ -86,8 +86,8 @@ class CycleRow:
 
     Parameters
     ----------
-    number : from 1, in order of the list. turn_deg : None where not known. values : parameter → number or
-        None where undefined. flags : rules that it meets. excluded : why it does not count, None = it counts.
+    number : from 1, in order of the list. turn_deg : None if unknown. values : parameter → number, None if
+        undefined. flags : exclusion rules that apply. excluded : reason for exclusion, None = included.
     """
 
     number: int
@@ -155,8 +155,8 @@ class ExportContent:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of the trial over the included strides; those relative to the anatomical zero come
-        last.
+        """Parameters of the trial over the included strides; those relative to the anatomical zero
+        come last.
         """
         return (*self.bundle.parameters, *self.levels)
 
@@ -211,7 +211,7 @@ def open_content(
 
     Raises
     ------
-    FormatError `no_analysis`, `newer_analysis`; `export_not_possible` where edits cannot be measured.
+    FormatError `no_analysis`, `newer_analysis`; `export_not_possible` if edits cannot be applied.
     """
     stored = load_bundle({name: read() for name, read in files.items() if name not in LATER})
     content = ExportContent(visit, files, stored, edits=tuple(edits))

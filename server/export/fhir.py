@@ -1,7 +1,7 @@
 """FHIR R4 bundle: a report with one observation per value, UCUM units, codes of our own catalogue.
 
-Observations and report are "preliminary" until the results are signed; the signed report is attached.
-Most gait parameters have no LOINC code; `LOINC` lists those with an equivalent one.
+Observations and report are "preliminary" until the results are signed; the signed report is attached. Most
+gait parameters have no LOINC code; `LOINC` lists those with an equivalent one.
 """
 
 from __future__ import annotations

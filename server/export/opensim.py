@@ -1,7 +1,7 @@
 """Export to OpenSim: joint angles as coordinates (.mot), orientations for OpenSense (.sto).
 
-Coordinates and signs follow the model of Rajagopal et al. 2016 (doi:10.1109/TBME.2016.2586891); files
-use the text format of OpenSim 4. OpenSim's ground frame has x forward, y up, z to the right.
+Coordinates and signs follow the model of Rajagopal et al. 2016 (doi:10.1109/TBME.2016.2586891); files use the
+text format of OpenSim 4. OpenSim's ground frame has x forward, y up, z to the right.
 """
 
 from __future__ import annotations
@@ -102,12 +102,11 @@ def _find_first(heading: Floats) -> float:
 
 
 def write_orientations(poses: Poses, worn: Collection[str]) -> bytes:
-    """Write one quaternion "w,x,y,z" per instrumented segment and time; rows with missing data are
-    omitted.
+    """Write one quaternion "w,x,y,z" per instrumented segment and time; rows with missing data are omitted.
 
     Each describes the sensor axes aligned with its segment: x forward, y up, z to the right in quiet
-    standing, in a world with z up. OpenSense's usual `sensor_to_opensim_rotations` of −π/2 0 0 maps
-    standing to identity.
+    standing, in a world with z up. OpenSense's usual `sensor_to_opensim_rotations` of −π/2 0 0 maps standing
+    to identity.
 
     Parameters
     ----------

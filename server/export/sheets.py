@@ -142,9 +142,7 @@ def list_values(content: ExportContent) -> TableSheet:
 
 
 def list_curves(content: ExportContent) -> TableSheet:
-    """Mean and standard deviation of each angle in degrees, one row per % of the stride; included strides
-    only.
-    """
+    """Mean and standard deviation of each angle in degrees over the included strides, one row per %."""
     angles = content.bundle.angles
     if angles is None:
         return TableSheet("Curves", ("pct_cycle",), ())

@@ -22,12 +22,11 @@ async def carry_messages(
     admits: Callable[[Message], bool] = lambda _: True,
     until: Coroutine[Any, Any, str] | None = None,
 ) -> None:
-    """Relay messages in both directions until one side closes or access ends; the close code is
-    forwarded.
+    """Relay messages in both directions until one side closes or access ends; the close code is forwarded.
 
     Parameters
     ----------
-    admits : which messages of the client are passed on. until : returns, when it must end, why.
+    admits : filter for messages of the client. until : completes with a reason when the relay must end.
     """
     over = None if until is None else asyncio.create_task(until)
     tasks = [asyncio.create_task(_down(ws, up)), asyncio.create_task(_upward(ws, up, admits))]

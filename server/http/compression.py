@@ -1,13 +1,12 @@
 """Compresses pages, JSON, style sheets and scripts to about a fifth of their size.
 
-Event streams (an event must not wait for the next), downloads and ranges (the client expects the
-exact bytes) and content that is already compressed are sent unchanged.
+Event streams (an event must not wait for the next), downloads and ranges (the client expects the exact bytes)
+and content that is already compressed are sent unchanged.
 
-Compression makes a BREACH attack possible: an eavesdropper who causes a browser to repeat requests
-with guesses in the URL can infer the page's content from the length of the encrypted response. Such
-requests originate from the attacker's page; browsers mark them as cross-site, and their responses are
-not compressed. No page contains an anti-forgery token (cross_site.py relies on the same headers) or
-the session cookie.
+Compression makes a BREACH attack possible: an eavesdropper who causes a browser to repeat requests with
+guesses in the URL can infer the page's content from the length of the encrypted response. Such requests
+originate from the attacker's page; browsers mark them as cross-site, and their responses are not compressed.
+No page contains an anti-forgery token (cross_site.py relies on the same headers) or the session cookie.
 """
 
 from __future__ import annotations

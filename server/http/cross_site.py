@@ -1,9 +1,9 @@
 """Rejects cross-site requests by the headers that browsers set; forms need no tokens.
 
-Uses Sec-Fetch-Site if present (W3C Fetch Metadata), otherwise compares Origin with Host, the rule of
-Go's net/http.CrossOriginProtection. A client that sends neither header is not a browser and carries
-no cookie that another site could exploit. Browsers let any page open a websocket, so the rule also
-applies to the opening handshake.
+Uses Sec-Fetch-Site if present (W3C Fetch Metadata), otherwise compares Origin with Host, the rule of Go's
+net/http.CrossOriginProtection. A client that sends neither header is not a browser and carries no cookie that
+another site could exploit. Browsers let any page open a websocket, so the rule also applies to the opening
+handshake.
 """
 
 from __future__ import annotations
@@ -31,9 +31,7 @@ def is_cross_site(headers: Headers) -> bool:
 
 
 class CrossSiteGuard:
-    """ASGI middleware that rejects cross-site changes and cross-site websockets before they are
-    accepted.
-    """
+    """ASGI middleware that rejects cross-site changes and cross-site websockets before they are accepted."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app

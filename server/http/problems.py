@@ -127,8 +127,8 @@ def problem_response(problem: Problem, connection: HTTPConnection) -> Response:
 
 
 async def send_problem(problem: Problem, scope: Scope, receive: Receive, send: Send) -> None:
-    """Reject a request from within a middleware; websockets are rejected before they are accepted (HTTP
-    403).
+    """Reject a request from within a middleware; websockets are rejected before they are accepted
+    (HTTP 403).
     """
     if scope["type"] == "websocket":
         await refuse_websocket(WebSocket(scope, receive, send), problem)

@@ -24,9 +24,9 @@ def answer_range(
 
     Parameters
     ----------
-    headers : of the request, their names in small letters. size : bytes of the whole.
-    version : what changes with its content; a range of another version gets all.
-    read : gives the bytes from a place to before another.
+    headers : of the request, names in lower case. size : total bytes.
+    version : entity tag; a range of another version returns the whole content.
+    read : returns the bytes from start to stop.
     """
     tag = f'"{version}"'
     ours = {"Accept-Ranges": "bytes", "ETag": tag}

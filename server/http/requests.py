@@ -1,7 +1,7 @@
 """Request ids, durations and machine-readable access log lines.
 
-Neither log lines nor metrics contain query strings, names or bodies, only the route's pattern, the
-method and the status.
+Neither log lines nor metrics contain query strings, names or bodies, only the route's pattern, the method and
+the status.
 """
 
 from __future__ import annotations
@@ -26,8 +26,7 @@ _PREFIXES: Final = ("/api/v1", "/static")
 
 
 class RequestObserver:
-    """ASGI middleware that assigns request ids and calls `observe(method, route pattern, status,
-    seconds)`.
+    """ASGI middleware that assigns request ids and calls `observe(method, route pattern, status, seconds)`.
 
     Parameters
     ----------

@@ -52,9 +52,7 @@ class SpokenLoader(FlushLeftLoader):
 
 @cache
 def fingerprint_pages() -> str:
-    """Digest of everything that determines the compiled templates, including the code that compiles
-    them.
-    """
+    """Digest of everything that determines the compiled templates, including the code that compiles them."""
     digest = hashlib.sha256()
     for path in (Path(__file__), Path(compiler.__file__), *sorted(FOLDER.rglob("*"))):
         if path.is_file() and path.suffix != ".pyc":
@@ -65,8 +63,8 @@ def fingerprint_pages() -> str:
 class KeptBytecode(FileSystemBytecodeCache):
     """Cache of compiled templates of one language, in the folder of compiled filters.
 
-    Compiling takes a third of the time of a process's first page. If the folder is not writable, each
-    process compiles its own.
+    Compiling takes a third of the time of a process's first page. If the folder is not writable, each process
+    compiles its own.
     """
 
     def __init__(self, language: str) -> None:
@@ -94,8 +92,8 @@ class KeptBytecode(FileSystemBytecodeCache):
 class SettledEnvironment(Environment):
     """Environment whose globals are complete before the first template is loaded.
 
-    By default Jinja keeps the globals of templates and environment apart and compares them name by
-    name at every import, which takes a fifteenth of the rendering time of a page.
+    By default Jinja keeps the globals of templates and environment apart and compares them name by name at
+    every import, which takes a fifteenth of the rendering time of a page.
     """
 
     def make_globals(self, d: MutableMapping[str, Any] | None) -> MutableMapping[str, Any]:

@@ -20,8 +20,8 @@ class Attempt:
 
     Parameters
     ----------
-    keep : stores a checkpoint from which another attempt can resume. A job with checkpoints has no total
-        time limit, and yields to more urgent jobs.
+    keep : stores a checkpoint from which another attempt can resume. A job with checkpoints has no total time
+        limit, and yields to more urgent jobs.
     checkpoint : checkpoint of an earlier attempt, None = start from the beginning.
     """
 

@@ -1,8 +1,8 @@
 """Jobs on PostgreSQL: procrastinate delivers their ids to idle workers on any computer.
 
-An id is deferred in the transaction that queues the job, so it is delivered after the commit. The job
-table remains authoritative: a delivery only triggers a look at the table, a duplicate has no effect,
-and a lost one is covered by slow polling.
+An id is deferred in the transaction that queues the job, so it is delivered after the commit. The job table
+remains authoritative: a delivery only triggers a look at the table, a duplicate has no effect, and a lost one
+is covered by slow polling.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class DeliveryLine:
 
     Parameters
     ----------
-    poll_s : longest wait without a delivery, s.
+    poll_s : maximum wait without a delivery, s.
     """
 
     def __init__(self, url: str, poll_s: float) -> None:

@@ -134,8 +134,8 @@ class JobQueue(Protocol):
         requested_by: str | None = None,
         priority: Priority = Priority.USUAL,
     ) -> JobView:
-        """Queue a job in the caller's transaction, or return the pending or successful one with the same
-        key.
+        """Queue a job in the caller's transaction, or return the pending or successful one with the
+        same key.
         """
 
     def get(self, job_id: str) -> JobView | None:

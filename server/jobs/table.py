@@ -1,8 +1,7 @@
 """Embedded queue: the job table, claimed by the workers of `sagittal serve`.
 
-A job whose worker crashes three times fails, so that a malformed recording cannot loop. A lease far
-in the future is treated as expired, since the clock was set back; fencing makes a wrong decision
-harmless.
+A job whose worker crashes three times fails, so that a malformed recording cannot loop. A lease far in the
+future is treated as expired, since the clock was set back; fencing makes a wrong decision harmless.
 """
 
 from __future__ import annotations
@@ -47,8 +46,8 @@ class TableQueue:
 
     Parameters
     ----------
-    lease_s : a claim that has not been renewed for so long is dead.
-    clock : aware UTC now, replaced in tests.
+    lease_s : time without renewal after which a claim expires.
+    clock : returns the current UTC time, replaced in tests.
     """
 
     def __init__(self, db: Database, lease_s: float, clock: Callable[[], dt.datetime] = now) -> None:

@@ -46,10 +46,10 @@ async def stream(
 
     Parameters
     ----------
-    url : of the socket, ws:// or wss://. frames : encoded batches, seq from 0; their pace is the sender's.
-    patience_s : longest time without an acknowledgement while there is something to acknowledge.
+    url : of the socket, ws:// or wss://. frames : encoded batches, seq from 0; the sender sets their pace.
+    patience_s : timeout without an acknowledgement while batches are unacknowledged.
     hear : called with the server's commands and states. seed : of the faults.
-    report : filled while it streams, for those who watch.
+    report : updated during streaming, for observers.
 
     Raises
     ------

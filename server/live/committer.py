@@ -132,9 +132,8 @@ class LogLane:
     def mend(self) -> None:
         """Truncate to the synced part and restart the count of records; OSError if the disk still fails.
 
-        After a failed sync it is unknown which pages reached the disk, and a second sync would not
-        report it (the kernel has marked them clean), so unsynced records are dropped and must be sent
-        again.
+        After a failed sync it is unknown which pages reached the disk, and a second sync would not report it
+        (the kernel has marked them clean), so unsynced records are dropped and must be sent again.
         """
         with self._lock:
             self._queue.clear()
@@ -163,7 +162,7 @@ class Committer:
 
     Parameters
     ----------
-    interval_s : longest time a written record waits for its group to be synced.
+    interval_s : maximum delay before a written record is synced with its group.
     """
 
     def __init__(self, interval_s: float = INTERVAL_S) -> None:

@@ -1,7 +1,7 @@
 """Crash-safe steps after the end of a live trial is on disk.
 
-Mark the row as ended, store the log as a recording, notify the tablet, wait for the estimator's last
-results, remove the log (services/live_recordings.py completes pending steps at the next start).
+Mark the row as ended, store the log as a recording, notify the tablet, wait for the estimator's last results,
+remove the log (services/live_recordings.py completes pending steps at the next start).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Ending:
 
     Parameters
     ----------
-    over : called with the row of a take that is over.
+    over : called with the row of an ended trial.
     """
 
     def __init__(

@@ -64,7 +64,7 @@ class Follower:
 
     Parameters
     ----------
-    say : sends one report. clock : monotonic seconds, the same clock as the web process's.
+    say : sends one report. clock : monotonic seconds, same clock as in the web process.
     """
 
     def __init__(

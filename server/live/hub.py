@@ -1,7 +1,7 @@
 """Registry of all live trials of this server: tablets, browsers, estimators and events.
 
 One per web process, on its event loop; disk and database access runs in threads. At start it completes
-what a crash interrupted, opens the logs of unfinished trials and waits for their tablets.
+interrupted work, opens the logs of unfinished trials and waits for their tablets.
 """
 
 from __future__ import annotations
@@ -180,7 +180,7 @@ class Hub:
 
         Parameters
         ----------
-        at_s : the moment a mark means, which is before its words are written; never after the newest sample.
+        at_s : time of a mark, which precedes entering its text; clipped to the latest sample.
         """
         row = await asyncio.to_thread(self.rows.open_take, session_id)
         take = self._takes.get(row.id)

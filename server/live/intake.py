@@ -39,7 +39,7 @@ class TakeEnd:
     Parameters
     ----------
     count : batches in the log. sha256 : over their payloads in order of seq.
-    problem : None, or finish_mismatch: the tablet counted or hashed otherwise; the take is kept all the same.
+    problem : None, or finish_mismatch: the tablet's count or hash differs; the trial is stored nevertheless.
     """
 
     count: int

@@ -1,7 +1,6 @@
 """Messages between web and estimator processes: MessagePack over a socket pair, not pickle.
 
-Samples are not transmitted: the estimator reads them from the log, of which it receives the current
-size.
+Samples are not transmitted: the estimator reads them from the log, of which it receives the current size.
 """
 
 from __future__ import annotations

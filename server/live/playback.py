@@ -1,8 +1,8 @@
 """Division of a recording into batches as sent by a tablet, with their due times.
 
-Sensors whose samples share a time grid form one stream; missing samples are NaN. A sensor with its own
-sample times forms a stream with offsets. The sender's clock is the recording's: each playback sends the
-same bytes at any speed.
+Sensors whose samples share a time grid form one stream; missing samples are NaN. A sensor with its own sample
+times forms a stream with offsets. The sender's clock is the recording's: each playback sends the same bytes
+at any speed.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def cut(recording: Recording, per_batch: int) -> list[DueBatch]:
 
     Parameters
     ----------
-    per_batch : samples of a batch, 1 to 1000.
+    per_batch : samples per batch, 1 to 1000.
 
     Raises
     ------

@@ -39,8 +39,7 @@ class EstimatorPool:
     Parameters
     ----------
     report : called with each message of a process. begin : creates the order to process a trial from its
-        start,
-        None if it has ended. restarted : called with the trials of a crashed process.
+        start, None if it has ended. restarted : called with the trials of a crashed process.
     """
 
     def __init__(

@@ -1,5 +1,4 @@
-"""Messages between tablet and server on a live socket, other than batches
-(docs/reference/live-protocol.md).
+"""Messages between tablet and server on a live socket, other than batches (docs/reference/live-protocol.md).
 
 Malformed messages are reported with a code. Independent of sockets, clocks and disks.
 """

@@ -30,8 +30,8 @@ class RecorderListener(Protocol):
     def note_growth(self, size: int) -> None:
         """The log now has `size` readable bytes of complete records.
 
-        After a disk error the size may decrease, because unsynced data were dropped; readers beyond
-        `size` must restart.
+        After a disk error the size may decrease, because unsynced data were dropped; readers beyond `size`
+        must restart.
         """
 
     def note_acknowledged(self, below: int) -> None:
@@ -125,9 +125,7 @@ class Recorder:
         return self._kept(self._intake.offer(message))
 
     def finish(self) -> IntakeAnswer:
-        """End the trial on the server; `RecorderListener.note_end` follows unless the response contains
-        the end.
-        """
+        """End the trial on the server; `RecorderListener.note_end` follows if the response lacks the end."""
         if self._failure:
             return refuse(self._failure)
         return self._kept(self._intake.end())

@@ -1,7 +1,7 @@
 """Viewers of a session: each browser receives the latest state, and one-time events in order.
 
-A slow browser loses frames without delaying the others: pending state is replaced, and beyond `QUEUE`
-the oldest events are dropped.
+A slow browser loses frames without delaying the others: pending state is replaced, and beyond `QUEUE` the
+oldest events are dropped.
 """
 
 from __future__ import annotations

@@ -28,8 +28,7 @@ class LiveError(SagittalError):
 
     unreachable (nothing acknowledged before the timeout), refused_connection, take_ended (on the server),
     other_sender (the trial contains batches of another client), acknowledged_lost (the server requests
-    batches it
-    had acknowledged).
+    batches it had acknowledged).
     """
 
 
@@ -39,7 +38,7 @@ class StreamFaults:
 
     Parameters
     ----------
-    drop : probability per batch that the connection is cut instead. jitter_s : longest delay of a batch.
+    drop : probability per batch of dropping the connection instead. jitter_s : maximum delay of a batch.
     """
 
     drop: float = 0.0

@@ -16,7 +16,7 @@ def sensor_rows(
 
     Parameters
     ----------
-    heard : streams of which samples have come. battery : sensor id → percent. silent : nothing comes now.
+    heard : streams with samples. battery : sensor id → percent. silent : no data are being received.
     """
     rows = []
     for stream in hello.streams:

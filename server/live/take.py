@@ -107,7 +107,7 @@ class ActiveTake:
 
     Parameters
     ----------
-    house : the registry it belongs to. row : as stored when it was entered.
+    house : its registry. row : as stored when it was opened.
     earlier : its events so far, after a restart of the server.
     """
 

@@ -61,8 +61,8 @@ def frame(
 
     Parameters
     ----------
-    trail : of this frame and those before it that were not sent. slow : its `slow_part`, or an earlier one.
-    phase : per side the share of the running cycle, 0 to 100, None where unknown.
+    trail : angles of this frame and earlier unsent ones. slow : its `slow_part`, or an earlier one.
+    phase : percentage of the current cycle per side, 0 to 100, None if unknown.
     """
     body = {
         "type": "frame",

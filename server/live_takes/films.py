@@ -1,10 +1,9 @@
 """Videos recorded by the tablet's camera during live trials: chunked upload and storage.
 
-Chunks are numbered and acknowledged when on disk. Repeated chunks are accepted; gaps are rejected, so
-that the tablet resumes at the server's position. Chunks are stored in `live/<take>.film` in the record
-format of a live log, and erased with the trial's other files. Once the trial is a recording, the video
-is attached to it like an uploaded one, aligned by the tablet's clock, which stamps frames and samples
-alike.
+Chunks are numbered and acknowledged when on disk. Repeated chunks are accepted; gaps are rejected, so that
+the tablet resumes at the server's position. Chunks are stored in `live/<take>.film` in the record format of a
+live log, and erased with the trial's other files. Once the trial is a recording, the video is attached to it
+like an uploaded one, aligned by the tablet's clock, which stamps frames and samples alike.
 """
 
 from __future__ import annotations
@@ -52,11 +51,11 @@ class TokenNotValid(ServiceError):  # noqa: N818 - what the person reads
 
 @dataclass(frozen=True)
 class FilmProgress:
-    """Number of chunks and bytes received.
+    """Progress of a video upload.
 
     Parameters
     ----------
-    next_piece : number of the piece it waits for; all below are on its disk. limit_bytes : of the whole film.
+    next_piece : number of the next chunk; all below are on disk. limit_bytes : maximum size of the video.
     """
 
     next_piece: int

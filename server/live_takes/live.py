@@ -79,7 +79,7 @@ class TakeOwner:
     run: int | None = None
 
     def has(self, take: LiveTakeRecord) -> bool:
-        """Whether this server owns a trial, or nobody does."""
+        """Whether a trial belongs to this server or is unassigned."""
         return self.node is None or take.node in (None, self.node)
 
     def require(self, take: LiveTakeRecord) -> None:

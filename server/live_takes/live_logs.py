@@ -1,7 +1,7 @@
 """Logs of all web servers: their content, whether the database knows them, and adoption of unknown ones.
 
-A log may lack a row after the database was restored from a backup. It is retained until it is adopted
-or removed manually.
+A log may lack a row after the database was restored from a backup. It is retained until it is adopted or
+removed manually.
 """
 
 from __future__ import annotations

@@ -54,11 +54,11 @@ def keep(db: Database, blobs: BlobStore, queue: JobQueue, path: Path) -> str | N
 
     Parameters
     ----------
-    path : of the log, named by the take.
+    path : of the log, named after the trial.
 
     Returns
     -------
-    The recording's id; None when no sample ever came or the session has been erased. The log may go.
+    The recording's id; None without samples or if the session has been erased. The log may then be deleted.
     """
     take_id = path.stem
     try:
@@ -108,8 +108,7 @@ def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) 
 
 
 def _take_in(db: Database, settings: Settings) -> None:
-    """Move logs and videos here from web servers that cannot run at the same time, and take over their
-    trials.
+    """Take over logs, videos and trials of web servers that cannot run at the same time.
 
     These are the unnamed server or, if this one is unnamed, all others.
     """

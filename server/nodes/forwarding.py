@@ -1,7 +1,7 @@
 """Forwards a request or websocket to the web server that owns it, and returns the response.
 
-Requests are forwarded unchanged: the receiving server checks the cookie or token itself. A request
-that has been forwarded once is answered by the receiving server in any case.
+Requests are forwarded unchanged: the receiving server checks the cookie or token itself. A request that has
+been forwarded once is answered by the receiving server in any case.
 """
 
 from __future__ import annotations
@@ -144,9 +144,7 @@ async def carry_tablet(nodes: Nodes, node: WebNode, ws: WebSocket, first: str | 
 
 @contextlib.asynccontextmanager
 async def open_line(node: WebNode, ws: WebSocket, line: bytes) -> AsyncIterator[ClientConnection]:
-    """Open a websocket to another server on behalf of the client; raises UnreachableError,
-    InvalidStatus.
-    """
+    """Open a websocket to another server on behalf of the client; raises UnreachableError, InvalidStatus."""
     at = urlsplit(node.address)
     own = {b"host", b"user-agent"}
     headers = [
@@ -213,9 +211,7 @@ async def _ask(
 
 
 async def _read_body(receive: Receive) -> bytes | None:
-    """Read the whole body, whose length is limited (server/http/body_limit.py); None if the client
-    disconnected.
-    """
+    """Read the whole body of limited length (server/http/body_limit.py); None if the client disconnected."""
     body, more = bytearray(), True
     while more:
         message = await receive()

@@ -1,8 +1,7 @@
-"""Authentication between web servers: a header with an HMAC identifies the client of a forwarded
-request.
+"""Authentication between web servers: a header with an HMAC identifies the client of a forwarded request.
 
-The key is a file in the shared data folder. The header contains sender, receiver, time, client
-address and scheme; the HMAC binds it to this request.
+The key is a file in the shared data folder. The header contains sender, receiver, time, client address and
+scheme; the HMAC binds it to this request.
 """
 
 from __future__ import annotations

@@ -40,8 +40,8 @@ class WebNode:
 
     Parameters
     ----------
-    address : where the others reach it. key_sha256 : of the key that it holds. run : which of its starts.
-    beat_at : None = it was stopped.
+    address : for the other servers. key_sha256 : hash of its key. run : number of its start.
+    beat_at : last heartbeat, None = stopped.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Nodes:
 
     Parameters
     ----------
-    when_fenced : called in a thread when another process has taken this one's name: it must end.
+    when_fenced : called in a thread when another process has taken over this one's name, which must then end.
     """
 
     def __init__(self, settings: Settings, db: Database, when_fenced: Callable[[], None]) -> None:

@@ -51,7 +51,7 @@ def render_page(
 
     Parameters
     ----------
-    here : its entry in the navigation. running : `jobs.count_active`, where it is read already.
+    here : its entry in the navigation. running : `jobs.count_active`, if already known.
     """
     if running is None:
         running = jobs.count_active(db, who)

@@ -30,8 +30,7 @@ async def read_message(reader: asyncio.StreamReader) -> bytes:
 class Channel:
     """One end of the connection, for blocking use in a thread.
 
-    Never reads past the message it returns, so `poll` on `fileno` indicates whether another is
-    available.
+    Never reads past the message it returns, so `poll` on `fileno` indicates whether another is available.
 
     Parameters
     ----------

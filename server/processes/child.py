@@ -83,8 +83,7 @@ def end_process(process: subprocess.Popen[bytes]) -> None:
 
 
 def enter_child() -> tuple[Channel, Settings]:
-    """Open the channel given by `start_child`, tie this process's lifetime to the parent's and limit
-    memory.
+    """Open the channel given by `start_child`, tie this process's lifetime to the parent's and limit memory.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """Ends child processes together with their parent.
 
-The parent holds the other end of our standard input and never writes to it, so end of file means that
-it is gone, for any reason. On Linux the kernel also kills us, even in the middle of a computation.
+The parent holds the other end of our standard input and never writes to it, so end of file means that it is
+gone, for any reason. On Linux the kernel also kills us, even in the middle of a computation.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """PDF rendering of a self-contained document by WeasyPrint (BSD-3-Clause; needs the system's Pango).
 
-Nothing is downloaded: styles are inline, images are `data:` URLs; other URLs are refused. Imported only
-in a separate process (server/sharing/paper_child.py), as the library takes a second and 130 MB.
+Nothing is downloaded: styles are inline, images are `data:` URLs; other URLs are refused. Imported only in a
+separate process (server/sharing/paper_child.py), as the library takes a second and 130 MB.
 """
 
 from __future__ import annotations

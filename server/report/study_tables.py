@@ -30,9 +30,9 @@ class StudyTake:
 
     Parameters
     ----------
-    name : unique in the study. labels : what else is known of it, in every row of its strides too.
-    files : how many were recorded. sha256 : of each by name.
-    error : why there is no result, None where there is one.
+    name : unique in the study. labels : further attributes, also added to every row of its strides.
+    files : their number. sha256 : of each by name.
+    error : why there is no result, None if there is one.
     read_analysis : its analysis.json. read_strides : its strides.csv, None without strides.
     """
 

@@ -24,9 +24,7 @@ SYMMETRY = {
 
 
 def parameters_csv(report: ReportModel) -> bytes:
-    """One row per parameter and side, with unrounded numbers, comparable norms, or the reason for a
-    missing value.
-    """
+    """One row per parameter and side: unrounded value or reason for its absence, and comparable norm."""
     header = (
         "name",
         "side",
@@ -102,8 +100,7 @@ def _judged(c: Change) -> tuple[object, ...]:
 
 
 def curves_csv(report: ReportModel) -> bytes:
-    """One row per variable, side and % of cycle: mean and sd over the included strides, norm with the same
-    zero.
+    """One row per variable, side and % of cycle: mean and sd of the included strides, matching norm.
 
     The mean is empty, with a `reason`, where the knee of the leg model is at its limit in most strides.
     """

@@ -62,9 +62,8 @@ def submit(
 ) -> JobView:
     """Request an analysis of the current recording with its latest manifest.
 
-    Height and protocol are taken from the session (or the patient) if not in the manifest. Identical
-    files, mapping, parameters and version are analysed only once, unless the analysis failed or the
-    mapping changed.
+    Height and protocol are taken from the session (or the patient) if not in the manifest. Identical files,
+    mapping, parameters and version are analysed only once, unless the analysis failed or the mapping changed.
 
     Raises
     ------
@@ -94,7 +93,7 @@ def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob], config_sha2
 
     Parameters
     ----------
-    config_sha256 : digest of all parameters that were used, defaults included, from the result itself.
+    config_sha256 : digest of all parameters used, including defaults, from the result itself.
     """
     params = claim.params
     analysis_id = new_id()
@@ -143,7 +142,7 @@ def latest_of(
 
     Parameters
     ----------
-    session_ids : ids, or the statement of a module that selects them. values : its parameters.
+    session_ids : ids, or a statement that selects them. values : its parameters.
     """
     if isinstance(session_ids, Select):
         result = c.execute(_select_latest(session_ids), dict(values))

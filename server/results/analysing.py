@@ -58,14 +58,14 @@ def analyse_files(
     Parameters
     ----------
     manifest : JSON text, None = nothing declared.
-    config : overrides of PipelineConfig by stage, {"fusion": {"k_acc": 1.0}}; without any those of an archive
-        of a visit among the files, else the defaults.
-    resumable : as `sagittal.core.pipeline.analyse`.
+    config : overrides of PipelineConfig by stage, {"fusion": {"k_acc": 1.0}}; if empty, those of an archive
+        of a visit among the files, otherwise the defaults.
+    resumable : see `sagittal.core.pipeline.analyse`.
 
     Raises
     ------
     SagittalError
-        nothing can be analysed; the code and the sentence say why.
+        nothing can be analysed; code and message give the reason.
     """
     from sagittal.core.formats import read_recording
     from sagittal.core.formats.manifest import parse_manifest

@@ -80,13 +80,12 @@ def pair(c: Connection, session_id: str, other_id: str) -> SessionPair:
 def list_comparable(
     c: Connection, session: Session, done: Sequence[AnalysedSession]
 ) -> list[tuple[AnalysedSession, VisitKind]]:
-    """Earlier analysed sessions with which a session is compared, oldest first, followed by the session
-    itself.
+    """Earlier analysed sessions comparable with a session, oldest first, followed by the session.
 
-    All have the same walking condition. An assessment is compared with assessments only, so that a
-    training does not influence the trend. Trials of one day under the same condition form one visit and
-    are not compared with each other. Sessions with feedback are neither compared nor used for
-    comparison. Empty if the session has no result.
+    All have the same walking condition. An assessment is compared with assessments only, so that a training
+    does not influence the trend. Trials of one day under the same condition form one visit and are not
+    compared with each other. Sessions with feedback are neither compared nor used for comparison. Empty if
+    the session has no result.
 
     Parameters
     ----------

@@ -1,7 +1,6 @@
 """Edits of an analysis: append-only rows, including those for undoing.
 
-Repeating the edit that was undone last is a redo and preserves the redo history; any other edit clears
-it.
+Repeating the edit that was undone last is a redo and preserves the redo history; any other edit clears it.
 """
 
 from __future__ import annotations
@@ -37,8 +36,8 @@ class EditHistory:
 
     Parameters
     ----------
-    version : number of the last row, undone ones included; 0 = nothing was ever changed.
-    changed_at : of that row, None = nothing was ever changed.
+    version : number of the last row, including undone ones; 0 = never edited.
+    changed_at : time of that row, None = never edited.
     undone : edits that can be redone, the next one last.
     """
 

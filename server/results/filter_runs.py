@@ -60,12 +60,12 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
 
     Parameters
     ----------
-    files : of the recording, and the reference as the last where `params` names one.
+    files : of the recording, followed by the reference if `params` names one.
 
     Raises
     ------
     SagittalError
-        the reference cannot be read, or no filter ran; the code and the sentence say why.
+        the reference cannot be read, or no filter ran; code and message give the reason.
     """
     from sagittal.core.events.edits import read_edit
     from sagittal.core.events.result import Strides
@@ -113,7 +113,7 @@ def submit(
     Raises
     ------
     NotFound
-        the session, its analysis, the reference. ParameterError: of `require_filters`.
+        the session, its analysis, or the reference. ParameterError: see `require_filters`.
     """
     require_filters(filters)
     found = analyses.get_shown(c, session_id)

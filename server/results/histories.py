@@ -30,9 +30,8 @@ class PatientHistory:
 
     Parameters
     ----------
-    condition : under which all of them were walked, some perhaps with feedback; None without a visit.
-    visits : analysed, oldest first. others : visits walked otherwise, by condition. programmes : newest
-    first.
+    condition : common walking condition, possibly with feedback; None without a visit.
+    visits : analysed, oldest first. others : visits under other conditions. programmes : newest first.
     """
 
     patient: Patient
@@ -104,11 +103,10 @@ def list_analysed(c: Connection, patient_id: str) -> list[AnalysedSession]:
 
 
 def baseline(done: Sequence[AnalysedSession]) -> AnalysedSession | None:
-    """The newest visit representative of the patient's gait: at comfortable pace if available, without
-    feedback.
+    """The newest visit representative of the patient's gait, if possible at comfortable pace.
 
-    Tests and squats are used only if there is no walk overground or on a treadmill, daily life only if
-    there is nothing else.
+    Visits with feedback are excluded. Tests and squats are used only if there is no walk overground or on a
+    treadmill, daily life only if there is nothing else.
 
     Parameters
     ----------
@@ -132,8 +130,8 @@ def read_history(
 
     Parameters
     ----------
-    protocol : only visits of this one. like : under the condition of this session; None = of `baseline`, else
-        of the newest visit.
+    protocol : only visits with this protocol. like : use the condition of this session; None = of `baseline`,
+        otherwise of the newest visit.
     """
     asked = [a for a in done if protocol in {None, a.session.protocol}]
     if like is None:

@@ -1,7 +1,7 @@
 """Biofeedback prescriptions: create, replace, end, and prepare for a live trial.
 
-Records are immutable: a change ends one and creates another, so that every trial and its cues refer to
-the prescription in force at the time. One prescription, for one parameter, is in force at a time
+Records are immutable: a change ends one and creates another, so that every trial and its cues refer to the
+prescription in force at the time. One prescription, for one parameter, is in force at a time
 (docs/science/feedback.md).
 """
 
@@ -60,9 +60,9 @@ def write(
 
     Raises
     ------
-    NotFound: the patient. ParameterError, ServiceError bad_prescription: a field is
-    invalid. ServiceError no_target: the source has no target for this patient; the message gives the reason.
-    both_sides: a side is given for a bilateral parameter.
+    NotFound: the patient. ParameterError, ServiceError bad_prescription: a field is invalid. ServiceError
+    no_target: the source has no target for this patient; the message gives the reason. both_sides: a side is
+    given for a bilateral parameter.
     """
     patient = patients.get(c, patient_id)
     asked = Prescription.from_json(content)
@@ -125,8 +125,8 @@ def for_take(
 ) -> tuple[Prescription, Baseline] | None:
     """Prescription for a live trial of this session, with its numeric target; None if there is none.
 
-    Norms depend on gait speed: they are looked up for the last walk before this session. If that yields
-    none, and for all other sources, the numbers from the time of prescription are used.
+    Norms depend on gait speed: they are looked up for the last walk before this session. If that yields none,
+    and for all other sources, the numbers from the time of prescription are used.
     """
     this = sessions.get(c, session_id)
     written = in_force(c, this.patient_id)

@@ -35,7 +35,7 @@ def read(
 
     Parameters
     ----------
-    before : the visit that the table is compared with, None = none.
+    before : visit with which the table is compared, None = none.
     control_visits : of the clinic's own controls.
     """
     bundle = reviewed.read_bundle(found, edits)

@@ -1,7 +1,7 @@
 """Current state of finished analyses: stored results combined with the edits in effect.
 
-A stored analysis never changes. Current events, strides and parameters are recomputed from its tracks
-and edits by the last function of the pipeline.
+A stored analysis never changes. Current events, strides and parameters are recomputed from its tracks and
+edits by the last function of the pipeline.
 """
 
 from __future__ import annotations
@@ -143,8 +143,7 @@ class ReviewedAnalyses:
         return stored if result is None else apply_review(stored, result, edits.edits)
 
     def read_without_tracks(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
-        """Return an analysis that is not being edited; without edits its tracks are neither read nor
-        cached.
+        """Return an analysis that is not being edited; without edits its tracks are neither read nor cached.
 
         Raises
         ------

@@ -1,7 +1,7 @@
 """Edits of a finished analysis by users: logged in order, undoable, and applied immediately.
 
-Two users may review the same session: each edit states the version it is based on (`version`), and any
-but the latest is rejected.
+Two users may review the same session: each edit states the version it is based on (`version`), and any but
+the latest is rejected.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ def make(
 
     Parameters
     ----------
-    seen : version on which the person decided; None = whatever there is.
+    seen : version on which the edit is based; None = any.
 
     Raises
     ------
-    NotFound: no analysis. Conflict: edited_meanwhile, no_tracks.
-    ParameterError of sagittal.core.events.edits.
+    NotFound: no analysis. Conflict: edited_meanwhile, no_tracks. ParameterError of
+    sagittal.core.events.edits.
     """
     found, before = _state(db, session_id, seen)
     return found, _make(db, reviewed, actor, session_id, found, before, edit, ACTIONS[edit.kind])

@@ -43,8 +43,8 @@ class StoredSensitivity:
 
     Parameters
     ----------
-    reference : name of the reference that errors are of; None = changes of the take's own angles.
-    from_standing : angles were zeroed on standing, as the session shows them; else anatomical.
+    reference : name of the reference for errors; None = changes relative to the trial's own angles.
+    from_standing : angles are relative to standing, as on the session's pages; otherwise anatomical.
     files : names among the files of the analysis.
     """
 
@@ -82,12 +82,12 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
 
     Parameters
     ----------
-    files : of the recording, and the reference as the last where `params` names one.
+    files : of the recording, followed by the reference if `params` names one.
 
     Raises
     ------
     SagittalError
-        the take has no squats that were followed, the reference cannot be read or does not fit.
+        the trial has no tracked squats, or the reference cannot be read or does not match.
     """
     from sagittal.core.body.chain.geometry import LegGeometry
     from sagittal.core.squat.sensitivity import analyse_legs
@@ -131,7 +131,7 @@ def submit(
     Raises
     ------
     NotFound
-        the session, its analysis, the reference. Conflict: not_squats.
+        the session, its analysis, or the reference. Conflict: not_squats.
     """
     if sessions.get(c, session_id).protocol != "squat":
         raise Conflict("not_squats", "This is analysed for squats; the visit has another protocol.")

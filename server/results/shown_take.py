@@ -29,8 +29,8 @@ def submit_on_shown(
 
     Parameters
     ----------
-    found : the analysis that is shown. action : in the audit log. against : a reference, last of the job's
-        files. own : parameters of this kind of job.
+    found : the displayed analysis. action : in the audit log. against : a reference, added as last file of
+        the job. own : parameters specific to this kind of job.
     """
     inputs = recordings.job_inputs(recordings.get(c, found.recording_id))
     if against is not None:

@@ -1,8 +1,8 @@
 """Signals of a finished analysis for display: named lanes, downsampled to screen resolution.
 
-Derived: pitch, angular rate and height of the feet, every joint angle. Raw: measurements of each sensor
-in its own axes. A window of a lane is returned as minimum and maximum of equal bins, so that peaks are
-preserved at any zoom.
+Derived: pitch, angular rate and height of the feet, every joint angle. Raw: measurements of each sensor in
+its own axes. A window of a lane is returned as minimum and maximum of equal bins, so that peaks are preserved
+at any zoom.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ class SignalWindow:
 
     Parameters
     ----------
-    start_s, step_s : time of the first part and from part to part.
-    low, high : line → least and greatest value of every part, None where the sensor was lost.
+    start_s, step_s : time of the first bin and bin width.
+    low, high : line → minimum and maximum of every bin, None where the sensor was lost.
     """
 
     lane: SignalLane

@@ -120,7 +120,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
 
     Parameters
     ----------
-    params : of the job, its `order` as members of TuningOrder.
+    params : of the job, with `order` as fields of TuningOrder.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def submit(
 
     Raises
     ------
-    Conflict : no_files, no_such_trial. NotFound : the session. ParameterError : of `require_tunable`.
+    Conflict : no_files, no_such_trial. NotFound : the session. ParameterError : see `require_tunable`.
     """
     require_tunable(order.algorithm)
     this = recordings.require_current(c, session_id)

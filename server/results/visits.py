@@ -46,7 +46,7 @@ class TakesFigure:
 
     Parameters
     ----------
-    by_take : session of every take that has the parameter → it. mean : over them.
+    by_take : session of every trial with a value → value. mean : over them.
     """
 
     by_take: Mapping[str, Parameter]
@@ -160,8 +160,7 @@ def read_newest_speeds(
 
     Parameters
     ----------
-    chosen : what `choose_newest_walks` chose.
-    shown : the results that count, by session.
+    chosen : result of `choose_newest_walks`. shown : displayed analyses, by session.
     edits : by analysis.
     """
     speeds = {}

@@ -70,7 +70,7 @@ class BackupState:
 
     Parameters
     ----------
-    good : the last backup that was made without a complaint.
+    good : the last backup without errors.
     """
 
     backup: Outcome | None = None
@@ -102,7 +102,7 @@ def is_due(settings: Settings, at: dt.datetime) -> bool:
 
     Parameters
     ----------
-    at : the time in the machine's zone.
+    at : local time.
     """
     if not settings.backup_dir:
         return False

@@ -77,10 +77,10 @@ class MadeBackup:
 
     Parameters
     ----------
-    path, size : the file, bytes. files : how many stored files and live logs are in it.
+    path, size : the file, bytes. files : number of stored files and live logs in it.
     head : newest audit row.
-    missing : (space, sha256) of files that the database refers to and that are gone or damaged, so not in it.
-    left_out : the key of patients' names, where it is not in it: not encrypted, or the key cannot be read.
+    missing : (space, sha256) of referenced files that are missing or damaged and thus not included.
+    left_out : the identity key, if not included: the backup is not encrypted, or the key cannot be read.
     """
 
     path: Path
@@ -102,8 +102,7 @@ class _Content:
 def make_backup(
     db: Database, settings: Settings, target: Path, key: ClinicKey | None, actor: audit.Actor | None = None
 ) -> MadeBackup:
-    """Make one backup; a target without the extension of a backup is a folder, and the file is named by
-    time.
+    """Make one backup; a target without the extension of a backup is a folder, and the file is named by time.
 
     Raises
     ------

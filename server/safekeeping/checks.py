@@ -28,8 +28,8 @@ class StorageDefect:
 
     Parameters
     ----------
-    area : database, files, live, trash, audit, or keys: what cannot be read by its key.
-    message : what, and where.
+    area : database, files, live, trash, audit, or keys (values that cannot be decrypted).
+    message : description and location.
     """
 
     area: str

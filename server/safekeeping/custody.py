@@ -87,9 +87,9 @@ def refuse_foreign_folder(
 ) -> None:
     """Raise StrangersError if this host's data folder or clock does not match the PostgreSQL database.
 
-    A worker on another host needs the server's folder of stored files (a network share), and leases
-    require synchronized clocks. The server writes the mark some seconds after the first row of the
-    audit log; until then there is no work, and this function waits (`stop` ends it).
+    A worker on another host needs the server's folder of stored files (a network share), and leases require
+    synchronized clocks. The server writes the mark some seconds after the first row of the audit log; until
+    then there is no work, and this function waits (`stop` ends it).
     """
     if not refuse_wrong_clock(db, settings):
         return
@@ -113,9 +113,7 @@ def refuse_foreign_folder(
 
 
 def find_doubt(c: Connection, settings: Settings) -> str | None:
-    """Reason why stored files must not be deleted on the evidence of this database, as a sentence; None =
-    none.
-    """
+    """Reason not to delete files on the evidence of this database, as a sentence; None = none."""
     try:
         return _doubt(c, settings)
     except StoreAway:

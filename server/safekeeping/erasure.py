@@ -1,9 +1,9 @@
 """Permanent deletion of a session or patient: rows in one transaction, then files; the audit log remains.
 
-Erased data do not go to the trash; copies in the trash and old pages of the database's write-ahead log
-are removed as well. A note in `erasing/` is written before the rows are deleted and removed after the
-files: after a crash the erasure is completed at the next start or sweep (`finish`). A running job loses
-its row, so its worker fails at the fence and publishes nothing.
+Erased data do not go to the trash; copies in the trash and old pages of the database's write-ahead log are
+removed as well. A note in `erasing/` is written before the rows are deleted and removed after the files:
+after a crash the erasure is completed at the next start or sweep (`finish`). A running job loses its row, so
+its worker fails at the fence and publishes nothing.
 """
 
 from __future__ import annotations
@@ -226,10 +226,10 @@ def _read(path: Path) -> dict[str, Any] | None:
 
 
 def _remove(db: Database, blobs: BlobStore, settings: Settings, note: dict[str, Any]) -> None:
-    """Remove what a note lists unless rows still refer to it, as after an aborted erasure.
+    """Remove the content of a note unless rows still refer to it, as after an aborted erasure.
 
-    Only files that may be stored again are removed under the write lock, some at a time, when the
-    author of the note has committed or aborted; erased patients, trials and uploads never return.
+    Only files that may be stored again are removed under the write lock, some at a time, when the author of
+    the note has committed or aborted; erased patients, trials and uploads never return.
     """
     with db.write() as c:
         spaces, takes, parts = (

@@ -114,8 +114,8 @@ def restore(
 
     Parameters
     ----------
-    erased : patients and sessions to exclude, in addition to those in the backup and in `erased.json`
-        next to it.
+    erased : patients and sessions to exclude, in addition to those in the backup and in `erased.json` next to
+        it.
 
     Raises
     ------
@@ -295,9 +295,7 @@ def _at(settings: Settings, folder: Path) -> Settings:
 
 
 def _fill_bucket(settings: Settings, stage: Settings) -> None:
-    """Upload every stored file of the stage to the bucket, so that only the database remains to be put in
-    place.
-    """
+    """Upload every stored file of the stage, so that only the database remains to be put in place."""
     bucket, staged = open_empty_bucket(settings), FolderBlobs(stage.blobs)
     for one in staged.files():
         bucket.adopt(one.space, staged.path(one.space, one.name), one.name)

@@ -1,12 +1,12 @@
 """Deletion of unreferenced stored files: interrupted uploads, results of lost claims, replaced files.
 
-They remain in the trash for 30 days, because a database restored from a backup refers to fewer files;
-after a restore nothing is deleted until confirmed (services/custody.py). Only partially received files
-and erased data are removed immediately.
+They remain in the trash for 30 days, because a database restored from a backup refers to fewer files; after a
+restore nothing is deleted until confirmed (services/custody.py). Only partially received files and erased
+data are removed immediately.
 
-A recent file may be about to be referenced, so only files older than a grace period are removed, under
-the write lock: a publisher has either committed (the reference is visible) or will find its file
-missing in its own transaction (BlobStore.require) and fail cleanly.
+A recent file may be about to be referenced, so only files older than a grace period are removed, under the
+write lock: a publisher has either committed (the reference is visible) or will find its file missing in its
+own transaction (BlobStore.require) and fail cleanly.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """List of erased patients and sessions, stored with the backups, so that restores exclude them.
 
-Every backup contains the list at its time; `erased.json` in the backup folder is updated within a
-minute of an erasure and only grows. It contains random ids and no personal data.
+Every backup contains the list at its time; `erased.json` in the backup folder is updated within a minute of
+an erasure and only grows. It contains random ids and no personal data.
 """
 
 from __future__ import annotations

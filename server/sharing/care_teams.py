@@ -170,8 +170,8 @@ def open_in_emergency(c: Connection, who: Identity, code: str, reason: str) -> E
 
     Raises
     ------
-    NotFound : no patient has exactly this code. ServiceError bad_value : the reason is too short or too
-        long. Conflict
+    NotFound : no patient has exactly this code. ServiceError bad_value : the reason is too short or too long.
+        Conflict
     care_teams_off, seen_already.
     """
     if not are_on(c):

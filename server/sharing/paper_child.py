@@ -1,7 +1,6 @@
 """Process that renders one PDF, which isolates its libraries and memory from the web process.
 
-Started by server/sharing/pdfs.py as `python -m sagittal.server.sharing.paper_child <socket> <parent
-pid>`.
+Started by server/sharing/pdfs.py as `python -m sagittal.server.sharing.paper_child <socket> <parent pid>`.
 """
 
 from __future__ import annotations

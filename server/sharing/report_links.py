@@ -1,10 +1,10 @@
 """Links that give readers without an account access to one signed report; they expire and can be revoked.
 
-Knowing the URL is sufficient, so it contains a random 256-bit token that is shown only once. The
-database stores and indexes its hash, so the duration of a look-up reveals nothing about the token. The
-linked report shows a number instead of the patient's code. Reopening a report ends its links. They also
-end when their creator's account is closed or loses access to the report (`end_orphaned`); restrictions
-that depend on time, such as emergency access, are checked whenever a link is opened.
+Knowing the URL is sufficient, so it contains a random 256-bit token that is shown only once. The database
+stores and indexes its hash, so the duration of a look-up reveals nothing about the token. The linked report
+shows a number instead of the patient's code. Reopening a report ends its links. They also end when their
+creator's account is closed or loses access to the report (`end_orphaned`); restrictions that depend on time,
+such as emergency access, are checked whenever a link is opened.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class ReportLink:
 
     Parameters
     ----------
-    openings, opened_at : how often it was opened, and when last.
-    emergency_id : the access in an emergency in which it was made and with which it ends; None = in none.
+    openings, opened_at : number of openings, and time of the last.
+    emergency_id : emergency access in which it was created and with which it ends; None = none.
     """
 
     id: str
@@ -74,8 +74,7 @@ class LinkNotFound(ServiceError):  # noqa: N818 - as NotFound
 def make(
     c: Connection, actor: Identity | None, report_id: str, days: int, name: str
 ) -> tuple[ReportLink, str]:
-    """Create a link and return its token, which is not stored. During emergency access, the link ends with
-    it.
+    """Create a link and return its token, which is not stored; it ends with an emergency access.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Signed reports: assessment text, signing, reopening, and stored documents.
 
-A signed report is stored with its hash and unaffected by later analyses. While one is in force, the
-text cannot be changed and no other can be signed; reopening requires a reason.
+A signed report is stored with its hash and unaffected by later analyses. While one is in force, the text
+cannot be changed and no other can be signed; reopening requires a reason.
 """
 
 from __future__ import annotations

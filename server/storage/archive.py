@@ -49,7 +49,7 @@ class ClinicKey:
 
     Parameters
     ----------
-    public : to encrypt with. private : to decrypt with; None = it is kept elsewhere.
+    public : for encryption. private : for decryption; None = stored elsewhere.
     """
 
     public: pyrage.x25519.Recipient
@@ -74,8 +74,7 @@ def make_key(path: Path) -> str:
 
 
 def read_key(path: Path) -> ClinicKey:
-    """Read a key file: a private key of age, or a public one (age1…), which only encrypts; # starts a
-    comment.
+    """Read a private age key, or a public one (age1…) for encryption only; # starts a comment.
 
     Raises
     ------

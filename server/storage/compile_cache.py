@@ -52,8 +52,7 @@ def has_compiled_filters() -> bool:
 
 
 def find_compile_cache(environment: Mapping[str, str], fallback: Path) -> Path:
-    """Return the user's folder for this installation's filters, created if necessary; otherwise
-    `fallback`.
+    """Return the user's folder for this installation's filters, created if necessary; otherwise `fallback`.
 
     Parameters
     ----------
@@ -72,9 +71,9 @@ def find_compile_cache(environment: Mapping[str, str], fallback: Path) -> Path:
 def _name_installation(package: Path) -> str:
     """Return the fingerprint of the filters and their location.
 
-    numba identifies a compiled filter by the path of its source. If several installations of a version
-    shared a folder, filters of another would appear to be present: startup would not announce the wait,
-    and each process would compile on its own, one filter after another.
+    numba identifies a compiled filter by the path of its source. If several installations of a version shared
+    a folder, filters of another would appear to be present: startup would not announce the wait, and each
+    process would compile on its own, one filter after another.
     """
     place = hashlib.sha256(os.fsencode(package.resolve())).hexdigest()[:4]
     return f"{fingerprint_filters(package)}-{place}"
@@ -83,9 +82,8 @@ def _name_installation(package: Path) -> str:
 def fingerprint_filters(package: Path) -> str:
     """Return 12 hexadecimal digits that change with any source of a compiled filter.
 
-    numba checks the modification time of one file only, although a filter is compiled together with
-    functions and constants of other modules; so all modules reachable from a module with a filter are
-    included.
+    numba checks the modification time of one file only, although a filter is compiled together with functions
+    and constants of other modules; so all modules reachable from a module with a filter are included.
 
     Parameters
     ----------

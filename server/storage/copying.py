@@ -1,7 +1,6 @@
 """Copies all rows between databases of the same revision, whatever their engines: moves and backups.
 
-Tables are read from the databases rather than from this version, as they may be older before an
-upgrade.
+Tables are read from the databases rather than from this version, as they may be older before an upgrade.
 """
 
 from __future__ import annotations

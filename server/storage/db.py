@@ -27,9 +27,7 @@ Source = Path | str
 
 
 class Database:
-    """Read and write access to one database; opening neither creates tables nor migrates (see
-    storage/migrate.py).
-    """
+    """Read and write access to one database; neither creates tables nor migrates (see storage/migrate.py)."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -81,8 +79,7 @@ class Database:
 
     @contextmanager
     def serve(self, node: str) -> Iterator[bool]:
-        """Register as web server of a PostgreSQL database, alone or under a name; False = not possible
-        now.
+        """Register as web server of a PostgreSQL database, alone or under a name; False = not possible now.
 
         For SQLite files the lock file serves this purpose.
         """
@@ -94,9 +91,7 @@ class Database:
 
     @contextmanager
     def do_alone(self, duty: str) -> Iterator[bool]:
-        """Run a named periodic task exclusively; False = another program runs it. Always True for SQLite
-        files.
-        """
+        """Run a periodic task exclusively; False = another program runs it. Always True for SQLite files."""
         if isinstance(self._engine, PostgresServer):
             with self._engine.do_alone(duty) as is_mine:
                 yield is_mine

@@ -24,7 +24,7 @@ class DiskLog:
 
     Parameters
     ----------
-    logger : where the lines go. clock : seconds.
+    logger : receives the lines. clock : seconds.
     """
 
     def __init__(self, logger: logging.Logger, clock: Callable[[], float] = time.monotonic) -> None:
@@ -38,7 +38,7 @@ class DiskLog:
 
         Parameters
         ----------
-        what : cannot be written, for the log.
+        what : description of the written object, for the log.
         """
         refusal = refusal_of(error)
         why = refusal.value if refusal is not None else getattr(error, "strerror", None)

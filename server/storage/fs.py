@@ -1,10 +1,9 @@
 """The only module of the server that opens files for writing.
 
-A file appears completely or not at all, even after a power failure: temporary file → fsync → rename →
-fsync of the
-folder (measured: 25 kills, 0 broken files; the enumerated power-loss model: 18 states, 0 violations, without
-the file's fsync 3, without the folder's 2). All side effects use `system`, which tests replace to inject
-faults.
+A file appears completely or not at all, even after a power failure: temporary file → fsync → rename → fsync
+of the folder (measured: 25 kills, 0 broken files; the enumerated power-loss model: 18 states, 0 violations,
+without the file's fsync 3, without the folder's 2). All side effects use `system`, which tests replace to
+inject faults.
 """
 
 from __future__ import annotations
@@ -84,8 +83,8 @@ class IncomingFile:
 
     Parameters
     ----------
-    folder : where the temporary file lives; the same file system as every target.
-    limit : most bytes that will be taken, None = no limit.
+    folder : for the temporary file; on the same file system as every target.
+    limit : maximum number of bytes, None = no limit.
     """
 
     def __init__(self, folder: Path, limit: int | None = None) -> None:
@@ -106,7 +105,7 @@ class IncomingFile:
         return self._hash.hexdigest()
 
     def write(self, data: bytes) -> None:
-        """Append bytes; raise SizeLimitError beyond the limit."""
+        """Append bytes; raise SizeLimitError if the limit is exceeded."""
         if self._fd is None:
             raise ValueError("The file is already closed.")
         if self._limit is not None and self.size + len(data) > self._limit:
@@ -236,8 +235,8 @@ def make_folder(folder: Path) -> None:
 def move_file(source: Path, target: Path) -> None:
     """Rename a file within the same file system, replacing an existing one.
 
-    After a power failure it has one of both names; the new one is guaranteed after `sync_folder` of
-    both folders, which the caller does once for many files.
+    After a power failure it has one of both names; the new one is guaranteed after `sync_folder` of both
+    folders, which the caller does once for many files.
     """
     make_folder(target.parent)
     system.replace(source, target)
@@ -339,7 +338,7 @@ class Lock:
         self.release()
 
     def release(self) -> None:
-        """Release the lock; the file remains, so that two processes never lock different files of the same
+        """Release the lock; the file remains, so that two processes never lock different files of one
         name.
         """
         system.close(self._fd)

@@ -1,11 +1,11 @@
 """PostgreSQL-specific part of the database (psycopg 3, the extra `postgres`).
 
-Writing transactions first acquire one advisory lock, like BEGIN IMMEDIATE on SQLite: a transaction that
-reads before it writes sees the previous commit, and the audit log cannot fork. Reading transactions see
-one snapshot.
+Writing transactions first acquire one advisory lock, like BEGIN IMMEDIATE on SQLite: a transaction that reads
+before it writes sees the previous commit, and the audit log cannot fork. Reading transactions see one
+snapshot.
 
-Each round trip to the server costs two context switches, which are slow on a busy machine. Therefore
-the driver begins no transactions (BEGIN and lock are sent together, a single statement needs none), and
+Each round trip to the server costs two context switches, which are slow on a busy machine. Therefore the
+driver begins no transactions (BEGIN and lock are sent together, a single statement needs none), and
 connections are checked before use only if data have arrived on them or they were idle for long.
 """
 
@@ -138,9 +138,7 @@ class PostgresServer:
         c.exec_driver_sql("SELECT pg_logical_emit_message(true, 'sagittal', 'probe')")
 
     def highest_number(self, c: Connection, table: str) -> int:
-        """See storage/db.py; from the sequence if PostgreSQL generates the numbers, otherwise from the
-        newest row.
-        """
+        """See storage/db.py; from the sequence for generated numbers, otherwise from the newest row."""
         quoted = c.dialect.identifier_preparer.quote(table)
         given = c.exec_driver_sql(
             "SELECT last_value FROM pg_sequences WHERE schemaname || '.' || sequencename "
@@ -196,9 +194,7 @@ class PostgresServer:
         return self.hold(f"pg_advisory_lock({MIGRATING}) IS NOT NULL", wait_ms=MIGRATION_WAIT_MS)
 
     def list_others(self) -> list[str]:
-        """Hosts of other Sagittal programs on this database, except those that serve, migrate or wait to
-        migrate.
-        """
+        """Hosts of other Sagittal programs on this database, except servers and migrating programs."""
         engine = self.reader()
         try:
             with engine.connect() as c:
@@ -280,8 +276,8 @@ class PostgresServer:
 def _renew_broken(engine: Engine) -> None:
     """Replace the connections of the pool if PostgreSQL was restarted since their last use.
 
-    A terminating server sends a message on the connection, which is otherwise silent when idle, so this
-    can be detected without a round trip.
+    A terminating server sends a message on the connection, which is otherwise silent when idle, so this can
+    be detected without a round trip.
     """
     refused = engine.dialect.loaded_dbapi.Error
 

@@ -52,8 +52,8 @@ _PASSING = {"55P03", "57P01", "57P03", None}
 
 
 def is_busy(error: BaseException) -> bool:
-    """Whether another writer held the database for too long, or PostgreSQL is unavailable; retrying may
-    help.
+    """Whether another writer held the database for too long, or PostgreSQL is unavailable; retrying
+    may help.
     """
     if not isinstance(error, OperationalError):
         return False

@@ -1,8 +1,8 @@
 """Log of a live trial: `live/<take>.log`, appended during streaming and read after a crash.
 
-A log is created durably with its header and first record, so an existing file is always a valid log;
-then records are appended and synced in groups. After a crash the longest valid prefix remains (for the
-format see core/formats/live_log.py); reading never needs more than a few megabytes of memory.
+A log is created durably with its header and first record, so an existing file is always a valid log; then
+records are appended and synced in groups. After a crash the longest valid prefix remains (for the format see
+core/formats/live_log.py); reading never needs more than a few megabytes of memory.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def create(path: Path, hello: bytes) -> TakeLog:
     Raises
     ------
     InputError
-        `live_log_damaged`: a file is there already that is more than a part of this beginning.
+        `live_log_damaged`: a file exists that contains more than part of this header.
     """
     content = FILE_MARK + record("H", hello)
     fs.make_folder(path.parent)
@@ -154,8 +154,8 @@ def recover(path: Path, see: Callable[[LogRecord], None]) -> TakeLog | None:
 def find_damage(path: Path, size: int) -> Damage | None:
     """Damage after the first `size` bytes of a log, other than an end torn by a crash.
 
-    A log is damaged if a complete record follows unreadable data, or if the last record has its full
-    length but invalid content. A torn end is shorter, or ends in zeros of blocks never written.
+    A log is damaged if a complete record follows unreadable data, or if the last record has its full length
+    but invalid content. A torn end is shorter, or ends in zeros of blocks never written.
     """
     length = path.stat().st_size
     if length <= size:
@@ -203,7 +203,7 @@ def read_records(path: Path, start: int = 0) -> Iterator[tuple[int, LogRecord]]:
 
     Parameters
     ----------
-    start : 0, or the end of a record read before. `LogRecord.end` is of no use here: it counts in a chunk.
+    start : 0, or the end of an earlier record. Do not use `LogRecord.end`, which is relative to a chunk.
     """
     with path.open("rb") as file:
         yield from read_open_records(file, start)

@@ -103,7 +103,7 @@ def check_set(c: Connection, settings: Settings, session_id: str, name: str, siz
 
 
 def make_too_large(name: str, limit: int) -> TooLarge:
-    """Error for a file beyond the size limit in bytes."""
+    """Error for a file that exceeds the size limit in bytes."""
     return TooLarge(
         "file_too_large",
         f"'{name}' is larger than {limit / 1e6:g} MB, the limit of this installation. "

@@ -1,8 +1,8 @@
 """Upload sets: the original files of a trial, their inspection, and the mapping of sensors to segments.
 
-A session's current recording is its newest. Its files may change until an analysis or tuning is
-requested; then it becomes immutable, and adding or removing a file starts a new one with the same other
-files. For the reception of files see server/uploads/receiving.py.
+A session's current recording is its newest. Its files may change until an analysis or tuning is requested;
+then it becomes immutable, and adding or removing a file starts a new one with the same other files. For the
+reception of files see server/uploads/receiving.py.
 """
 
 from __future__ import annotations

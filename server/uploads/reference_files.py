@@ -1,5 +1,4 @@
-"""References of a session: orientations of another system for comparison, kept separate from the
-recording.
+"""References of a session: orientations of another system for comparison, kept separate from the recording.
 
 A file of the same name replaces the previous one; comparisons that used that retain it.
 """

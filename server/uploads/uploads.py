@@ -1,8 +1,8 @@
 """Resumable uploads of files in parts, which survive a restart of the server.
 
-Received data are stored as `<id>.part` in the folder of files being received; a part is acknowledged
-when it is on disk. Once the file is complete and its SHA-256 matches, it is renamed to its name in the
-store and gets its row in the session, like a file uploaded at once.
+Received data are stored as `<id>.part` in the folder of files being received; a part is acknowledged when it
+is on disk. Once the file is complete and its SHA-256 matches, it is renamed to its name in the store and gets
+its row in the session, like a file uploaded at once.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class FileUpload:
 
     Parameters
     ----------
-    name, size : of the whole file. offset : bytes that are on the server's disk; the next part begins there.
+    name, size : of the complete file. offset : bytes on the server's disk, where the next part begins.
     """
 
     id: str
@@ -107,7 +107,7 @@ def add_part(
 
     Raises
     ------
-    NotFound; Conflict upload_gap: wrong offset; TooLarge beyond the announced size; DiskFull.
+    NotFound; Conflict upload_gap: wrong offset; TooLarge if it exceeds the announced size; DiskFull.
     """
     with blobs.hold_part(upload_id):
         with db.read() as c:

@@ -1,7 +1,7 @@
 """Video of a trial: shown next to the avatar, never analysed, and not part of reports.
 
-A video is accepted only if the user who adds it confirms the patient's consent, which is recorded with
-it. It is deleted with its session and patient. A session has one video; another replaces it.
+A video is accepted only if the user who adds it confirms the patient's consent, which is recorded with it. It
+is deleted with its session and patient. A session has one video; another replaces it.
 """
 
 from __future__ import annotations

@@ -36,8 +36,8 @@ class DrawnBatch:
 
     Parameters
     ----------
-    name : of the node in the room. opacity : of all copies; None = 1, and `FAINT` for those not measured.
-    middle : (2,) m, of the floor.
+    name : of the node in the room. opacity : of all instances; None = 1, and `FAINT` for those not measured.
+    middle : (2,) m, centre of the floor.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class DrawnBatch:
         )
 
     def move(self, wxyz: Single, position: Single) -> None:
-        """Set orientations (k, 4) and positions (k, 3) m of all instances; `wxyz` must not be modified
+        """Set orientations (k, 4) and positions (k, 3) m of all instances; do not modify `wxyz`
         afterwards.
         """
         move_copies(self.handle, wxyz, position - self.origin)
@@ -78,7 +78,7 @@ class DrawnFigure:
 
     Parameters
     ----------
-    copies : mesh → its copies among those of all meshes (`FigureLayout.copies`).
+    copies : mesh → indices of its instances among those of all meshes (`FigureLayout.copies`).
     """
 
     def __init__(self, parts: Mapping[PartName, DrawnBatch], copies: Mapping[PartName, slice]) -> None:
@@ -89,7 +89,7 @@ class DrawnFigure:
             self._origins[copies[name]] = part.origin
 
     def move(self, wxyz: Single, position: Single) -> None:
-        """Set orientations (c, 4) and positions (c, 3) m of all instances; `wxyz` must not be modified
+        """Set orientations (c, 4) and positions (c, 3) m of all instances; do not modify `wxyz`
         afterwards.
         """
         inside = position - self._origins

@@ -98,7 +98,7 @@ def find_toe_bend(body: BodyModel, pitch: Floats, height: Floats) -> Floats:
 
     Parameters
     ----------
-    pitch : of the foot, rad, toes up. height : of the ball over the floor, m.
+    pitch : of the foot, rad, toes up. height : of the ball above the floor, m.
     """
     along, under = (_TIP - _BALL - 0.05) * body.foot, _KNUCKLE * body.ankle_height
     # of a moment np.clip alone would take as long as all else

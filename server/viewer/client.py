@@ -1,9 +1,8 @@
 """Viser's client page: one cacheable document for all views.
 
-In viser's own page the script is already compressed and cannot be compressed further. For clients that
-accept brotli (browsers do over TLS and on localhost) script and style are unpacked and the whole page
-is compressed: 0.63 MB instead of 0.67. This takes seconds once per version; meanwhile the original is
-served.
+In viser's own page the script is already compressed and cannot be compressed further. For clients that accept
+brotli (browsers do over TLS and on localhost) script and style are unpacked and the whole page is compressed:
+0.63 MB instead of 0.67. This takes seconds once per version; meanwhile the original is served.
 """
 
 from __future__ import annotations
@@ -153,7 +152,7 @@ def _pack(file: Path) -> None:
 
 
 def _read_digits(text: str, digits: str) -> bytes:
-    """Decode a base-85-like text: each five digits, most significant first, are four bytes."""
+    """Decode base-N text: each five digits, most significant first, are four bytes."""
     value = np.zeros(128, np.int64)
     value[[ord(c) for c in digits]] = np.arange(len(digits))
     found = value[np.frombuffer(text.encode("ascii"), np.uint8)]

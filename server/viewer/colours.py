@@ -45,8 +45,8 @@ FLOOR: Final[Mapping[bool, tuple[Rgb, Rgb]]] = {
 def to_linear_rgb(colour: Rgb) -> Rgb:
     """Convert sRGB to the linear RGB that viser expects per instance of a batch (0 to 255).
 
-    Colours per mesh are interpreted as sRGB, colours per instance are not: unconverted they look washed
-    out. Formula: IEC 61966-2-1.
+    Colours per mesh are interpreted as sRGB, colours per instance are not: unconverted they look washed out.
+    Formula: IEC 61966-2-1.
     """
     c = np.asarray(colour) / 255.0
     out = np.where(c > 0.04045, ((c + 0.055) / 1.055) ** 2.4, c / 12.92)

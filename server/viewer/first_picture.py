@@ -1,8 +1,7 @@
 """First frame of a replay as an SVG drawing, from the initial camera of the 3D view.
 
-It is displayed in the page until the 3D view has rendered, which takes seconds without a graphics
-processor. It shows the same parts in the same places: avatar, shadow, footprints and trails, and floor
-lines.
+It is displayed in the page until the 3D view has rendered, which takes seconds without a graphics processor.
+It shows the same parts in the same places: avatar, shadow, footprints and trails, and floor lines.
 """
 
 from __future__ import annotations
@@ -67,8 +66,7 @@ class _SeenSurface:
 
 
 def draw_first_picture(motion: ReplayMotion, t_s: float) -> str | None:
-    """Draw the frame nearest to a time as shown first by `ReplayFigure`; None if there is no avatar at
-    that time.
+    """Draw the frame nearest to a time like `ReplayFigure`; None if there is no avatar at that time.
 
     Returns
     -------

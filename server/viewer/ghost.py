@@ -1,8 +1,8 @@
 """Overlay of another walk on the avatar, at the same phase of a stride and in the same place.
 
-Two walks share no time axis. Each included stride of the avatar is assigned a stride of the other
-visit, in order and cyclically; between contacts time is scaled by phase. A walk defined by curves is
-shown at the phases of both legs. There is no ghost outside such strides.
+Two walks share no time axis. Each included stride of the avatar is assigned a stride of the other visit, in
+order and cyclically; between contacts time is scaled by phase. A walk defined by curves is shown at the
+phases of both legs. There is no ghost outside such strides.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def match_ghost(
 ) -> GhostMotion | None:
     """Match another visit to an avatar; None if no side has included strides in both.
 
-    Left strides determine the match; right ones are used where there is no left one, as at the ends of
-    a walk.
+    Left strides determine the match; right ones are used where there is no left one, as at the ends of a
+    walk.
     """
     frames = np.full(len(figure.t_s), -1, np.int64)
     for side in SIDES:

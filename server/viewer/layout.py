@@ -1,7 +1,7 @@
 """Layout of an avatar: mesh instances and their poses.
 
-The same few rigid parts are used at all times, for a whole trial or a single moment. A part is defined
-in the axes of its segment, so placing it means assigning the pose of that segment.
+The same few rigid parts are used at all times, for a whole trial or a single moment. A part is defined in the
+axes of its segment, so placing it means assigning the pose of that segment.
 """
 
 from __future__ import annotations

@@ -2,9 +2,8 @@
 
     GET /sessions/{sid}/live/figure?dark=…   opens it: {"src": "/views/<id>/"} for an iframe (proxy.py)
 
-The view is shared by all users who may run live sessions, one per theme, and is recreated after it was
-stopped:
-a page only needs to request it again after losing its connection.
+The view is shared by all users permitted to run live sessions, one per theme, and is recreated after it was
+stopped: a page only needs to request it again after losing its connection.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """Displays the estimator's poses of a session in one live avatar while it is being viewed.
 
-Pictures are shown as they arrive, only the latest; after half a second without one the avatar turns
-grey.
+Pictures are shown as they arrive, only the latest; after half a second without one the avatar turns grey.
 """
 
 from __future__ import annotations

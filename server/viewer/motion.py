@@ -1,7 +1,7 @@
 """Precomputed arrays of an avatar, so that showing a frame only requires indexing.
 
-Everything is float32 and reduced to at most 50 frames per second. The avatar is placed in room
-coordinates; the smoothed path of its root is stored separately, so that the camera can follow.
+Everything is float32 and reduced to at most 50 frames per second. The avatar is placed in room coordinates;
+the smoothed path of its root is stored separately, so that the camera can follow.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ class ReplayMotion:
     root : (m, 2) m, smoothed path on the floor.
     prints, trails : side → footprints and path of that foot; no trails unless `placed`.
     placed : positions are estimates in the room, rather than for illustration only.
-    facing : heading in rad at the first valid frame. ghosts : name → function that
-        returns a walk for overlay, None if unavailable; slow the first time.
+    facing : heading in rad at the first valid frame. ghosts : name → function that returns a walk for
+        overlay, None if unavailable; slow the first time.
     """
 
     t_s: Floats

@@ -1,8 +1,7 @@
-"""Reference walk defined by curves over the gait cycle, on the patient's body: the norm or the better
-side.
+"""Reference walk defined by curves over the gait cycle, on the patient's body: the norm or the better side.
 
-Both legs follow the same curves, each at its own phase. Everything independent of time is precomputed,
-so a frame requires only a look-up, one rotation and the floor contact.
+Both legs follow the same curves, each at its own phase. Everything independent of time is precomputed, so a
+frame requires only a look-up, one rotation and the floor contact.
 """
 
 from __future__ import annotations
@@ -35,8 +34,8 @@ class ReferenceWalk:
     Parameters
     ----------
     curves : variable → (n,) rad over the cycle, signs as in the curves of sagittal.core.parameters; the
-        sagittal ones must be there, another that is missing is 0. A pelvis rotation is about the heading.
-    lead : the side whose cycle the pelvis follows.
+        sagittal ones are required, others default to 0. Pelvis rotation is relative to the heading.
+    lead : side whose cycle determines the pelvis.
     """
 
     def __init__(self, curves: Mapping[str, Floats], body: BodyModel, lead: Side = "left") -> None:
@@ -56,13 +55,12 @@ class ReferenceWalk:
         self._turns, self._points = ([list(of) for of in both] for both in (turn, points))
 
     def at(self, phases: Phases, place: tuple[float, float], heading: float) -> tuple[Floats, Floats] | None:
-        """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS`, with the lower sole on the
-        floor.
+        """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS`, lower sole on the floor.
 
         Parameters
         ----------
-        phases : side → 0 to 1; where one is not known, half a cycle from the other. None when neither is.
-        place : m, where the pelvis is. heading : rad, where the walk goes.
+        phases : side → 0 to 1; an unknown one is half a cycle from the other. None if both are unknown.
+        place : position of the pelvis, m. heading : walking direction, rad.
         """
         left, right = (_row(phases, side, self._last) for side in SIDES)
         if left is None or right is None:
@@ -115,7 +113,8 @@ def add_standing_angles(
 
     Parameters
     ----------
-    curves : variable → (n,) rad from standing. zero : angle → rad at standing, as `JointAngles.zero_offset`.
+    curves : variable → (n,) rad relative to standing. zero : angle → rad in standing, as
+        `JointAngles.zero_offset`.
     """
     own = 1.0 if side == "right" else -1.0
     found = {name: x for name, x in curves.items() if name == "pelvis_rotation"}
@@ -132,8 +131,8 @@ def add_standing_angles(
 def find_better_side(curves: Mapping[Side, Mapping[str, Floats]], norm: Mapping[str, Floats]) -> Side | None:
     """Return the side whose sagittal curves are closer in shape to the norm, with means removed; rad.
 
-    Uses the mean of root mean squares as in `gps_sagittal`, without offsets since our angles are
-    relative to standing. None without both sides and the norm, as there is no basis for a choice.
+    Uses the mean of root mean squares as in `gps_sagittal`, without offsets since our angles are relative to
+    standing. None without both sides and the norm, as there is no basis for a choice.
     """
     found: dict[Side, float] = {
         side: sum(_unlike(own[name], norm[name]) for name in SAGITTAL)

@@ -1,7 +1,7 @@
 """Scene around an avatar: floor, light, background and camera.
 
-Everything with a position in the room is attached to one node. Following the avatar moves that node
-rather than the camera, so that it does not interfere with the user's control of the camera.
+Everything with a position in the room is attached to one node. Following the avatar moves that node rather
+than the camera, so that it does not interfere with the user's control of the camera.
 """
 
 from __future__ import annotations

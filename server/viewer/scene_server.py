@@ -1,7 +1,7 @@
 """viser servers accessible only to this process: they listen on Unix sockets in private folders.
 
-viser checks neither cookies nor origins and normally listens on TCP, where any user of the machine and
-any page in a local browser could connect. A socket file in a private folder prevents both.
+viser checks neither cookies nor origins and normally listens on TCP, where any user of the machine and any
+page in a local browser could connect. A socket file in a private folder prevents both.
 """
 
 from __future__ import annotations

@@ -24,8 +24,8 @@ def loft_sections(
 
     Parameters
     ----------
-    rows : (n, 5 or 6) m: place in y, rising, middle in x, reach forward, back, right and left; without the
-        last column as far to the left as to the right. sides : vertices of a section, four quarters of
+    rows : (n, 5 or 6) m: position in y, increasing, centre in x, extent forward, back, right and left;
+        without the last column left equals right. sides : vertices of a section, four quarters of
         superellipses. caps : height of the dome on the lower and on the upper end, m, 0 = flat.
     power : of the front and of the back half, 2 = ellipse.
     """
@@ -58,14 +58,14 @@ def loft_sections(
 def interpolate_rows(
     table: Floats, count: int, between: tuple[float, float] | None = None, *, dense_ends: bool = False
 ) -> Floats:
-    """Interpolate a table (n, k) at `count` positions of its first column by monotone cubics, without
-    overshoot.
+    """Interpolate a table (n, k) at `count` positions of its first column by monotone cubics.
 
     Source: Fritsch and Butland 1984, doi:10.1137/0905021.
 
     Parameters
     ----------
-    between : first and last place, None = all of the table. dense_ends : more places towards both ends.
+    between : first and last position, None = the whole table. dense_ends : denser positions towards both
+        ends.
     """
     x, y = table[:, 0], table[:, 1:]
     h = np.diff(x)[:, None]

@@ -35,7 +35,7 @@ class FootTrail:
 
     Parameters
     ----------
-    t_s : (k,) s, increasing, when the foot had gone a piece. pieces : (k, 2, 3) m, from and to, world.
+    t_s : (k,) s, increasing, end time of each piece. pieces : (k, 2, 3) m, start and end, world.
     """
 
     t_s: Floats
@@ -48,8 +48,8 @@ class FootPrints:
 
     Parameters
     ----------
-    t_s : (c,) s, increasing, when the foot rested. position : (c, 3) m, middle of the sole on the floor,
-    world. wxyz : (c, 4) turned about the vertical only, x to the toes.
+    t_s : (c,) s, increasing, times of rest. position : (c, 3) m, middle of the sole on the floor, world. wxyz
+        : (c, 4) rotated about the vertical only, x to the toes.
     """
 
     t_s: Floats

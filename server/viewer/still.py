@@ -26,7 +26,7 @@ def draw_still(poses: Poses, t_s: float, near: Side, title: str) -> str | None:
 
     Parameters
     ----------
-    near : leg that is in front. title : for those who hear the page.
+    near : leg nearer to the viewer. title : for screen readers.
     """
     frame = min(int(np.searchsorted(poses.t_s, t_s)), len(poses.t_s) - 1)
     segments = tuple(poses.q)

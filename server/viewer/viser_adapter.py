@@ -1,9 +1,8 @@
 """Adapter to viser's internals: no other module uses its private names or its client's build.
 
-Avatar updates use lower-level calls than viser's public setters: a node is moved with one message, and
-a frame wakes viser once. It listens on Unix sockets. Verified by
-tests/server/viewer/test_viser_adapter.py, and at startup `require_known_viser` reports a version of
-viser in which the required names have changed.
+Avatar updates use lower-level calls than viser's public setters: a node is moved with one message, and a
+frame wakes viser once. It listens on Unix sockets. Verified by tests/server/viewer/test_viser_adapter.py, and
+at startup `require_known_viser` reports a version of viser in which the required names have changed.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from sagittal.server.viewer.steps import Single
 
 
 class UnknownViserError(SagittalError):
-    """The installed viser is unsupported; the message names what is missing."""
+    """The installed viser is unsupported; the message names the missing part."""
 
     def __init__(self, missing: str) -> None:
         super().__init__(
@@ -66,8 +65,7 @@ class ArraysChanged(  # type: ignore[call-arg]  # viser's types are not looked a
     entity=EntityLifecycle("scene", "update_dict", "name"),
     include_in_scene_serialization=True,
 ):
-    """viser's property update message, restricted to C-contiguous float32 arrays of a fixed set of
-    properties.
+    """viser's property update, restricted to C-contiguous float32 arrays of fixed properties.
 
     viser inspects the type of every field of every message, which takes a third of the time of a frame.
     """
@@ -93,11 +91,10 @@ class ArraysChanged(  # type: ignore[call-arg]  # viser's types are not looked a
 
 
 def move_copies(handle: viser.BatchedMeshHandle, wxyz: Single, position: Single) -> None:
-    """Set orientations (k, 4) and positions (k, 3) of all instances with one message; public setters need
-    two.
+    """Set orientations (k, 4) and positions (k, 3) of all instances with one message instead of two.
 
-    The number of messages, not of bytes, determines the cost of a frame. The arrays must be
-    C-contiguous and must not be modified afterwards.
+    The number of messages, not of bytes, determines the cost of a frame. The arrays must be C-contiguous and
+    must not be modified afterwards.
     """
     inside = handle._impl  # noqa: SLF001
     props = inside.props
@@ -124,8 +121,8 @@ def gather_longer(server: viser.ViserServer) -> None:
 def show_at_once(server: viser.ViserServer) -> Iterator[None]:
     """Send all changes made within the context together and immediately.
 
-    viser's `atomic` and `flush` do the same but wake its thread twice. Both its events are set: it may
-    have checked since the last change and then waits for the next one, not for a flush.
+    viser's `atomic` and `flush` do the same but wake its thread twice. Both its events are set: it may have
+    checked since the last change and then waits for the next one, not for a flush.
     """
     buffer = server._websock_server.get_message_buffer()  # noqa: SLF001
     buffer.atomic_start()
@@ -152,9 +149,7 @@ def move_node(handle: viser.SceneNodeHandle, place: tuple[float, float, float]) 
 
 
 def forbid_sharing(server: viser.ViserServer) -> None:
-    """Prevent clients from requesting a public tunnel through a third party; the proxy also drops the
-    request.
-    """
+    """Prevent clients from requesting a public tunnel; the proxy also drops the request."""
     server._websock_server.unregister_handler(ShareUrlRequest)  # noqa: SLF001
 
 

@@ -1,9 +1,9 @@
 """HTTP connections with timeouts, so that incomplete requests do not hold a connection indefinitely.
 
-uvicorn only closes connections that are idle between two requests. Here request headers have a
-deadline, bodies a minimum rate, and responses must keep being read by the client. None of this limits
-the duration of a response: event streams and websockets may stay open. A body that we read slowly is
-not held against the client.
+uvicorn only closes connections that are idle between two requests. Here request headers have a deadline,
+bodies a minimum rate, and responses must keep being read by the client. None of this limits the duration of a
+response: event streams and websockets may stay open. A body that we read slowly is not held against the
+client.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ class ConnectionLimits:
 
     Parameters
     ----------
-    most : connections at once; the next is answered 503 and closed.
-    head_s : time for the first line and the headers of a request.
-    body_s, body_bytes : of a body at least so many bytes come in each such time, or all that is left.
-    unread_s : some of an answer that fills all buffers is read in each such time.
+    most : simultaneous connections; further ones are answered with 503 and closed.
+    head_s : time limit for the request line and headers.
+    body_s, body_bytes : minimum rate of a body: bytes per interval, or the remainder.
+    unread_s : time limit for reading part of a response that fills all buffers.
     """
 
     most: int = 1000

@@ -1,6 +1,4 @@
-"""Listening socket: sends small responses immediately, and rejects only new connections when out of
-descriptors.
-"""
+"""Listening socket: sends small responses immediately; rejects new connections if out of descriptors."""
 
 from __future__ import annotations
 
@@ -46,12 +44,12 @@ class SeldomLog:
 class ListeningSocket(socket.socket):
     """Listening TCP socket for an asyncio server.
 
-    Its protocol number is set explicitly: with 0, asyncio does not set TCP_NODELAY on accepted
-    connections, and each small response waits some 40 ms for an acknowledgement.
+    Its protocol number is set explicitly: with 0, asyncio does not set TCP_NODELAY on accepted connections,
+    and each small response waits some 40 ms for an acknowledgement.
 
     Without a free descriptor asyncio leaves a connection in the queue, retries 2,048 times and logs a
-    traceback for each. Here one descriptor is kept in reserve and released for as long as it takes to
-    accept that connection and close it.
+    traceback for each. Here one descriptor is kept in reserve and released for as long as it takes to accept
+    that connection and close it.
     """
 
     def __init__(self, family: socket.AddressFamily) -> None:

@@ -19,8 +19,8 @@ class TrustedProxies:
 
     Parameters
     ----------
-    proxies : addresses and networks whose X-Forwarded-For and X-Forwarded-Proto are believed. Of a chain of
-        proxies the last address that is none of theirs is the client.
+    proxies : addresses and networks whose X-Forwarded-For and X-Forwarded-Proto are trusted. In a chain of
+        proxies, the last address that is not one of them is the client.
     """
 
     def __init__(self, app: ASGIApp, proxies: Sequence[str]) -> None:

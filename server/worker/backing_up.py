@@ -1,5 +1,4 @@
-"""Scheduled backups next to the running server: a thread with a timer and a separate process for each
-backup.
+"""Scheduled backups next to the running server: a thread with a timer and a separate process for each backup.
 
 The process serves neither web requests nor jobs, and runs at low disk and CPU priority (nice).
 """

@@ -29,9 +29,9 @@ class Task:
     ----------
     run : in the child: (files, the job's params, attempt) → result files; raises SagittalError.
     publish : in the worker, inside the transaction that marks the job done: (connection, claim, result files,
-        the same as blobs). It may raise SagittalError: then the job fails and nothing is written.
+        their blobs). If it raises SagittalError, the job fails and nothing is written.
     keeps_files : whether the result files are stored as blobs before the transaction.
-    warm : imports and compiles what `run` needs, once per child.
+    warm : imports and compiles everything required by `run`, once per child.
     """
 
     kind: str

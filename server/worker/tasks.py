@@ -1,8 +1,8 @@
 """Built-in kinds of jobs.
 
-Inspect a recording, analyse it, run filters on it, tune a filter, estimate the uncertainty of squat
-angles, export a file for another program. Kinds that concern one package are that package's `run` and
-`publish`; the two defined here combine two packages each.
+Inspect a recording, analyse it, run filters on it, tune a filter, estimate the uncertainty of squat angles,
+export a file for another program. Kinds that concern one package are that package's `run` and `publish`; the
+two defined here combine two packages each.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Worker: claims jobs, lets its child compute them, renews the lease and publishes the results.
 
-It runs in its own process (started by `sagittal serve` or as `sagittal worker`); run as a module it
-ends with its parent. Computations run only in the child, which may be killed at any moment.
+It runs in its own process (started by `sagittal serve` or as `sagittal worker`); run as a module it ends with
+its parent. Computations run only in the child, which may be killed at any moment.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Worker:
 
     Parameters
     ----------
-    stop : set it to end: the current job is given back unharmed.
+    stop : set to end; the current job is released.
     """
 
     def __init__(

@@ -124,8 +124,8 @@ def ask_for_key(
     trail: OpenTrail,
     failures: Failures,
 ) -> account_schemas.KeyOptions:
-    """Options for signing in with a security key, after the correct password; 404 if none is registered
-    here.
+    """Options for signing in with a security key, after the correct password; 404 if none is
+    registered here.
     """
     row = accounts.check_password(db, failures, trail, body.name, body.password, address_of(request))
     with db.write() as c:

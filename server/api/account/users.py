@@ -48,8 +48,8 @@ def change_user(
 ) -> account_schemas.User:
     """Change role, display name or password, or close the account.
 
-    Ends the user's sign-ins; a new password also revokes API tokens. Report links end if their
-    creator's account is closed or may no longer open the patient.
+    Ends the user's sign-ins; a new password also revokes API tokens. Report links end if their creator's
+    account is closed or may no longer open the patient.
     """
     values = body.model_dump(exclude_unset=True, mode="json")
     fields = sorted(values)

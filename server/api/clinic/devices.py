@@ -41,8 +41,8 @@ COLUMNS = (
 class DeviceCheckAnswer:
     """Check of a sensor in one trial, in sensor axes, or the reason why there is none.
 
-    `rest_s`: still period, from the sensor's first sample. `bias_error`: uncertainty due to slow
-    rotation of the wearer. `up`: the vertical. `rthz`: per √Hz.
+    `rest_s`: still period, from the sensor's first sample. `bias_error`: uncertainty due to slow rotation of
+    the wearer. `up`: the vertical. `rthz`: per √Hz.
     """
 
     day: dt.date

@@ -89,8 +89,7 @@ def cancel_job(
 
 
 async def _events(feed: JobFeed, job_id: str, find_end: Callable[[], str | None]) -> AsyncIterator[str]:
-    """Format updates of a job as events, with comments in between so that proxies keep the connection
-    open.
+    """Format updates of a job as events, with comments in between so that proxies keep the connection open.
 
     Parameters
     ----------

@@ -27,9 +27,9 @@ class OpenedTake:
 class TakeAnswer:
     """A live trial.
 
-    `state` is pairing, open (a tablet has joined), streaming, finished (by the tablet) or closed
-    (here); `problem` finish_mismatch: the tablet's final count or hash differs. node_away: the web
-    server that runs the trial is unavailable.
+    `state` is pairing, open (a tablet has joined), streaming, finished (by the tablet) or closed (here);
+    `problem` finish_mismatch: the tablet's final count or hash differs. node_away: the web server that runs
+    the trial is unavailable.
     """
 
     id: str
@@ -90,8 +90,8 @@ class PairingCode(Request):
 class FilmBeginning(Request):
     """Start of a video on a tablet.
 
-    `began_us` is the time of the first frame by the clock that stamps `sent_us` of its batches;
-    `consent` confirms that the patient agreed to be filmed.
+    `began_us` is the time of the first frame by the clock that stamps `sent_us` of its batches; `consent`
+    confirms that the patient agreed to be filmed.
     """
 
     consent: bool
@@ -121,8 +121,7 @@ class PairedTablet:
 
 
 class LiveCommand(Request):
-    """A command; feedback and pause take true or false, level takes steps (+ easier), mark and ghost a
-    text.
+    """A command; feedback and pause take true or false, level takes steps (+ easier), mark and ghost a text.
 
     test takes "go", "repeat", or start and end of the functional test.
     """

@@ -140,8 +140,8 @@ def _opened(
 def _review(
     reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, edits: edit_log.EditHistory, status: int = 200
 ) -> Response:
-    """Response without model validation, which would take longer for two thousand events than computing
-    them.
+    """Response without model validation, which would take longer for two thousand events than
+    computing them.
     """
     bundle = reviewed.read_bundle(found, edits)
     events, strides, of = bundle.events.events, bundle.strides.strides, bundle.strides.columns

@@ -106,8 +106,7 @@ class ChangeInWords(Change):
 class Comparison:
     """Two sessions, the earlier one first; `cautions` list differences in condition and measurement.
 
-    `comparable` false: the walking conditions differ or feedback was given, so changes are not
-    assessed.
+    `comparable` false: the walking conditions differ or feedback was given, so changes are not assessed.
     """
 
     before: ComparedSession

@@ -159,7 +159,7 @@ async def receive_body(request: Request, upload: receiving.receive) -> recording
 
 
 def read_size(request: Request, limit: int) -> int:
-    """Return the announced body size in bytes, 0 = unknown; raise Problem 413 beyond the limit."""
+    """Return the announced body size in bytes, 0 = unknown; raise Problem 413 if it exceeds the limit."""
     declared = request.headers.get("content-length", "0")
     if not declared.isdecimal() or int(declared) > limit:
         raise Problem(

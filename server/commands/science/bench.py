@@ -44,11 +44,11 @@ def bench(
     folder
         recordings (docs/science/filters.md)
     show_list
-        list them, with their sources
+        list algorithms with their sources
     out
-        write every score into a file
+        write all scores to a file
     every
-        print every recording instead of their mean
+        print each recording instead of the mean
     """
     if show_list:
         sys.stdout.write(_table(_list_algorithms()))

@@ -45,21 +45,21 @@ def sensitivity(
     Parameters
     ----------
     paths
-        files of one take (default: a simulated one)
+        files of one trial (default: a simulated one)
     reference
-        angles.parquet to hold the angles against (default: themselves)
+        angles.parquet to compare the angles with (default: themselves)
     table_top
-        take in which sensors left the table
+        trial in which the sensors were lifted off a table
     side
-        leg that squats (default: all with sensors)
+        leg to analyse (default: all with sensors)
     measures
         lengths in m (docs/science/squat.md)
     from_standing
-        compare angles from standing
+        compare angles relative to standing
     out
-        write every figure into a file
+        write all results to a file
     seed
-        of the simulated take
+        seed of the simulated trial
     """
     from sagittal.server.report.view.sensitivity import (
         sensitivity_csv,

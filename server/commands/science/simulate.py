@@ -25,18 +25,18 @@ ACTIVITY: Final = "activity"
 def simulate(*, out: Path, script: str = "comfortable", seed: Seed = 1, hours: float = 24.0) -> int:
     """Write `recording.parquet` and `truth/` into `out`; 2 = unknown script.
 
-    Ground truth of a walk: angles, events, strides; of squats, leg swings and bows: angles, phases; of
-    a chest sensor: trunk, phases; of a test that begins on a chair: trunk, segments, scripted changes;
-    of daily life: phases and steps.
+    Ground truth of a walk: angles, events, strides; of squats, leg swings and bows: angles, phases; of a
+    chest sensor: trunk, phases; of a test that begins on a chair: trunk, segments, scripted changes; of daily
+    life: phases and steps.
 
     Parameters
     ----------
     out
-        folder for recording and truth
+        folder for recording and ground truth
     script
         comfortable, fast_with_turns, hemiparetic, squats, postures, activity … (docs/science/simulation.md)
     hours
-        of daily life, --script activity (default 24)
+        duration of daily life, --script activity (default 24)
     """
     from sagittal.core.formats import write_recording
     from sagittal.core.simulate import MOVEMENTS, SCRIPTS, Simulation, simulate_movement, simulate_scenario

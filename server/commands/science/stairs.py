@@ -33,17 +33,17 @@ def stairs(
     Parameters
     ----------
     level
-        when they walked on the level, s from the first sample
+        period of level walking, s from the first sample
     up
-        when they walked upstairs, s from the first sample
+        period of walking upstairs, s from the first sample
     down
-        when they walked downstairs, s from the first sample
+        period of walking downstairs, s from the first sample
     out
-        file for `analyse --config`
+        output file for `analyse --config`
 
     Returns
     -------
-    0, or 1 when the recording does not give them.
+    0, or 1 if the limits cannot be determined.
     """
     from sagittal.core.activity.monitor import calibrate_on_walks
     from sagittal.core.formats import list_source_files, read_named_file, read_recording

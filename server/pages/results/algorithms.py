@@ -62,8 +62,8 @@ def show_algorithms(
 
     Parameters
     ----------
-    run : which comparison, else the newest. of : segment or joint angle held against the reference.
-    against : filter whose plot is drawn.
+    run : comparison to show, default the newest. of : segment or joint angle compared with the reference.
+    against : filter to plot.
     """
     with db.read() as c:
         context = read_context(c, sid)

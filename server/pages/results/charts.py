@@ -38,6 +38,6 @@ def draw_chart(panel: CurvePanel, height: int, *, x_unit: bool, glance: bool = F
 
     Parameters
     ----------
-    glance : for a first look: single strides coarsely.
+    glance : draw single strides at low resolution.
     """
     return caption_chart(panel, cycle_svg(panel, height=height, x_unit=x_unit, glance=glance))

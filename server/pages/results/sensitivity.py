@@ -46,7 +46,8 @@ def show_sensitivity(
 
     Parameters
     ----------
-    run : which one, else the newest. show : change by steps, by a share of the nominal value, or in %.
+    run : analysis to show, default the newest. show : change per step, per fraction of the nominal value, or
+        in %.
     """
     with db.read() as c:
         context = read_context(c, sid)

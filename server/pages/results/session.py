@@ -304,11 +304,9 @@ def _draw_report(
 
 
 def _follow(reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any]) -> TrendStrip | None:
-    """Gait speed and score up to this visit under the same condition; None on screen or with too few
-    visits.
+    """Gait speed and score up to this visit under the same condition; None on screen or with too few visits.
 
-    Trials of one day form one visit, represented by the last; those with poor or damaged data are
-    omitted.
+    Trials of one day form one visit, represented by the last; those with poor or damaged data are omitted.
     """
     alike: Sequence[tuple[AnalysedSession, VisitKind]] = context.get("alike", ())
     if model.headline is None or model.quality.kind == "bad" or len(alike) < LEAST_VISITS:
@@ -367,9 +365,7 @@ def explain_emptiness(model: ReportModel) -> str:
 
 
 def _notices(model: ReportModel) -> list[dict[str, Any]]:
-    """Notices by severity; those of one kind share a box, errors that stopped the analysis are shown
-    separately.
-    """
+    """Notices by severity, grouped by kind; errors that stopped the analysis are shown separately."""
     boxes: dict[tuple[str, str], dict[str, Any]] = {}
     for w in sorted(model.warnings, key=lambda w: SEVERITIES.index(w.kind)):
         if w.message == model.problem:

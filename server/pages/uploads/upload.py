@@ -207,9 +207,8 @@ def view_inspection(
     """Template context of an inspection: facts, sensors with their most likely segment, notices.
 
     The segment of a sensor is, in order of priority: set by the user, declared by the files, from this
-    patient's last visit with these sensors, from a name, from the clinic's last trial with it,
-    suggested by movement. Earlier placements are used as a whole or not at all, if inconsistent with
-    names or movement.
+    patient's last visit with these sensors, from a name, from the clinic's last trial with it, suggested by
+    movement. Earlier placements are used as a whole or not at all, if inconsistent with names or movement.
 
     Parameters
     ----------

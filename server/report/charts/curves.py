@@ -65,9 +65,8 @@ def cycle_svg(
     height : px including margins, which the stylesheet sets to 18 above and 20 (34 with `x_unit`) below.
     x_unit : print the unit of the x axis; once per column. over : cycle of the curves.
     single_strides : draw thin single strides, each a path with its index in the stride list as `data-stride`.
-    glance : draw at most `GLANCE_STRIDES` single strides per side, spread over the trial; these and the
-        norm in
-        steps of 4 %, means in steps of 2 %, which takes a third of the bytes.
+    glance : draw at most `GLANCE_STRIDES` single strides per side, spread over the trial; these and the norm
+        in steps of 4 %, means in steps of 2 %, which takes a third of the bytes.
     earlier : the same variable in an earlier session; its means are drawn thin, in the background.
 
     Returns
@@ -113,12 +112,11 @@ def range_svg(
     scale: tuple[float, float],
     width: int = 120,
 ) -> str:
-    """Draw one row of the parameter table: norm ± 1 SD as a box with its mean; values are clipped at the
-    ends.
+    """Draw one row of the parameter table: norm ± 1 SD as a box with its mean; values are clipped.
 
     Parameters
     ----------
-    marks : "left" a filled disc, "right" a ring, "both" a disc in ink → value.
+    marks : "left" (filled disc), "right" (ring) or "both" (dark disc) → value.
     norm : mean and standard deviation.
     """
     boxes = [] if norm is None else [(norm[0] - norm[1], norm[0] + norm[1])]
@@ -126,11 +124,10 @@ def range_svg(
 
 
 def strip_svg(strides: Strides, duration_s: float, height: int = 92) -> str:
-    """Draw all strides over time: stance solid, swing light, excluded strides faded with a cross, and the
-    cursor.
+    """Draw all strides over time with the cursor: stance solid, swing light, excluded ones faded and crossed.
 
-    Every stride is a `<g>`, in the order of the stride list. Excluded strides state their reason;
-    labels of the others are added by the page's script, as there are many.
+    Every stride is a `<g>`, in the order of the stride list. Excluded strides state their reason; labels of
+    the others are added by the page's script, as there are many.
     """
     plot_height = height - 24
     marks = "".join(_stride_mark(s, duration_s) for s in strides.strides)

@@ -1,7 +1,7 @@
 """Chart of a trial with feedback: strides over the zone of their level, solid with feedback, open without.
 
-Follows the conventions of the cycle curves (server/report/charts/svg.py): the plot stretches, dots and
-text do not.
+Follows the conventions of the cycle curves (server/report/charts/svg.py): the plot stretches, dots and text
+do not.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ def draw_spread(title: str, lines: Mapping[Side | None, Floats], top: float, end
 
     Parameters
     ----------
-    top : of the value axis, shared by neighbours. end : of the time axis in s; the cycle ends at 100 %.
+    top : upper limit of the value axis, shared by adjacent charts. end : of the time axis in s, or 100 %.
     """
     plot = PlotArea((0.0, top), HEIGHT - TOP - BOTTOM)
     ticks, digits = find_round_ticks(0.0, top)
@@ -62,8 +62,7 @@ def _path(plot: PlotArea, values: Floats) -> str:
 def draw_agreement(
     title: str, middle: Sequence[float], difference: Sequence[float], levels: Sequence[float]
 ) -> str:
-    """Draw a Bland–Altman plot in degrees: difference over mean, with bias and limits of agreement as
-    lines.
+    """Draw a Bland–Altman plot in degrees: difference over mean, with bias and limits of agreement as lines.
 
     Parameters
     ----------

@@ -46,9 +46,8 @@ class SideCurve:
     ----------
     mean_deg, sd_deg : (101,) over the included strides; None without strides, sd also with one. NaN where the
         knee of the leg model is at its limit in most strides.
-    n : number of strides in the mean. strides : index in the stride list → (101,) deg, included strides
-        to draw,
-        NaN where the knee is at its limit.
+    n : number of strides in the mean. strides : index in the stride list → (101,) deg, included strides to
+        draw, NaN where the knee is at its limit.
     foot_off_pct, foot_off_sd : foot-off, % of cycle, None if not detected.
     """
 
@@ -67,14 +66,12 @@ class CurvePanel:
     Parameters
     ----------
     title : including the zero, "Knee flexion, from standing".
-    zero : zero of the curves, None without angles. added_deg : goniometer reading added to it, by side;
-        empty if
-        relative to standing.
+    zero : zero of the curves, None without angles. added_deg : goniometer reading added to it, by side; empty
+        if relative to standing.
     low_confidence : frontal and transverse planes, and joints without a sensor on both segments.
     reason : why there is no curve, None if there is one.
-    norm : band with the same zero; None if there is none. norm_note : remarks on the norm, or why an
-        existing norm
-        is not shown.
+    norm : band with the same zero; None if there is none. norm_note : remarks on the norm, or why an existing
+        norm is not shown.
     comfortable : band of the same group at comfortable speed, if `norm` is at the patient's speed.
     """
 
@@ -119,8 +116,8 @@ def curve_panels(
 
 
 def same_zero(before: CurvePanel, after: CurvePanel) -> tuple[CurvePanel, CurvePanel]:
-    """Convert two panels of a variable to a common zero: relative to standing unless both are anatomical.
-    The earlier one loses its curves if only one trial includes quiet standing.
+    """Convert two panels of a variable to a common zero: relative to standing unless both are anatomical. The
+    earlier one loses its curves if only one trial includes quiet standing.
     """
     if before.zero == after.zero or None in (before.zero, after.zero):
         return before, after

@@ -32,12 +32,11 @@ Box = tuple[float, float, float, float]
 def place_words(figure: Element, width: float, height: float, left: float) -> None:
     """Move the labels of a chart along its upper or lower edge to the place with least overlap.
 
-    The upper label is moved above the plot if no place inside is clear and the foot-off marks leave
-    space.
+    The upper label is moved above the plot if no place inside is clear and the foot-off marks leave space.
 
     Parameters
     ----------
-    figure : of fixed size, px. width, height : of its plot area. left : margin.
+    figure : chart of fixed size, px. width, height : of its plot area. left : margin.
     """
     curves = [
         p for part in figure.iter(f"{SVG}path") if _is_of(part, CURVES) for p in _sample(part.get("d", ""))

@@ -1,9 +1,9 @@
 """Common elements of charts: plot area, axes, text and dots, and the bar of a table row.
 
 The margins of a chart are the padding of its `<div>`; the `<svg>` is the plot area. Data are drawn in a
-nested `viewBox="0 0 1000 1000"` that stretches, while strokes and text keep their size; labels are
-placed in percent and px. Colours, widths and dashes are set by CSS classes only (design tokens), so
-light, dark and print share one drawing.
+nested `viewBox="0 0 1000 1000"` that stretches, while strokes and text keep their size; labels are placed in
+percent and px. Colours, widths and dashes are set by CSS classes only (design tokens), so light, dark and
+print share one drawing.
 """
 
 from __future__ import annotations
@@ -81,8 +81,8 @@ def draw_bar(
 
     Parameters
     ----------
-    marks : "left", "right", "both" → value. boxes : low and high, the rear one first; values outside
-        `scale` are drawn at its end. width : px.
+    marks : "left", "right", "both" → value. boxes : low and high, the rear one first; values outside `scale`
+        are drawn at its end. width : px.
     """
 
     def x(value: float) -> float:
@@ -109,8 +109,7 @@ def draw_bar(
 
 
 class PlotArea:
-    """Collects stretching shapes (0 to 1000 both ways) and fixed ones (percent and px), from back to
-    front.
+    """Collects stretching shapes (0 to 1000 both ways) and fixed ones (percent and px), from back to front.
 
     Parameters
     ----------

@@ -83,9 +83,7 @@ def write_activity(found: ActivityResult) -> dict[str, bytes]:
 
 
 def summarise_activity(found: ActivityResult) -> dict[str, object]:
-    """Content of activity.json: everything except spans, steps and inclination, which have files of their
-    own.
-    """
+    """Content of activity.json: everything except spans, steps and inclination, which have own files."""
     return {
         "schema": SCHEMA,
         "segment": found.segment,

@@ -65,9 +65,7 @@ def _functional(analysis: TakeAnalysis) -> dict[str, object] | None:
 
 
 def _quality(analysis: TakeAnalysis) -> dict[str, object]:
-    """The quality report; its level is the worse of signals and estimator, `signals_level` that of the
-    signals.
-    """
+    """The quality report; `level` is the worse of signals and estimator, `signals_level` the former."""
     found = reduce_to_plain(analysis.quality.to_json())
     assert isinstance(found, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
     verdict = None if analysis.poses is None else find_worst_verdict(analysis.poses.health)
@@ -192,8 +190,8 @@ def _body(analysis: TakeAnalysis) -> dict[str, object] | None:
 
 
 def _sensor_places(analysis: TakeAnalysis) -> object:
-    """Positions of sensors and joints in cm along the segment's axes, with nominal positions, and the
-    knees' hinge axes; None if not estimated from motion.
+    """Positions of sensors and joints in cm along the segment's axes, with nominal positions, and the knees'
+    hinge axes; None if not estimated from motion.
     """
     # readers of results, which have nothing of this to write, do without numba
     from sagittal.core.agreement.joints import LEG_JOINTS

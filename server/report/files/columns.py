@@ -96,7 +96,7 @@ def parquet_file(
 
     Parameters
     ----------
-    written : called after each group of rows.
+    written : called after each row group.
     """
     kept = {"sagittal": json.dumps(reduce_to_plain(meta))}
     sink, writer = io.BytesIO(), None
@@ -159,8 +159,7 @@ def bools_of(table: pa.Table, name: str) -> Bools:
 
 
 def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
-    """UTF-8 comma-separated text with a header; None and non-finite numbers are empty, others rounded to
-    1e-6.
+    """UTF-8 CSV with a header; None and non-finite numbers are empty, others rounded to 1e-6.
 
     Text that a spreadsheet could interpret as a formula is prefixed with an apostrophe (OWASP, "CSV
     injection").
@@ -219,8 +218,7 @@ def _cell(value: object) -> object:
 
 
 def write_json(value: object) -> bytes:
-    """Equivalent of `json.dumps` with an indent of 1, mostly by its faster compiled part, which cannot
-    indent.
+    """Equivalent of `json.dumps` with an indent of 1, using its faster compiled part where possible.
 
     Raises
     ------

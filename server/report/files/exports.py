@@ -71,7 +71,7 @@ def analysis_files(analysis: TakeAnalysis, let_go: Callable[[], None] = lambda: 
 
     Parameters
     ----------
-    let_go : called when something large is no longer held.
+    let_go : called when a large object has been released.
     """
     if analysis.source.protocol == "activity":
         written = {} if analysis.activity is None else write_activity(analysis.activity)
@@ -178,7 +178,7 @@ def strides_csv(strides: Strides, columns: Mapping[str, Column]) -> bytes:
 
     Parameters
     ----------
-    columns : parameters by name, one entry per stride.
+    columns : parameters by name, one value per stride.
     """
     own = (
         (

@@ -42,9 +42,7 @@ _Made = TypeVar("_Made")
 
 
 def tracks_parquet(tracks: Tracks) -> bytes:
-    """Write the input of `core.parameters.measure.measure_gait` not contained in angles.parquet and
-    events.csv.
-    """
+    """Write the input of `core.parameters.measure.measure_gait` other than angles and events."""
     columns: dict[str, ParquetColumn] = {}
     for segment, q in tracks.q.items():
         columns |= _spread(f"{segment}_q", q, "wxyz")

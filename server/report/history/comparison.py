@@ -33,7 +33,7 @@ class ComparedRow:
 
     Parameters
     ----------
-    before, after : as printed, "–" where not measured. reason : why there is no number after, else None.
+    before, after : as printed, "–" if not measured. reason : why the later value is missing, otherwise None.
     """
 
     title: str
@@ -54,7 +54,7 @@ def compare_figures(
 
     Parameters
     ----------
-    norms : of the earlier and of the later session, each at its own speed; without them changes have no
+    norms : for the earlier and the later session, each at its own speed; without them changes have no
         direction.
     """
     known = None if norms is None else (norms[0].values, norms[1].values)
@@ -95,8 +95,8 @@ def compare_rows(
 def add_changes(groups: Sequence[Group], found: Sequence[Change]) -> tuple[Group, ...]:
     """Add changes since an earlier session to the rows of a table, where both have a value.
 
-    Values with different measurement methods are marked as such. An angle relative to the anatomical
-    zero shows the change relative to standing, which is available at every visit.
+    Values with different measurement methods are marked as such. An angle relative to the anatomical zero
+    shows the change relative to standing, which is available at every visit.
     """
     words: dict[str, list[ChangeWords]] = {}
     for c in found:

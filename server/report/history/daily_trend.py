@@ -1,7 +1,7 @@
 """Capacity in the clinic and performance at home, over the same period.
 
-Capacity is the walk of a clinic session (gait speed, cadence); performance is daily life (steps per
-day, cadence of longer bouts). They are different quantities with separate axes; cadence shares one.
+Capacity is the walk of a clinic session (gait speed, cadence); performance is daily life (steps per day,
+cadence of longer bouts). They are different quantities with separate axes; cadence shares one.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class PerformanceDay:
 
     Parameters
     ----------
-    day : of the device's clock, else counted from the day of the session. cadence_spm : median of the walks
-        of LONG_BOUT_S or longer, None without one.
+    day : by the device's clock, otherwise counted from the date of the session.
+    cadence_spm : median of the walking bouts of at least LONG_BOUT_S, None without any.
     """
 
     session_id: str

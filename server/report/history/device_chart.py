@@ -28,8 +28,8 @@ def draw_device(
 
     Parameters
     ----------
-    least : height of the value axis that is not fallen below, so that noise does not look like a change.
-    band : within which a value is no change.
+    least : minimum range of the value axis, so that noise does not look like a change.
+    band : range of values that are not a change.
     """
     there = [(x, v) for x, v in zip(_places(days), values, strict=True) if v is not None]
     if not there:

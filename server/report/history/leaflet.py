@@ -60,8 +60,8 @@ class LeafletFigure:
 
     Parameters
     ----------
-    now, before : value with its unit; before None = no number that is compared. words : what became of it.
-    estimated : a model of the leg gives it, and no two sensors measure it.
+    now, before : value with its unit; before None = not compared. words : description of the change.
+    estimated : estimated by a leg model rather than measured by two sensors.
     """
 
     title: str
@@ -78,7 +78,7 @@ def list_figures(
 
     Parameters
     ----------
-    changes : since the last time, empty without one that can be compared.
+    changes : since the previous visit, empty if not comparable.
     """
     found = []
     for figure in FIGURES:

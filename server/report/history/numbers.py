@@ -39,8 +39,8 @@ class Numbers:
 
 @dataclass(frozen=True, eq=False)
 class WalkMeans:
-    """Contribution of a control's walk to a reference: parameters, and mean curves relative to standing,
-    deg.
+    """Contribution of a control's walk to a reference: parameters, and mean curves relative to
+    standing, deg.
     """
 
     parameters: tuple[Parameter, ...]

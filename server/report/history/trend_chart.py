@@ -63,8 +63,7 @@ def trend_svg(
     *,
     small: bool = False,
 ) -> str:
-    """Draw one side of a trend over the dates of all visits, so that all charts of a patient share an
-    axis.
+    """Draw one side of a trend over the dates of all visits, so that all charts of a patient share an axis.
 
     Parameters
     ----------

@@ -67,10 +67,10 @@ class TrendStrip:
 
     Parameters
     ----------
-    days : of the shown visits, oldest first. hidden : how many visits between the first two are not shown.
-    missing : day and reason of each value that is not there, the same ones once.
-    later : title and day of what changed since a later visit than the first, which has no value to compare
-        with: none, an estimated one, or one of training.
+    days : of the displayed visits, oldest first. hidden : number of omitted visits between the first two.
+    missing : date and reason of each missing value, without repetition.
+    later : title and date for changes since a later visit than the first, whose value is missing, estimated
+        or from a training.
     """
 
     days: tuple[dt.date, ...]
@@ -85,7 +85,7 @@ def trend_strip(visits: Sequence[AnalysedVisit], affected: Side | None = None) -
 
     Parameters
     ----------
-    visits : walked alike, oldest first. affected : side, None = none or both.
+    visits : under the same condition, oldest first. affected : side, None = none or both.
     """
     if len(visits) < LEAST_VISITS:
         return None

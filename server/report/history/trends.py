@@ -1,8 +1,8 @@
 """Parameters over a patient's visits: changes since the first assessment, and the change required.
 
-All visits have the same walking condition. The first assessment is the base: its measurement error is
-the band that a later value must leave to count as a real change (docs/science/change.md, "Verdict").
-Trainings are displayed but never used as the base; those with feedback are not compared with it.
+All visits have the same walking condition. The first assessment is the base: its measurement error is the
+band that a later value must leave to count as a real change (docs/science/change.md, "Verdict"). Trainings
+are displayed but never used as the base; those with feedback are not compared with it.
 """
 
 from __future__ import annotations
@@ -89,9 +89,9 @@ class TrendSeries:
 
     Parameters
     ----------
-    points : visits with a value, oldest first. base : index of the first assessment among them, of the first
-        that was measured if any was; None = none.
-    latest : index of the last assessment after it, else None: nothing to judge yet.
+    points : visits with a value, oldest first. base : index of the first assessment among them, preferably a
+        measured one; None = none.
+    latest : index of the last assessment after it, None if there is none yet.
     mdc, mcid : around the base; None without a source.
     """
 
@@ -141,10 +141,10 @@ def follow_figures(
 
     Parameters
     ----------
-    norms : of this person, one of every visit at its speed; empty = none. A trend shows that of the last
-        visit without feedback.
-    usual : of people of this age and sex at their own comfortable speed; the reference of speed itself,
-        which cannot be matched by speed.
+    norms : for the patient, one per visit at its speed; empty = none. A trend shows that of the last visit
+        without feedback.
+    usual : norms for this age and sex at comfortable speed; the reference for speed itself, which cannot be
+        matched by speed.
     affected : side, None = none or both.
     """
     tables = [{(p.name, p.side): p for p in collect_figures(visit.numbers)} for visit in visits]

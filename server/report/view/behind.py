@@ -45,8 +45,8 @@ class ParameterStrides:
 
     Parameters
     ----------
-    row : as in the table. definition : in a sentence. strides : of the whole list; empty for a figure that is
-        not one of strides. svg : its strides over time, empty without any.
+    row : as in the table. definition : in a sentence. strides : all strides; empty for a parameter not based
+        on strides. svg : chart of the strides over time, empty without any.
     """
 
     row: ParameterRow
@@ -72,7 +72,7 @@ def open_row(
 
     Parameters
     ----------
-    column : the figure of every stride of the list, None where it is not one of strides.
+    column : values of all strides, None if the parameter is not based on strides.
     """
     digits = CATALOGUE[row.name].digits if row.name in CATALOGUE else 2
     values = () if column is None else tuple(

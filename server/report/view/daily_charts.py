@@ -1,7 +1,7 @@
 """Charts of daily life: activity ribbon, trunk inclination, walking bouts, steps.
 
-Activities are distinguished by colour and bar height; unknown periods are hatched or dotted. Follows
-the conventions of all charts (server/report/charts/svg.py).
+Activities are distinguished by colour and bar height; unknown periods are hatched or dotted. Follows the
+conventions of all charts (server/report/charts/svg.py).
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def bars_svg(
 
     Parameters
     ----------
-    bars : label, height (None = not known, a dash), and whether it is full: one that is not is dashed.
+    bars : label, height (None = unknown, drawn as a dash), and whether complete; incomplete ones are dashed.
     values : write the numbers.
     """
     top = max((value for _, value, _ in bars if value is not None), default=0.0) or 1.0

@@ -1,7 +1,7 @@
 """View of a daily-life recording: days, hours, transitions, walking bouts and trunk inclination.
 
-For the results see core/activity/result.py, for the charts server/report/view/daily_charts.py, for
-names of activities and days server/report/words/daily_words.py.
+For the results see core/activity/result.py, for the charts server/report/view/daily_charts.py, for names of
+activities and days server/report/words/daily_words.py.
 """
 
 from __future__ import annotations
@@ -316,9 +316,7 @@ def _describe_event(found: ActivityResult, e: PosturalTransition | TransitionCan
 
 
 def _describe_leans(found: ActivityResult) -> tuple[LeanRow, ...]:
-    """Median and central 90 % of inclination per activity; lying is excluded, as forward is undefined on a
-    side.
-    """
+    """Median and central 90 % of inclination per activity, except lying, when forward may be undefined."""
     values, kinds = found.inclination_deg, label_seconds(found)
     rows = []
     for i, kind in enumerate(KINDS):
@@ -344,8 +342,8 @@ def inclination_course(found: ActivityResult, start_s: float, end_s: float) -> t
 
     Returns
     -------
-    t_s : (n,) start of each window. course : (n, 3) 10 %, 50 % and 90 % of its seconds, NaN if fewer than
-        a tenth of them are known.
+    t_s : (n,) start of each window. course : (n, 3) 10 %, 50 % and 90 % of its seconds, NaN if fewer than a
+        tenth of them are known.
     """
     first, last = int(start_s), min(int(np.ceil(end_s)), len(found.inclination_deg))
     n = max(0, -(-(last - first) // COURSE_S))

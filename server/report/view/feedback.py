@@ -131,7 +131,7 @@ def feedback_view(
 
     Parameters
     ----------
-    before : the visit whose end the retention block is held against. limb : of the trained side.
+    before : visit whose end is compared with the retention block. limb : of the trained side.
     """
     term = parameter_term(content.parameter)
     rows = tuple(

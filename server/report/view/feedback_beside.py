@@ -53,7 +53,7 @@ class Retention:
 
     Parameters
     ----------
-    verdict : in words, with the limit it follows.
+    verdict : in words, with the underlying limit.
     """
 
     session_id: str

@@ -1,9 +1,9 @@
 """Findings of a trial and changes since the previous visit, in a few sentences.
 
-A parameter can be compared with the norm, the other side or the previous visit. The deviation is
-divided by the combined variation between subjects and measurement error; values above 1 are findings.
-Of related parameters only the largest finding is reported (docs/science/headline.md). Deviations from
-the norm or the other side are found by server/report/view/standouts.py.
+A parameter can be compared with the norm, the other side or the previous visit. The deviation is divided by
+the combined variation between subjects and measurement error; values above 1 are findings. Of related
+parameters only the largest finding is reported (docs/science/headline.md). Deviations from the norm or the
+other side are found by server/report/view/standouts.py.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def say_badge(kind: str, strides: Strides) -> str:
 
     Parameters
     ----------
-    kind : ok, warn or bad, of the data as a whole.
+    kind : overall data quality, ok, warn or bad.
     """
     if kind == "bad":
         return ""

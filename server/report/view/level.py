@@ -1,6 +1,4 @@
-"""Angles relative to the anatomical zero, in addition to those relative to standing, if measured by
-goniometer.
-"""
+"""Angles relative to the anatomical zero, if measured by goniometer, in addition to standing."""
 
 from __future__ import annotations
 
@@ -55,9 +53,7 @@ def label_parameter(name: str) -> str:
 def level_column(
     name: str, strides: Strides, columns: Mapping[str, Column], standing_deg: Mapping[str, float]
 ) -> Column | None:
-    """Values of all strides relative to the anatomical zero: value relative to standing plus goniometer
-    reading.
-    """
+    """Values of all strides relative to the anatomical zero, by adding the goniometer reading."""
     column = columns.get(from_standing(name) or "")
     if column is None:
         return None
@@ -80,7 +76,7 @@ def level_parameters(
 
     Parameters
     ----------
-    estimated : variables that no two sensors measure; a goniometer does not help them.
+    estimated : variables estimated by a model, for which a goniometer reading is not used.
     """
     found = _measured_parameters(curves, standing_deg, estimated)
     return tuple(replace(p, name=_level_name(p.name)) for p in found)
@@ -96,7 +92,7 @@ def level_rows(
 
     Parameters
     ----------
-    norms : of this person, looked up with `anatomical` = the variables of `anatomical_variables`.
+    norms : for the patient, looked up with `anatomical` = the variables of `anatomical_variables`.
     """
     found = _measured_parameters(curves, standing_deg, estimated)
     rows = parameter_rows(found, norms, zero="anatomical")
@@ -108,7 +104,7 @@ def choose_zero(rows: Iterable[ParameterRow], anatomical: Collection[str]) -> tu
 
     Parameters
     ----------
-    anatomical : variables whose curves are drawn from the anatomical zero.
+    anatomical : variables with curves relative to the anatomical zero.
     """
     given = tuple(rows)
     names = {row.name for row in given}

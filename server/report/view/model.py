@@ -145,9 +145,7 @@ class ReportModel:
 
     @property
     def has_sides(self) -> bool:
-        """Whether the table has columns for left and right: always, except for a test without values of
-        one side.
-        """
+        """Whether the table has columns for left and right; only a test may lack values of one side."""
         rows = [row for _, group in self.groups for row in group]
         return self.functional is None or any(row.left or row.right for row in rows)
 

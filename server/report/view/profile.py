@@ -49,9 +49,8 @@ class ProfileRow:
 
     Parameters
     ----------
-    left, right, healthy, svg : against people at the person's speed where `ProfileView.at_speed`.
-    comfortable_left, comfortable_right : against people at their comfortable speed, "" where the above are
-        against these already.
+    left, right, healthy, svg : against subjects at the patient's speed if `ProfileView.at_speed`.
+    comfortable_left, comfortable_right : against subjects at comfortable speed, "" if the above already are.
     """
 
     title: str
@@ -102,8 +101,7 @@ def profile_view(comfortable: Scores, matched: Scores | None = None) -> ProfileV
     Parameters
     ----------
     comfortable, matched : scores of the same curves, against subjects at comfortable speed and at the
-        patient's
-        speed; None if unavailable.
+        patient's speed; None if unavailable.
     """
     scores = comfortable if matched is None else matched
     rows, bars = [], []
@@ -140,11 +138,10 @@ def _total(scores: Scores) -> ProfileBar | None:
 
 
 def bar_svg(bar: ProfileBar, before: ProfileBar | None, height: int = BAR_HEIGHT) -> str:
-    """Draw both sides of a bar one above the other, left filled, right outlined; a tick at the previous
-    visit.
+    """Draw the bars of both sides, left filled, right outlined, with a tick at the previous visit.
 
-    Solid line: median of healthy subjects; dashed: 95th percentile. Bars are clipped at BARS_DEG.
-    `height` in px.
+    Solid line: median of healthy subjects; dashed: 95th percentile. Bars are clipped at BARS_DEG. `height` in
+    px.
     """
 
     def x(value: float) -> str:
@@ -208,8 +205,8 @@ def _text(score: Score) -> str:
 
 
 def _bar(marks: dict[Side, float], healthy: tuple[float, float, float] | None) -> str:
-    """Healthy subjects to the 75th (dark) and 95th percentile (light), median as a line; left disc, right
-    ring.
+    """Bar to the 75th (dark) and 95th percentile (light) of healthy subjects with median, left and right
+    marks.
     """
     median, p75, p95 = healthy or (None, None, None)
     boxes = [(0.0, end) for end in (p95, p75) if end is not None]

@@ -72,10 +72,9 @@ class QualityBox:
 def quality_box(bundle: Bundle) -> QualityBox:
     """Assess the data quality of a finished analysis.
 
-    Bad if the analysis stopped, no stride is included, the signals are poor or the estimator reports
-    its result as unreliable; warn if the signals are only usable, the estimator reports doubts, any
-    stage has a warning or no day of daily life is complete; otherwise ok. Informational notices have no
-    effect.
+    Bad if the analysis stopped, no stride is included, the signals are poor or the estimator reports its
+    result as unreliable; warn if the signals are only usable, the estimator reports doubts, any stage has a
+    warning or no day of daily life is complete; otherwise ok. Informational notices have no effect.
     """
     kind, word = data_verdict(
         bundle.quality, bundle.estimator, {n.severity for n in bundle.warnings}, bundle.parameters
@@ -101,8 +100,8 @@ def quality_box(bundle: Bundle) -> QualityBox:
 def explain_verdict(kind: str, bundle: Bundle) -> tuple[str, int]:
     """Reason why the data are not good, and the number of further warnings.
 
-    Errors that stopped the analysis come first, then contradictory sensors, a failed sensor, and the
-    first of the other warnings.
+    Errors that stopped the analysis come first, then contradictory sensors, a failed sensor, and the first of
+    the other warnings.
     """
     if kind == "ok":
         return "", 0

@@ -242,8 +242,8 @@ class SensitivityLeg:
 
     Parameters
     ----------
-    parts : title of each table and its columns. groups : title and lines. average : last line, None where
-        quantities are no quotients. errors : RMS errors against the reference in words, empty without one.
+    parts : title of each table and its columns. groups : title and lines. average : last line, None for
+        quantities that are not ratios. errors : RMS errors against the reference in words, empty without one.
     """
 
     side: str

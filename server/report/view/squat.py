@@ -81,9 +81,9 @@ class SquatView:
 
     Parameters
     ----------
-    sides : legs that squatted. rows : in order of time. used : leg → squats that count.
-    lifted : leg → bends of its knee with the foot off the floor, which are no squats of it.
-    charts : titles and drawings, empty without a squat that counts. means_deg : variable → leg → (101,).
+    sides : legs with squats. rows : in order of time. used : leg → number of included squats.
+    lifted : leg → number of knee bends with the foot off the floor, which are not squats.
+    charts : titles and drawings, empty without included squats. means_deg : variable → leg → (101,).
     spans : of all rows.
     """
 

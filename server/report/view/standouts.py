@@ -41,8 +41,7 @@ AT_SPEED: Final = "people at this speed"
 def find_standouts(
     rows: Sequence[ParameterRow], norms: Norms, flags: Sequence[Flag] = ()
 ) -> tuple[tuple[HeadlineSentence, ...], int]:
-    """Parameters that deviate from the norm, a limit or the other side, largest first, and the number
-    considered.
+    """Findings against norm, limits or the other side, largest first, and the number considered.
 
     Parameters
     ----------
@@ -129,8 +128,7 @@ def _people(row: ParameterRow, family: Family) -> str:
 def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence | None:
     """Comparison of the sides, naming the one further from its norm.
 
-    None if the larger side is uncertain given strides and measurement error, or if both are within the
-    norm.
+    None if the larger side is uncertain given strides and measurement error, or if both are within the norm.
     """
     s = row.symmetry
     if s is None or not s.clear or s.low is None or s.high is None or not (p.smaller or p.larger):
@@ -160,8 +158,8 @@ def _has_norm(row: ParameterRow) -> bool:
 def _side_off_norm(row: ParameterRow) -> Side | None:
     """The side further from the norm; None if both are within it, as their row indicates.
 
-    The uncertainty of an absolute value is mostly common to both sides (the definition of a contact);
-    whether the sides differ is determined by the confidence interval of their difference.
+    The uncertainty of an absolute value is mostly common to both sides (the definition of a contact); whether
+    the sides differ is determined by the confidence interval of their difference.
     """
     z = {side: c.z for side in SIDES if (c := _cell(row, side)) is not None and c.z is not None}
     furthest = max(z, key=lambda side: abs(z[side]))

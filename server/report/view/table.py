@@ -86,9 +86,8 @@ class ParameterRow:
         otherwise None.
     reason : replaces all numbers, None if there are any. side_reason : for the only side without one.
     whole : applies to the trial, not to its sides.
-    low_confidence : angle estimated by a model, without a norm. low_side : the only side concerned, empty
-        if all
-        sides with a value are.
+    low_confidence : angle estimated by a model, without a norm. low_side : the only side concerned, empty if
+        all sides with a value are.
     symmetry : left against right in numbers, None unless both sides have enough strides.
     change : since the previous visit, for every side with one; empty without such a visit.
     """

@@ -42,8 +42,7 @@ class ChangeWords:
     Parameters
     ----------
     size : "+0.22" or "0.00" in the unit of the parameter. mark : "up" or "down" if larger than the
-        measurement
-        error, "" if within it, "none" if not assessable.
+        measurement error, "" if within it, "none" if not assessable.
     verdict : in words. limits : underlying limits with their sources, in sentences.
     about : the changed quantity if it differs from the displayed value, otherwise "".
     """

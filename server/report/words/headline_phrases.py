@@ -1,8 +1,7 @@
 """Sentences of the headline: parameters, families and phrases.
 
-A pattern has one bold part, between asterisks: the number and its meaning. `{side}` and `{other}` are the
-leg concerned and the opposite one, `{d}` the difference, `{v}` the value of one side, `{l}` and `{r}`
-those of
+A pattern has one bold part, between asterisks: the number and its meaning. `{side}` and `{other}` are the leg
+concerned and the opposite one, `{d}` the difference, `{v}` the value of one side, `{l}` and `{r}` those of
 both, `{a}` and `{b}` the norm's mean − 1 SD and + 1 SD.
 """
 
@@ -29,12 +28,10 @@ class Phrases:
     ----------
     family : group from which one parameter is reported.
     least : smallest reported difference of the sides, in the parameter's unit; our choice.
-    apart : upper limit of the difference in healthy subjects, as a fraction of the mean; 0 if the norm
-        covers it or
-        it is unknown.
-    smaller, larger : for different sides, naming that with the smaller or larger value. The side further
-        from the
-        norm is named.
+    apart : upper limit of the difference in healthy subjects, as a fraction of the mean; 0 if the norm covers
+        it or it is unknown.
+    smaller, larger : for different sides, naming that with the smaller or larger value. The side further from
+        the norm is named.
     names_larger : without a norm, name the side with the larger value, otherwise the smaller.
     both_low, both_high : both sides, or the whole trial, outside the norm.
     side_low, side_high : one side outside the norm.

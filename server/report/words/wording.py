@@ -22,7 +22,7 @@ class Variable:
     Parameters
     ----------
     label : title of its chart. y_range, ticks : degrees, the same in all sessions.
-    up, down : words at the two ends of the axis.
+    up, down : labels of the two ends of the axis.
     """
 
     name: str

@@ -1,8 +1,8 @@
 """Blobs in an S3-compatible bucket: objects `<prefix>/blobs/<space>/<sha256>`.
 
 A file is received into the local folder `incoming` and uploaded from there; it is acknowledged when the
-bucket has confirmed it. Any failure to reach the bucket raises StoreAway within seconds, so that files
-are not mistaken for missing. One prefix belongs to one clinic.
+bucket has confirmed it. Any failure to reach the bucket raises StoreAway within seconds, so that files are
+not mistaken for missing. One prefix belongs to one clinic.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class BucketBlobs(BlobStore):
     Parameters
     ----------
     url : s3://name/prefix. incoming : local folder in which files are received.
-    note : called when the bucket has taken a file, before that is acknowledged.
+    note : called when the bucket has stored a file, before it is acknowledged.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Moves stored files from the folder to a bucket, while servers and workers are stopped; resumable.
 
-Every file, including the trash, is uploaded, read back, verified by hash, and only then removed
-locally. The start of the move is recorded first: until it is complete, no server starts and no command
-mistakes files for missing.
+Every file, including the trash, is uploaded, read back, verified by hash, and only then removed locally. The
+start of the move is recorded first: until it is complete, no server starts and no command mistakes files for
+missing.
 """
 
 from __future__ import annotations

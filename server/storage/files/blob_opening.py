@@ -1,8 +1,8 @@
 """Opens the configured blob store, either kind.
 
-The data folder records the bucket of its files, so that a command with a missing or wrong setting is
-refused instead of finding all files missing. It is recorded once that bucket has granted access to a
-server or stored a file, so that a mistyped name has no effect.
+The data folder records the bucket of its files, so that a command with a missing or wrong setting is refused
+instead of finding all files missing. It is recorded once that bucket has granted access to a server or stored
+a file, so that a mistyped name has no effect.
 """
 
 from __future__ import annotations

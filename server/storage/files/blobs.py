@@ -84,8 +84,8 @@ class BlobStore(ABC):
 
     Parameters
     ----------
-    incoming : local folder of files on their way in; made if absent. trash : what nothing refers to any more.
-    place : where they are, for people.
+    incoming : local folder of files being received; created if absent. trash : unreferenced files.
+    place : description of the location for users.
     """
 
     moved_at_once: ClassVar[int]
@@ -244,7 +244,7 @@ class Receiver(ABC):
         self._file = fs.IncomingFile(incoming, limit)
 
     def write(self, data: bytes) -> None:
-        """Append bytes; raises fs.SizeLimitError beyond the limit."""
+        """Append bytes; raises fs.SizeLimitError if the limit is exceeded."""
         self._file.write(data)
 
     @abstractmethod

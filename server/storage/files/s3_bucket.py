@@ -44,7 +44,7 @@ class S3Bucket:
 
     Parameters
     ----------
-    silence_s : longest wait for a word of the store. retries : how often a request is tried again.
+    silence_s : timeout for a response of the store. retries : number of retries of a request.
 
     Raises
     ------

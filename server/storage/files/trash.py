@@ -1,9 +1,8 @@
 """Unreferenced stored files: `trash/<when>/<space>/<sha256>`, retained for 30 days.
 
-A folder `<when>` (UTC, 20260314T031500Z) has the layout of `blobs/`, so files can be restored manually.
-The content is determined by names alone. In a folder each file is moved by one rename, so a crash
-leaves it in either place, and `trash/list.txt` lists the files for users. In a bucket a file is copied,
-then removed.
+A folder `<when>` (UTC, 20260314T031500Z) has the layout of `blobs/`, so files can be restored manually. The
+content is determined by names alone. In a folder each file is moved by one rename, so a crash leaves it in
+either place, and `trash/list.txt` lists the files for users. In a bucket a file is copied, then removed.
 """
 
 from __future__ import annotations
@@ -130,7 +129,7 @@ class FolderTrash(Trash):
 
     Parameters
     ----------
-    blobs : the folder that files come from, on the same file system.
+    blobs : folder of the stored files, on the same file system.
     """
 
     def __init__(self, root: Path, blobs: Path) -> None:

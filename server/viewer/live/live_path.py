@@ -22,8 +22,8 @@ Sample = tuple[float, float, float, float]
 class LivePath:
     """Position and heading over the last two windows of about one stride.
 
-    The mean over a window removes the sway but lags by half a window; the change from the previous
-    window compensates this lag, so that steady walking is followed exactly.
+    The mean over a window removes the sway but lags by half a window; the change from the previous window
+    compensates this lag, so that steady walking is followed exactly.
     """
 
     def __init__(self) -> None:

@@ -44,8 +44,8 @@ class LiveReference:
 
     Parameters
     ----------
-    norm : speed → variable → (n,) rad over the cycle, empty where no norm fits the person.
-    trained : the side that is prescribed for, if one is; then the other one is the better.
+    norm : speed → variable → (n,) rad over the cycle, empty if no norm applies.
+    trained : side of the prescription, if any; the other one is then the better side.
     """
 
     def __init__(self, body: BodyModel, norm: NormAt, trained: Callable[[], Side | None]) -> None:

@@ -1,8 +1,8 @@
 """Floor marks of a replay up to a given time: footprints and trails of the feet.
 
-A trail is divided into chunks that are sent once and then only made visible; at any time only the
-incomplete chunk is sent, so that the cost of a frame does not grow with the length of the trial. In
-close-up only the last strides are shown, since many passes through a corridor would overlap.
+A trail is divided into chunks that are sent once and then only made visible; at any time only the incomplete
+chunk is sent, so that the cost of a frame does not grow with the length of the trial. In close-up only the
+last strides are shown, since many passes through a corridor would overlap.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class ReplayFloor:
 
     Parameters
     ----------
-    parent : name of the scene node that carries the room.
+    parent : name of the scene node of the room.
     """
 
     def __init__(self, scene: viser.SceneApi, parent: str, motion: ReplayMotion) -> None:
