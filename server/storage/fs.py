@@ -200,7 +200,7 @@ def write_file(path: Path, content: bytes) -> None:
 
 
 def open_scratch(folder: Path) -> BinaryIO:
-    """Open an anonymous temporary file; it disappears when it or its process is closed."""
+    """Open an anonymous temporary file, which disappears when it is closed or its process ends."""
     return cast("BinaryIO", tempfile.TemporaryFile(dir=folder))
 
 

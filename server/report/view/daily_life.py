@@ -316,7 +316,7 @@ def _describe_event(found: ActivityResult, e: PosturalTransition | TransitionCan
 
 
 def _describe_leans(found: ActivityResult) -> tuple[LeanRow, ...]:
-    """Median and central 90 % of inclination per activity, except lying, when forward may be undefined."""
+    """Median and central 90 % of inclination per activity; lying is excluded."""
     values, kinds = found.inclination_deg, label_seconds(found)
     rows = []
     for i, kind in enumerate(KINDS):
