@@ -129,7 +129,7 @@ def read_repetitions(data: bytes) -> tuple[StoredRepetition, ...]:
 
 def read_warnings(data: Mapping[str, Any]) -> tuple[Notice, ...]:
     """Notices of analysis.json about the take; of files that hold nothing for it the upload page has told."""
-    return keep_told(Notice(**row) for row in data["warnings"])
+    return keep_told(Notice.from_json(row) for row in data["warnings"])
 
 
 def keep_told(notices: Iterable[Notice]) -> tuple[Notice, ...]:
