@@ -1,4 +1,4 @@
-"""Words for the same while samples come: nothing is repaired yet, the analysis of the take does that."""
+"""Messages of the streaming consistency checks: nothing is corrected until the recording is analysed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CLOCK_AGREES: Final = "The clock of {sensors} agrees with the others now."
 
 
 def tell_lag_now(lag: SensorLag, params: LagParams, t_s: float) -> Notice:
-    """Say whose clock is late."""
+    """Notice about a late clock."""
     if not lag.sure:
         todo = "One joint alone shows it. Synchronise the sensors and record again."
         return Notice(
@@ -45,7 +45,7 @@ def tell_lag_now(lag: SensorLag, params: LagParams, t_s: float) -> Notice:
 
 
 def tell_exchange_now(exchange: SensorExchange, t_s: float) -> Notice:
-    """Say which sensors were put on each other's segments."""
+    """Notice about swapped sensors."""
     return Notice(
         "sensors_exchanged",
         Message(
@@ -59,7 +59,7 @@ def tell_exchange_now(exchange: SensorExchange, t_s: float) -> Notice:
 
 
 def tell_slip_now(slip: SensorSlip) -> Notice:
-    """Say which sensor slipped, when and how far."""
+    """Notice about a slipped sensor, with time and angle."""
     return Notice(
         "sensor_slipped",
         Message(
@@ -72,6 +72,6 @@ def tell_slip_now(slip: SensorSlip) -> Notice:
 
 
 def take_back(told: Notice, sensors: tuple[str, ...], t_s: float) -> Notice:
-    """Say that what was told holds no more."""
+    """Notice that an earlier notice no longer holds."""
     what = RESOLVED.get(told.code, CLOCK_AGREES)
     return Notice(AGAIN, Message(what, sensors=list_sensors(sensors)), told.sensor, t_s, "info")
