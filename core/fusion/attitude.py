@@ -22,6 +22,7 @@ import numpy as np
 
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import Bools, Floats
+from sagittal.core.message import Message
 from sagittal.core.rotation import compiled, find_middle
 from sagittal.core.signals.held_samples import SampleSeries, cut_blocks
 
@@ -43,7 +44,9 @@ class AttitudeParams:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.kp <= 10.0:
-            raise ParameterError("gain_out_of_range", f"kp = {self.kp:g} 1/s is outside 0 to 10.")
+            raise ParameterError(
+                "gain_out_of_range", Message("kp = {kp:g} 1/s is outside 0 to 10.", kp=self.kp)
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import about, multiply, yaw
 from sagittal.core.signals.calibrated import Calibration
 from sagittal.core.signals.held_samples import cut_blocks
@@ -94,10 +95,13 @@ def remove_relative_drift(
     if largest and max(largest.values()) > params.tell:
         # two sensors turn apart by the same angle: the first is told of, whatever the last digits are
         worst = max(largest, key=lambda s: round(largest[s], ALIKE_DIGITS))
-        message = (
-            f"The heading of {worst} drifted by up to {degrees(largest[worst]):.0f}° against the reference "
-            "and was brought back to its mean over straight walking. Slow changes of rotation posture during "
-            "the take are taken out with it: read transverse angles as changes within a stride."
+        message = Message(
+            "The heading of {worst} drifted by up to {degrees:.0f}° against the reference and "
+            "was brought back to its mean over straight walking. Slow changes of rotation "
+            "posture during the take are taken out with it: read transverse angles as changes "
+            "within a stride.",
+            worst=worst,
+            degrees=degrees(largest[worst]),
         )
         notices.append(Notice("heading_rereferenced", message, sensor=worst, severity="info"))
     return corrected, largest, notices

@@ -11,6 +11,7 @@ import numpy as np
 
 from sagittal.core.errors import Notice
 from sagittal.core.frames import GRAVITY, Segment
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.quality.inspection import measure_losses
 from sagittal.core.quality.signals import magnetic_share, measure_stream, saturation
@@ -261,10 +262,13 @@ def _tell_magnetic(segment: Segment, magnetic: float | None, params: QualityPara
     return [
         Notice(
             "magnetic_disturbed",
-            f"The magnetic field at {segment} is off its value at rest in {100 * magnetic:.0f} % of "
-            "the samples "
-            f"(limit {100 * params.magnetic_share:.0f} %). The magnetometer is not used for joint "
-            "angles.",
+            Message(
+                "The magnetic field at {segment} is off its value at rest in {magnetic:.0f} % of the "
+                "samples (limit {magnetic_share:.0f} %). The magnetometer is not used for joint angles.",
+                segment=segment,
+                magnetic=100 * magnetic,
+                magnetic_share=100 * params.magnetic_share,
+            ),
             segment,
             severity="info",
         ),
@@ -285,11 +289,17 @@ def _gap_notice(
     return [
         Notice(
             "gap",
-            f"{segment} has no data in {len(holes)} {plural(len(holes), 'stretch', 'stretches')} of "
-            f"{GAP_S:g} s and more, {100 * invalid:.1f} % of the take; the longest is "
-            f"{(end - start) / uniform.rate_hz:.2f} s. Angles there are "
-            "missing and strides that touch them are left out; heading is relearnt from the straight walking "
-            "after.",
+            Message(
+                f"{{segment}} has no data in {{holes}} {plural(len(holes), 'stretch', 'stretches')} of "
+                "{GAP_S:g} s and more, {invalid:.1f} % of the take; the longest is {value:.2f} s. Angles "
+                "there are missing and strides that touch them are left out; heading is relearnt "
+                "from the straight walking after.",
+                segment=segment,
+                holes=len(holes),
+                GAP_S=GAP_S,
+                invalid=100 * invalid,
+                value=(end - start) / uniform.rate_hz,
+            ),
             segment,
             start / uniform.rate_hz,
             severity="warning" if invalid > params.invalid_usable else "info",
@@ -305,8 +315,17 @@ def _saturated(
     return [
         Notice(
             "saturated",
-            f"The {what} of {segment} stays at {top:.1f} {unit} in {100 * share:.2f} % of the samples (limit "
-            f"{100 * params.saturated:.1f} %): its range is too small for this movement. Set a wider range.",
+            Message(
+                "The {what} of {segment} stays at {top:.1f} {unit} in {share:.2f} % of the samples "
+                "(limit {saturated:.1f} %): its range is too small for this movement. Set a wider "
+                "range.",
+                what=what,
+                segment=segment,
+                top=top,
+                unit=unit,
+                share=100 * share,
+                saturated=100 * params.saturated,
+            ),
             segment,
             severity="warning" if share > params.saturated else "info",
         )
@@ -329,10 +348,18 @@ def _copies(recording: Recording) -> list[Notice]:
         found.append(
             Notice(
                 "duplicate_stream",
-                f"Sensors “{ids}” hold identical samples (a copy under another id); none of them is analysed."
+                Message(
+                    "Sensors “{ids}” hold identical samples (a copy under another id); none of them is "
+                    "analysed.",
+                    ids=ids,
+                )
                 if device_id is None
-                else f"Sensors “{ids}” hold identical samples (a copy under another id); only "
-                f"“{device_id}” is analysed.",
+                else Message(
+                    "Sensors “{ids}” hold identical samples (a copy under another id); only “{device_id}” "
+                    "is analysed.",
+                    ids=ids,
+                    device_id=device_id,
+                ),
                 used[0] if used else group[0],
                 severity="info",
             )
@@ -348,9 +375,21 @@ def _level(
     usable = [n.message for n in notices if n.severity == "warning"]
     for s in sensors.values():
         if s.invalid_pct > 100 * params.invalid_poor:
-            poor.append(f"{s.segment} has no data in {s.invalid_pct:.0f} % of the take.")
+            poor.append(
+                Message(
+                    "{segment} has no data in {invalid_pct:.0f} % of the take.",
+                    segment=s.segment,
+                    invalid_pct=s.invalid_pct,
+                )
+            )
         if s.interpolated_pct > 100 * params.interpolated:
-            usable.append(f"{s.interpolated_pct:.1f} % of the samples of {s.segment} are interpolated.")
+            usable.append(
+                Message(
+                    "{interpolated_pct:.1f} % of the samples of {segment} are interpolated.",
+                    interpolated_pct=s.interpolated_pct,
+                    segment=s.segment,
+                )
+            )
     level: Level = "poor" if poor else "usable" if usable else "good"
     return level, tuple(dict.fromkeys([*poor, *usable]))
 

@@ -10,6 +10,7 @@ import numpy as np
 from sagittal.core.errors import Notice
 from sagittal.core.formats.aliases import segment_in
 from sagittal.core.frames import Segment
+from sagittal.core.message import Message
 from sagittal.core.quality.signals import measure_signal, measure_stream
 from sagittal.core.quality.suggestion import Suggestion, suggest
 from sagittal.core.quality.suspicion import list_suspicions
@@ -176,8 +177,12 @@ def _long_device(s: LongStream, *, declared: bool, segment: Segment | None) -> D
             *s.notices,
             Notice(
                 "read_in_blocks",
-                f"Sensor {s.device_id} recorded {s.duration_s / 3600:.0f} h: it serves the protocol daily "
-                "life. Its figures here are of the first ten minutes.",
+                Message(
+                    "Sensor {device_id} recorded {duration_s:.0f} h: it serves the protocol daily life. "
+                    "Its figures here are of the first ten minutes.",
+                    device_id=s.device_id,
+                    duration_s=s.duration_s / 3600,
+                ),
                 s.device_id,
                 severity="info",
             ),
@@ -200,8 +205,12 @@ def _device(
         notices.append(
             Notice(
                 "duplicate_stream",
-                f"Sensor {s.device_id} holds the same samples as {duplicate_of}: a copy under another id. "
-                "Only the one that is assigned to a segment is analysed.",
+                Message(
+                    "Sensor {device_id} holds the same samples as {duplicate_of}: a copy under another "
+                    "id. Only the one that is assigned to a segment is analysed.",
+                    device_id=s.device_id,
+                    duplicate_of=duplicate_of,
+                ),
                 s.device_id,
             )
         )

@@ -16,6 +16,7 @@ import numpy as np
 
 from sagittal.core.errors import Notice
 from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.quality.signals import RANGES
 from sagittal.core.quality.stuck_kernel import (
     CHANNELS,
@@ -112,7 +113,7 @@ class StuckWatch:
         """Say what is wrong with a sensor and since when."""
         code, words = TOLD[kind]
         which = channel_words(np.flatnonzero(self._state.channels[sensor]).tolist())
-        return Notice(code, words.format(segment=segment, which=which, first=first_s), segment, first_s)
+        return Notice(code, Message(words, segment=segment, which=which, first=first_s), segment, first_s)
 
 
 def _new_state(n: int, packet: int) -> StuckState:

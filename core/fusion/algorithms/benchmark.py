@@ -20,6 +20,7 @@ from sagittal.core.frames import Bools, Floats
 from sagittal.core.fusion.algorithms.filter import FusionFilter, RestMeans
 from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
 from sagittal.core.fusion.self_calibrating import SelfCalibratingFilter
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, multiply, split_heading
 
 REST_S: Final = 1.0
@@ -97,17 +98,30 @@ def read_trial(name: str, content: bytes) -> ReferenceTrial:
     except _UNREADABLE as error:
         raise FormatError(
             "not_a_trial",
-            f"{name} does not hold imu_gyr, imu_acc, imu_mag, opt_quat, movement, sampling_rate.",
+            Message(
+                "{name} does not hold imu_gyr, imu_acc, imu_mag, opt_quat, movement, sampling_rate.",
+                name=name,
+            ),
         ) from error
     if wrong := [key for key, array in found.items() if array.dtype.kind not in "fiub"]:
-        raise FormatError("not_a_trial", f"{name}: {', '.join(wrong)} are no numbers.")
+        raise FormatError(
+            "not_a_trial", Message("{name}: {wrong} are no numbers.", name=name, wrong=", ".join(wrong))
+        )
     n = found["movement"].size
     if not n or found["movement"].shape != (n,) or any(found[k].shape != (n, d) for k, d in _SHAPES.items()):
-        raise FormatError("not_a_trial", f"{name}: arrays of different lengths, or without samples.")
+        raise FormatError(
+            "not_a_trial", Message("{name}: arrays of different lengths, or without samples.", name=name)
+        )
     rate = found["sampling_rate"]
     if rate.size != 1 or not _RATES[0] <= rate.item() <= _RATES[1]:
         raise FormatError(
-            "not_a_trial", f"{name}: sampling_rate is one number of {_RATES[0]:g} to {_RATES[1]:g} Hz."
+            "not_a_trial",
+            Message(
+                "{name}: sampling_rate is one number of {RATES:g} to {RATES2:g} Hz.",
+                name=name,
+                RATES=_RATES[0],
+                RATES2=_RATES[1],
+            ),
         )
     gyr, acc, mag, reference = (np.array(found[key], np.float64, order="C") for key in _SHAPES)
     norm = np.linalg.norm(reference, axis=1)
@@ -124,7 +138,14 @@ def find_rest(trial: ReferenceTrial, *, with_bias: bool = False) -> RestMeans:
     """
     first = int(np.argmax(trial.moving)) if trial.moving.any() else len(trial.moving)
     if first < REST_S * trial.rate_hz:
-        raise SignalError("no_rest", f"{trial.name} has less than {REST_S:g} s of rest before the movement.")
+        raise SignalError(
+            "no_rest",
+            Message(
+                "{name} has less than {REST_S:g} s of rest before the movement.",
+                name=trial.name,
+                REST_S=REST_S,
+            ),
+        )
     acc, gyr, mag = (x[:first, None] for x in (trial.acc, trial.gyr, trial.mag))
     rest = RestMeans.over(acc, gyr, mag if trial.has_magnetometer else None)
     return RestMeans(rest.acc, np.zeros((1, 3)), rest.mag) if with_bias else rest

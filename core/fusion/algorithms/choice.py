@@ -8,6 +8,7 @@ from typing import Final
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.fusion.algorithms.listed import ALGORITHMS, BY_NAME
+from sagittal.core.message import Message
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,9 @@ def require_filters(names: Sequence[str]) -> None:
         raise ParameterError("no_filter", "No filter was chosen; choose at least one.")
     unknown = next((name for name in names if name not in LABELS), None)
     if unknown is not None:
-        raise ParameterError("no_such_algorithm", f"There is no filter '{unknown}'; see the list.")
+        raise ParameterError(
+            "no_such_algorithm", Message("There is no filter '{unknown}'; see the list.", unknown=unknown)
+        )
 
 
 def require_tunable(name: str) -> None:
@@ -52,9 +55,10 @@ def require_tunable(name: str) -> None:
     if any(name == own.name for own in OWN):
         raise ParameterError(
             "nothing_to_tune",
-            f"'{name}' calibrates itself, it has no gains to fit; choose a published one.",
+            Message("'{name}' calibrates itself, it has no gains to fit; choose a published one.", name=name),
         )
     if name not in BY_NAME:
         raise ParameterError(
-            "no_such_algorithm", f"There is no filter '{name}' to tune; GET /api/v1/filters lists them."
+            "no_such_algorithm",
+            Message("There is no filter '{name}' to tune; GET /api/v1/filters lists them.", name=name),
         )

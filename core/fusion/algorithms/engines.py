@@ -29,6 +29,7 @@ from sagittal.core.fusion.algorithms.gains import (
     InnovationRules,
 )
 from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, rotate
 
 GAINS_RATE_HZ: Final = 100.0
@@ -101,7 +102,9 @@ def prepare_complementary(kind: str, given: Setting) -> Prepared:
         if name not in shares:
             return values
         if (values > 1.0).any():
-            raise ParameterError("gain_out_of_range", f"Gain {name} is a share of an error: 0 to 1.")
+            raise ParameterError(
+                "gain_out_of_range", Message("Gain {name} is a share of an error: 0 to 1.", name=name)
+            )
         return np.asarray(1.0 - (1.0 - values) ** ratio)
 
     rows = given.rows(complementary.GAINS[kind], convert)

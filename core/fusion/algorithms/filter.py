@@ -13,6 +13,7 @@ from sagittal.core.fusion.algorithms.engines import PREPARE, Prepared, Setting
 from sagittal.core.fusion.algorithms.listed import BY_NAME, Algorithm
 from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
 from sagittal.core.fusion.algorithms.vectors import level
+from sagittal.core.message import Message
 from sagittal.core.rotation import from_matrix, normalise, rotate
 
 UPRIGHT: Final = 0.9
@@ -59,7 +60,10 @@ class RestMeans:
             north = np.array(seed) if self.mag is None else np.ascontiguousarray(self.mag[s], np.float64)
             vertical = np.ascontiguousarray(up, np.float64)
             if not (np.linalg.norm(vertical) > 0.0 and level(vertical, north, R)):
-                raise SignalError("bad_signal", f"Sensor {s} shows no direction at rest; use another rest.")
+                raise SignalError(
+                    "bad_signal",
+                    Message("Sensor {value} shows no direction at rest; use another rest.", value=s),
+                )
             q[s] = from_matrix(R)
             if self.mag is not None:
                 v = rotate(q[s], north)
@@ -105,15 +109,25 @@ class FusionFilter:
         if type(params) is not self.algorithm.gains:
             raise ParameterError(
                 "gain_out_of_range",
-                f"{self.algorithm.label} takes {self.algorithm.gains.__name__}, not {type(params).__name__}.",
+                Message(
+                    "{label} takes {name__}, not {type}.",
+                    label=self.algorithm.label,
+                    name__=self.algorithm.gains.__name__,
+                    type=type(params).__name__,
+                ),
             )
         if not rate_hz > 0.0:
-            raise ParameterError("rate_out_of_range", f"The rate must be above 0, not {rate_hz:g} Hz.")
+            raise ParameterError(
+                "rate_out_of_range", Message("The rate must be above 0, not {rate_hz:g} Hz.", rate_hz=rate_hz)
+            )
         used = rest.mag is not None if magnetometer is None else magnetometer
         if self.algorithm.magnetometer == "needed" and not (used and rest.mag is not None):
             raise EstimationError(
                 "no_magnetometer",
-                f"{self.algorithm.label} needs a magnetometer, and none is given. Choose one that does not.",
+                Message(
+                    "{label} needs a magnetometer, and none is given. Choose one that does not.",
+                    label=self.algorithm.label,
+                ),
             )
         self._uses_mag = used and rest.mag is not None and self.algorithm.magnetometer != "unused"
         self._params, self._rate_hz = params, rate_hz
@@ -146,7 +160,9 @@ class FusionFilter:
         """Start again at orientations q (S, 4) sensor to world, in the frame of the rest's field."""
         q = np.ascontiguousarray(q, np.float64)
         if q.shape != (len(self._rest.acc), 4) or not (np.linalg.norm(q, axis=1) > 0.0).all():
-            raise ParameterError("shape_mismatch", f"Expected orientations ({len(self._rest.acc)}, 4).")
+            raise ParameterError(
+                "shape_mismatch", Message("Expected orientations ({acc}, 4).", acc=len(self._rest.acc))
+            )
         self._prepared = self._prepare(normalise(q))
 
     def step(self, gyr: Floats, acc: Floats, mag: Floats | None = None) -> Floats:
@@ -177,7 +193,7 @@ class FusionFilter:
                 "no_magnetometer", "This filter was started with a magnetometer; give its samples."
             )
         if any(x is not None and np.shape(x) != shape for x in (gyr, acc, mag)):
-            raise ParameterError("shape_mismatch", f"Expected samples of shape {shape}.")
+            raise ParameterError("shape_mismatch", Message("Expected samples of shape {shape}.", shape=shape))
         rate = np.ascontiguousarray(gyr - self._rest.gyr, np.float64)
         force = np.ascontiguousarray(acc / self._acc_norm, np.float64)
         field = np.full(shape, np.nan) if mag is None else mag / self._mag_norm
@@ -188,8 +204,11 @@ class FusionFilter:
         if not np.isfinite(prepared.state[:, :4]).all():
             raise EstimationError(
                 "filter_diverged",
-                f"{self.algorithm.label} has diverged: its covariance is no longer positive definite. "
-                "Raise γ, or reset the filter.",
+                Message(
+                    "{label} has diverged: its covariance is no longer positive definite. Raise γ, or "
+                    "reset the filter.",
+                    label=self.algorithm.label,
+                ),
             )
         return out
 
@@ -203,6 +222,7 @@ def find_algorithm(name: str) -> Algorithm:
     """
     if name not in BY_NAME:
         raise ParameterError(
-            "no_such_algorithm", f"No algorithm '{name}'; `sagittal bench fusion --list` lists them."
+            "no_such_algorithm",
+            Message("No algorithm '{name}'; `sagittal bench fusion --list` lists them.", name=name),
         )
     return BY_NAME[name]

@@ -19,6 +19,7 @@ from sagittal.core.fusion.algorithms.gains import FixedGain, FuzzyGain, Gain, Th
 from sagittal.core.fusion.algorithms.parameters import MAGNETIC, AlgorithmGains
 from sagittal.core.fusion.algorithms.schemes import Scheme
 from sagittal.core.fusion.algorithms.tuning_ranges import DEVIATION, TURNING, TuningRange
+from sagittal.core.message import Message
 
 DIGITS: Final = 4
 """Significant digits of a tuned gain: more would be noise of the data."""
@@ -61,7 +62,10 @@ class GainSpace:
             for variable in _list_variables(name, getattr(params, name), limits)
         )
         if not self._variables:
-            raise ParameterError("nothing_to_tune", f"{type(params).__name__} has no gain that can be tuned.")
+            raise ParameterError(
+                "nothing_to_tune",
+                Message("{type} has no gain that can be tuned.", type=type(params).__name__),
+            )
 
     def __len__(self) -> int:
         return len(self._variables)

@@ -14,6 +14,7 @@ import numpy as np
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Floats
+from sagittal.core.message import Message
 
 LEVELS: Final = slice(0, 3)
 """Where a row has the values of its levels."""
@@ -155,7 +156,10 @@ class InnovationRules:
 
     def __post_init__(self) -> None:
         if not 1 <= self.window <= LONGEST_WINDOW:
-            raise ParameterError("gain_out_of_range", f"The window is 1 to {LONGEST_WINDOW} samples.")
+            raise ParameterError(
+                "gain_out_of_range",
+                Message("The window is 1 to {LONGEST_WINDOW} samples.", LONGEST_WINDOW=LONGEST_WINDOW),
+            )
 
     def row(self) -> Floats:
         """What `infer_gain` reads, (42,)."""

@@ -18,6 +18,7 @@ from sagittal.core.frames import Floats
 from sagittal.core.fusion.algorithms.gain_kernel import choose_level
 from sagittal.core.fusion.algorithms.kalman import take_away, triangularise
 from sagittal.core.fusion.algorithms.vectors import normalise, rate_jacobian, read_sample, to_sensor, turn_by
+from sagittal.core.message import Message
 
 Points = Literal["merwe", "julier95", "spherical_simplex", "menegaz", "cubature"]
 POINTS: Final[tuple[Points, ...]] = ("merwe", "julier95", "spherical_simplex", "menegaz", "cubature")
@@ -52,7 +53,10 @@ def make_points(
     if kind in ("merwe", "julier95"):
         scale = alpha**2 * (n + kappa) if kind == "merwe" else n + kappa
         if not scale > 0.0:
-            raise ParameterError("gain_out_of_range", f"κ = {kappa:g} must be above −{n}, α above 0.")
+            raise ParameterError(
+                "gain_out_of_range",
+                Message("κ = {kappa:g} must be above −{value}, α above 0.", kappa=kappa, value=n),
+            )
         mean = np.full(2 * n + 1, 0.5 / scale)
         mean[0] = 1.0 - n / scale
         spread = mean.copy()
@@ -60,7 +64,10 @@ def make_points(
             spread[0] += 1.0 - alpha**2 + beta
         return np.concatenate((np.zeros((1, n)), sqrt(scale) * star)), mean, spread
     if not 0.0 < weight < 1.0:
-        raise ParameterError("gain_out_of_range", f"Weight {weight:g} of the first point is not in 0 to 1.")
+        raise ParameterError(
+            "gain_out_of_range",
+            Message("Weight {weight:g} of the first point is not in 0 to 1.", weight=weight),
+        )
     if kind == "menegaz":
         share = sqrt((1.0 - weight) / n)
         C = np.linalg.cholesky(np.eye(n) - share**2)
@@ -71,7 +78,7 @@ def make_points(
         # in rows, as the other sets are: of columns the loop would be compiled once more
         return np.ascontiguousarray(np.concatenate((first, (C / np.sqrt(others)).T))), weights, weights
     if kind != "spherical_simplex":
-        raise ParameterError("gain_out_of_range", f"No set of sigma points '{kind}'.")
+        raise ParameterError("gain_out_of_range", Message("No set of sigma points '{kind}'.", kind=kind))
     w1 = (1.0 - weight) / (n + 1)
     X = np.zeros((n + 2, n))
     for j in range(1, n + 1):

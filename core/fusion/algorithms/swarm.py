@@ -15,6 +15,7 @@ import numpy as np
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Floats
+from sagittal.core.message import Message
 
 Cost = Callable[[Floats], Floats]
 """Points (p, d) in the unit box → what is to be small (p,); inf where there is no value."""
@@ -54,7 +55,13 @@ class SwarmRules:
         for name, most in MOST_OF_SWARM.items():
             if getattr(self, name) > most:
                 raise ParameterError(
-                    "swarm_too_large", f"{name} is {getattr(self, name)}; expected at most {most}."
+                    "swarm_too_large",
+                    Message(
+                        "{name} is {self}; expected at most {most}.",
+                        name=name,
+                        self=getattr(self, name),
+                        most=most,
+                    ),
                 )
 
     @property

@@ -25,6 +25,7 @@ from sagittal.core.fusion.algorithms.gain_space import GainSpace, choose_scheme,
 from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
 from sagittal.core.fusion.algorithms.schemes import Scheme
 from sagittal.core.fusion.algorithms.swarm import Swarm, SwarmRules, advance_swarm, read_swarm, write_swarm
+from sagittal.core.message import Message
 
 Keep = Callable[[bytes, float, str], None]
 """(checkpoint, share done 0 to 1, sentence): told after every iteration."""
@@ -47,15 +48,24 @@ class TrialSplit:
         if not self.train or not self.validate:
             raise ParameterError(
                 "no_validation",
-                f"{len(self.train)} trials to fit to and {len(self.validate)} to judge by; at least one of "
-                "each is needed. Gains that are judged on what they were fitted to look too good.",
+                Message(
+                    "{train} trials to fit to and {validate} to judge by; at least one of each is "
+                    "needed. Gains that are judged on what they were fitted to look too good.",
+                    train=len(self.train),
+                    validate=len(self.validate),
+                ),
             )
         seen: dict[str, str] = {}
         for trial in (*self.train, *self.validate):
             for mark in (trial.name, trial.sha256):
                 if mark in seen:
                     raise ParameterError(
-                        "trial_twice", f"{seen[mark]} and {trial.name} are the same recording; leave one out."
+                        "trial_twice",
+                        Message(
+                            "{mark} and {name} are the same recording; leave one out.",
+                            mark=seen[mark],
+                            name=trial.name,
+                        ),
                     )
                 seen[mark] = trial.name
 
@@ -70,7 +80,11 @@ class TrialSplit:
         if unknown := sorted(set(validate) - {t.name for t in trials}):
             raise ParameterError(
                 "no_such_trial",
-                f"No trial {', '.join(unknown)}; there are {', '.join(t.name for t in trials) or 'none'}.",
+                Message(
+                    "No trial {unknown}; there are {join}.",
+                    unknown=", ".join(unknown),
+                    join=", ".join(t.name for t in trials) or "none",
+                ),
             )
         return cls(
             tuple(t for t in trials if t.name not in validate), tuple(t for t in trials if t.name in validate)
@@ -139,9 +153,14 @@ class GainTuner:
         without = [t.name for t in (*split.train, *split.validate) if not t.has_magnetometer]
         uses_mag = found.magnetometer != "unused" and magnetometer is not False and not without
         if not uses_mag and (found.magnetometer == "needed" or (magnetometer and without)):
-            why = f"{', '.join(without)} have none" if without else "it is told to go without"
+            why = (
+                Message("{without} have none", without=", ".join(without))
+                if without
+                else "it is told to go without"
+            )
             raise EstimationError(
-                "no_magnetometer", f"{found.label} is to run with a magnetometer, but {why}."
+                "no_magnetometer",
+                Message("{label} is to run with a magnetometer, but {why}.", label=found.label, why=why),
             )
         params = found.gains() if start is None else start
         self._name, self._split, self._seed, self._version = algorithm, split, seed, code_version
@@ -152,7 +171,8 @@ class GainTuner:
             find_rest(trial)
             if not trial.scored.any():
                 raise SignalError(
-                    "no_reference", f"{trial.name} has no reference while it moves; leave it out."
+                    "no_reference",
+                    Message("{name} has no reference while it moves; leave it out.", name=trial.name),
                 )
         halves = [("train", t) for t in split.train] + [("validate", t) for t in split.validate]
         self._data = {t.name: t.sha256 for _, t in halves}
@@ -205,14 +225,23 @@ class GainTuner:
     def _say(self, swarm: Swarm) -> str:
         number = min((swarm.step - 1) // (self._rules.iterations + 1) + 1, self._rules.rounds)
         best = _say_error(swarm.best[1], 3)
-        return f"Round {number} of {self._rules.rounds}, {best} on the trials it is fitted to."
+        return Message(
+            "Round {number} of {rounds}, {best} on the trials it is fitted to.",
+            number=number,
+            rounds=self._rules.rounds,
+            best=best,
+        )
 
     def _report(self, after: AlgorithmGains, trained: Floats, validated: Floats) -> TuningResult:
         old, new = validated.mean(axis=1)
         improved = bool(new < (1.0 - LEAST_GAIN) * old)
         words = f"{_say_error(old, 2)} before, {_say_error(new, 2)} after, on trials not fitted to"
         worse = [t.name for t, a, b in zip(self._split.validate, *validated, strict=True) if b > a]
-        verdict = f"Better: {words}." if improved else f"Not better: {words}. Keep the gains it began with."
+        verdict = (
+            f"Better: {words}."
+            if improved
+            else Message("Not better: {words}. Keep the gains it began with.", words=words)
+        )
         if improved and worse:
             verdict += f" Worse on {', '.join(worse)}."
         return TuningResult(

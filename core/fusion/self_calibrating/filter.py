@@ -14,6 +14,7 @@ from sagittal.core.fusion.self_calibrating.kernel import count_interval, run_for
 from sagittal.core.fusion.self_calibrating.motion import average_backwards, judge_motion
 from sagittal.core.fusion.self_calibrating.params import SelfCalibratingParams, make_weights
 from sagittal.core.fusion.self_calibrating.start import start_from_first
+from sagittal.core.message import Message
 
 NOTHING: Final = (np.empty((0, 4)), np.empty((0, 6, 0)), np.empty((0, 0)), np.empty((0, 1)))
 
@@ -79,9 +80,15 @@ class SelfCalibratingFilter:
         gyro_matrix: Floats | None = None,
     ) -> None:
         if not 10.0 <= rate_hz <= 5000.0:
-            raise ParameterError("rate_out_of_range", f"The rate must be 10 to 5000 Hz, not {rate_hz:g}.")
+            raise ParameterError(
+                "rate_out_of_range",
+                Message("The rate must be 10 to 5000 Hz, not {rate_hz:g}.", rate_hz=rate_hz),
+            )
         if sensors < 1:
-            raise ParameterError("sensors_out_of_range", f"At least one sensor is needed, not {sensors}.")
+            raise ParameterError(
+                "sensors_out_of_range",
+                Message("At least one sensor is needed, not {sensors}.", sensors=sensors),
+            )
         self.rate_hz, self.uses_magnetometer = rate_hz, magnetometer
         self._weights = make_weights(params or SelfCalibratingParams())
         size = at.WITH_MAG if magnetometer else at.WITHOUT_MAG
@@ -89,7 +96,10 @@ class SelfCalibratingFilter:
         self._x[:, 0] = 1.0
         if gyro_matrix is not None:
             if np.shape(gyro_matrix) != (sensors, 3, 3) or not np.isfinite(gyro_matrix).all():
-                raise ParameterError("shape_mismatch", f"Expected gyroscope matrices ({sensors}, 3, 3).")
+                raise ParameterError(
+                    "shape_mismatch",
+                    Message("Expected gyroscope matrices ({sensors}, 3, 3).", sensors=sensors),
+                )
             self._x[:, 14:23] = np.reshape(gyro_matrix, (sensors, 9))
         self._P = np.zeros((sensors, size, size))
         self._sums = np.zeros((sensors, at.SUMS))
@@ -182,7 +192,14 @@ class SelfCalibratingFilter:
         used = [v for v in (gyr, acc, mag if self.uses_magnetometer else None) if v is not None]
         shapes = {np.shape(v) for v in used}
         if len(shapes) != 1 or len(next(iter(shapes))) != 3 or next(iter(shapes))[1:] != (sensors, 3):
-            raise EstimationError("bad_shape", f"Expected (n, {sensors}, 3) for every signal, got {shapes}.")
+            raise EstimationError(
+                "bad_shape",
+                Message(
+                    "Expected (n, {sensors}, 3) for every signal, got {shapes}.",
+                    sensors=sensors,
+                    shapes=shapes,
+                ),
+            )
         made = [np.ascontiguousarray(np.swapaxes(np.asarray(v, np.float64), 0, 1)) for v in used]
         return made[0], made[1], made[2] if self.uses_magnetometer else np.empty((sensors, 0, 3))
 

@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import GRAVITY
+from sagittal.core.message import Message
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,13 @@ class SelfCalibratingParams:
             least = -0.02 if name == "mag_delay_s" else 0.0
             if not isfinite(value) or value < least or (value == 0.0 and name == "field_length_m"):
                 raise ParameterError(
-                    "parameter_out_of_range", f"{name} = {value:g}; expected a number of {least:g} or more."
+                    "parameter_out_of_range",
+                    Message(
+                        "{name} = {value:g}; expected a number of {least:g} or more.",
+                        name=name,
+                        value=value,
+                        least=least,
+                    ),
                 )
 
 
