@@ -79,16 +79,17 @@ def choose_language(accepted: str | None) -> str:
     >>> choose_language("fr-CH, de-CH;q=0.9, en;q=0.8"), choose_language("de;q=0.2, en")
     ('de', 'en')
     """
-    asked: list[tuple[float, str]] = []
+    preferences: list[tuple[float, str]] = []
     for part in (accepted or "").split(","):
         tag, _, quality = part.strip().partition(";q=")
         try:
             weight = float(quality or 1)
         except ValueError:
             continue
-        asked.append((-weight, tag.split("-")[0].strip().lower()))
+        preferences.append((-weight, tag.split("-")[0].strip().lower()))
     return next(
-        (tag for weight, tag in sorted(asked, key=lambda a: a[0]) if weight and tag in LANGUAGES), SOURCE
+        (tag for weight, tag in sorted(preferences, key=lambda a: a[0]) if weight and tag in LANGUAGES),
+        SOURCE,
     )
 
 
@@ -104,8 +105,10 @@ class Catalogue:
         self.language = language
         self.messages = messages
         self._locale = Locale.parse(language)
-        self._folded = {text.casefold(): said for text, said in messages.items()}
-        self._patterns = [_Pattern(text, said) for text, said in messages.items() if PLACEHOLDER.search(text)]
+        self._folded = {text.casefold(): translation for text, translation in messages.items()}
+        self._patterns = [
+            _Pattern(text, translation) for text, translation in messages.items() if PLACEHOLDER.search(text)
+        ]
         # of two that fit, the one with more words of its own
         self._patterns.sort(key=lambda p: -p.literal)
         self._own_quotations = {quoted for text in messages for quoted in QUOTED.findall(text)}
@@ -118,60 +121,60 @@ class Catalogue:
     def find(self, text: str) -> str | None:
         """Translation of a text; None if no part of it matches a message."""
         masked, quotations = self._mask(text)
-        known = self._known(masked)
-        said = self._loosely(masked.strip()) if known is None else known
-        return None if said is None else self._unmask(said, quotations)
+        exact = self._known(masked)
+        translation = self._loosely(masked.strip()) if exact is None else exact
+        return None if translation is None else self._unmask(translation, quotations)
 
     def _mask(self, text: str) -> tuple[str, list[str]]:
         """Replace each quotation by a character that occurs in no message or number."""
         quotations: list[str] = []
 
-        def mask(found: re.Match[str]) -> str:
-            if found[1] in self._own_quotations or len(quotations) == MOST_MASKS:
-                return found[0]
-            quotations.append(found[1])
+        def mask(match: re.Match[str]) -> str:
+            if match[1] in self._own_quotations or len(quotations) == MOST_MASKS:
+                return match[0]
+            quotations.append(match[1])
             return f"“{chr(FIRST_MASK + len(quotations) - 1)}”"
 
         return QUOTED.sub(mask, text), quotations
 
-    def _unmask(self, said: str, quotations: Sequence[str]) -> str:
+    def _unmask(self, text: str, quotations: Sequence[str]) -> str:
         marks = QUOTATION_MARKS.get(self.language, "“{}”")
         opening, closing = marks.split("{}")
-        said = said.replace("”, “", f"{closing}, {opening}")  # a list of them in one placeholder
+        text = text.replace("”, “", f"{closing}, {opening}")  # a list of them in one placeholder
         for i, quoted in enumerate(quotations):
             mask = chr(FIRST_MASK + i)
-            said = said.replace(f"“{mask}”", marks.format(mask)).replace(mask, quoted)
-        return said
+            text = text.replace(f"“{mask}”", marks.format(mask)).replace(mask, quoted)
+        return text
 
     def translate(self, text: str) -> str:
         """Translation of a text, English if it matches no message."""
-        known = self.find(text)
-        return text if known is None else known
+        translation = self.find(text)
+        return text if translation is None else translation
 
     def _loosely(self, text: str) -> str | None:
         """Translate a sentence with foreign text in it, or several sentences of which some are known."""
-        made = self._by_pattern(text, strong=True, loose=True) if len(text) <= LONGEST else None
-        made = made or self._by_sentences(_SENTENCE.split(text), partly=True)
-        return text if made is None and CITED.search(text) else made
+        translation = self._by_pattern(text, strong=True, loose=True) if len(text) <= LONGEST else None
+        translation = translation or self._by_sentences(_SENTENCE.split(text), partly=True)
+        return text if translation is None and CITED.search(text) else translation
 
     def _find(self, text: str) -> str | None:
         inner = text.strip()
         if not inner:
             return text
-        said = (
+        translation = (
             self._exact(inner)
             or self._plain(inner)
             or (self._made(inner) if len(inner) <= LONGEST else None)
             or self._by_sentences(_SENTENCE.split(inner), partly=False)
         )
-        return None if said is None else text.replace(inner, said, 1)
+        return None if translation is None else text.replace(inner, translation, 1)
 
     def _exact(self, text: str) -> str | None:
-        said = self.messages.get(text)
-        if said is None:
+        translation = self.messages.get(text)
+        if translation is None:
             folded = self._folded.get(text.casefold())
-            said = None if folded is None else _with_case(text, folded)
-        return said
+            translation = None if folded is None else _with_case(text, folded)
+        return translation
 
     def _made(self, text: str) -> str | None:
         return (
@@ -186,21 +189,21 @@ class Catalogue:
         """Translate a message followed by a full stop added by a page."""
         if text[-1] not in ".:;" or len(text) < 2:
             return None
-        before = self._known(text[:-1])
-        return None if before is None else before + text[-1]
+        sentence = self._known(text[:-1])
+        return None if sentence is None else sentence + text[-1]
 
     def _plain(self, text: str) -> str | None:
         """Format a date, a number, or a name in capitals."""
         date = _DATE.fullmatch(text)
         if date:
             return self._date(date)
-        found = _MEASURED.fullmatch(text)
-        if found and found[3] in self.messages:
-            return f"{self._localise(found[1])}{found[2]}{self.messages[found[3]]}"
+        match = _MEASURED.fullmatch(text)
+        if match and match[3] in self.messages:
+            return f"{self._localise(match[1])}{match[2]}{self.messages[match[3]]}"
         if not re.search(r"[a-zäöüß]", re.sub(r"(?<![^\W\d_])[^\W\d_](?![^\W\d_])", "", text)):
             # numbers, single letters, names of capitals
-            said = self._by_pattern(text, strong=False) if re.search(r"[^\W\d_]", text) else None
-            return self._localise(text) if said is None else said
+            translation = self._by_pattern(text, strong=False) if re.search(r"[^\W\d_]", text) else None
+            return self._localise(text) if translation is None else translation
         return None
 
     def _measured(self, text: str) -> str | None:
@@ -208,16 +211,16 @@ class Catalogue:
         numbered = _NUMBERED.fullmatch(text)
         if numbered and (word := self._known(numbered[1])) is not None:
             return word + self._localise(numbered[2])
-        found = _MEASURED.fullmatch(text)
-        if not found:
+        match = _MEASURED.fullmatch(text)
+        if not match:
             return None
-        unit = self._exact(found[3]) or self._by_pattern(found[3], strong=False)
-        if unit is None and re.fullmatch(r"\S{1,7}", found[3]):
-            unit = found[3]  # m/s, kHz, MB
-        return None if unit is None else f"{self._localise(found[1])}{found[2]}{unit}"
+        unit = self._exact(match[3]) or self._by_pattern(match[3], strong=False)
+        if unit is None and re.fullmatch(r"\S{1,7}", match[3]):
+            unit = match[3]  # m/s, kHz, MB
+        return None if unit is None else f"{self._localise(match[1])}{match[2]}{unit}"
 
-    def _date(self, found: re.Match[str]) -> str:
-        day, month, year = found.groups()
+    def _date(self, match: re.Match[str]) -> str:
+        day, month, year = match.groups()
         value = dt.date(int(year or 2000), MONTHS.index(month) + 1, int(day))
         return self.day(value) if year else str(format_date(value, "d. MMM", locale=self._locale))
 
@@ -234,18 +237,18 @@ class Catalogue:
 
     def _fill_pattern(self, pattern: _Pattern, values: Mapping[str, str]) -> str:
         """Fill a message with untranslated values; numbers are localised, except in user text."""
-        said: dict[str, str] = {}
+        replacements: dict[str, str] = {}
         settled: dict[str, str] = {}
         for n, (name, value) in enumerate(values.items()):
-            known = value if name in pattern.verbatim else self._known(value)
-            if known is not None and (name in pattern.verbatim or re.search(r"[^\W\d_]", known)):
+            translation = value if name in pattern.verbatim else self._known(value)
+            if translation is not None and (name in pattern.verbatim or re.search(r"[^\W\d_]", translation)):
                 mask = chr(FIRST_MASK + MOST_MASKS + n)
-                said[name], settled[mask] = mask, known
+                replacements[name], settled[mask] = mask, translation
             else:
                 # a number may stand in two placeholders side by side
-                said[name] = value if known is None else known
-        filled = self._localise(fill_placeholders(pattern.said, said))
-        return re.sub("|".join(settled) or "(?!)", lambda found: settled[found[0]], filled)
+                replacements[name] = value if translation is None else translation
+        filled = self._localise(fill_placeholders(pattern.said, replacements))
+        return re.sub("|".join(settled) or "(?!)", lambda match: settled[match[0]], filled)
 
     def _stands_alone(self, value: str) -> bool:
         """Whether a value is a single word or complete message rather than part of a sentence."""
@@ -260,12 +263,12 @@ class Catalogue:
         for join in _JOINS:
             if text.count(join) >= MOST_PARTS:
                 continue
-            at = text.rfind(join)
-            while at > 0:
-                said = self._join(text[:at], join, text[at + len(join) :])
-                if said is not None:
-                    return said
-                at = text.rfind(join, 0, at)
+            position = text.rfind(join)
+            while position > 0:
+                translation = self._join(text[:position], join, text[position + len(join) :])
+                if translation is not None:
+                    return translation
+                position = text.rfind(join, 0, position)
         return None
 
     def _join(self, first: str, join: str, second: str) -> str | None:
@@ -278,40 +281,42 @@ class Catalogue:
         head = self._known(first)
         if head is None:
             head = self.messages.get(f"{first}{join.rstrip()}")
-            if head is not None and (rest := self._known(second)) is not None:
-                return f"{head} {rest}"
+            if head is not None and (second_part := self._known(second)) is not None:
+                return f"{head} {second_part}"
             return None
         if tail is not None:
             return f"{head}{tail}" if tail[0] in ",;:" else f"{head} {tail}"
-        rest = self._known(second)
-        if rest is None:
+        second_part = self._known(second)
+        if second_part is None:
             return None
         return (
-            f"{head} {self.messages.get('and', 'and')} {rest}" if join == " and " else f"{head}{join}{rest}"
+            f"{head} {self.messages.get('and', 'and')} {second_part}"
+            if join == " and "
+            else f"{head}{join}{second_part}"
         )
 
     def _by_sentences(self, sentences: list[str], *, partly: bool) -> str | None:
         """Translate consecutive sentences, jointly if they form one message; `partly` = allow unknown
         ones.
         """
-        said: list[str] = []
-        found = False
-        while sentences and (len(sentences) > 1 or said):
+        parts: list[str] = []
+        is_translated = False
+        while sentences and (len(sentences) > 1 or parts):
             for n in range(len(sentences), 0, -1):
                 whole = " ".join(sentences[:n])
-                known = self._exact(whole)
-                if known is None and len(whole) <= LONGEST:
-                    known = self._by_pattern(whole, strong=True, loose=partly)
-                if known is None and n == 1:
-                    known = self._known(whole)
-                if known is None and n == 1 and not partly:
+                translation = self._exact(whole)
+                if translation is None and len(whole) <= LONGEST:
+                    translation = self._by_pattern(whole, strong=True, loose=partly)
+                if translation is None and n == 1:
+                    translation = self._known(whole)
+                if translation is None and n == 1 and not partly:
                     return None
-                if known is not None or n == 1:
-                    said.append(whole if known is None else known)
-                    found = found or known is not None
+                if translation is not None or n == 1:
+                    parts.append(whole if translation is None else translation)
+                    is_translated = is_translated or translation is not None
                     sentences = sentences[n:]
                     break
-        return " ".join(said) if found else None
+        return " ".join(parts) if is_translated else None
 
     def _localise(self, text: str) -> str:
         """Localise numbers and dates within a text."""
@@ -331,14 +336,14 @@ def find_verbatim(message: str) -> frozenset[str]:
     """
     quoted = re.findall(r"'\{(\w+)\}'|“\{(\w+)\}”", message)
     names = [name for name in PLACEHOLDER.findall(message) if IDENTIFIERS.fullmatch(name)]
-    return frozenset([*names, *(one or other for one, other in quoted)]) - OWN_WORDS
+    return frozenset([*names, *(one or unquoted for one, unquoted in quoted)]) - OWN_WORDS
 
 
 class _Pattern:
     """Pattern of the sentences formatted from one message."""
 
-    def __init__(self, text: str, said: str) -> None:
-        self.said = said
+    def __init__(self, text: str, translation: str) -> None:
+        self.said = translation
         self.verbatim = find_verbatim(text)
         pieces = PLACEHOLDER.split(text)
         self.names = pieces[1::2]
@@ -349,14 +354,19 @@ class _Pattern:
         if not literals[-1] and literals[-2] and not literals[-2].rstrip().endswith((".", ":")):
             self._stops = False  # what stands last is no sentence
         self._longest = max(literals, key=len).casefold()
-        first, *rest = map(re.escape, literals)
+        first, *literals_rest = map(re.escape, literals)
         # of two values without a word between, the one before is a number and the other its unit
         forms = [
             first
             + "".join(
-                (value if piece or i == len(rest) else before) + piece for i, piece in enumerate(rest, 1)
+                (value if piece or i == len(literals_rest) else value_before) + piece
+                for i, piece in enumerate(literals_rest, 1)
             )
-            for value, before in (("(.+?)", r"([−+-]?\d+(?:\.\d+)?)"), ("(.+?)", "(.+?)"), ("(.+)", "(.+)"))
+            for value, value_before in (
+                ("(.+?)", r"([−+-]?\d+(?:\.\d+)?)"),
+                ("(.+?)", "(.+?)"),
+                ("(.+)", "(.+)"),
+            )
         ]
         self._forms = [re.compile(form, re.DOTALL | re.IGNORECASE) for form in dict.fromkeys(forms)]
 
@@ -364,22 +374,22 @@ class _Pattern:
         """Yield possible values of the placeholders; none if the text does not match."""
         if (text.endswith(".") and not self._stops) or self._longest not in text.casefold():
             return
-        before: tuple[str, ...] = ()
+        previous: tuple[str, ...] = ()
         for form in self._forms:
-            found = form.fullmatch(text)
-            if found is not None and found.groups() != before:
-                before = found.groups()
-                yield dict(zip(self.names, before, strict=True))
+            result = form.fullmatch(text)
+            if result is not None and result.groups() != previous:
+                previous = result.groups()
+                yield dict(zip(self.names, previous, strict=True))
 
 
-def fill_placeholders(said: str, values: Mapping[str, str]) -> str:
+def fill_placeholders(text: str, values: Mapping[str, str]) -> str:
     """Replace `{placeholders}` by their values; those without a value remain."""
-    return PLACEHOLDER.sub(lambda m: values.get(m[1], m[0]), said)
+    return PLACEHOLDER.sub(lambda m: values.get(m[1], m[0]), text)
 
 
-def _with_case(text: str, said: str) -> str:
+def _with_case(text: str, translation: str) -> str:
     """Capitalize if the English text is capitalized; German nouns keep their capitals."""
-    return said[:1].upper() + said[1:] if text[:1].isupper() else said
+    return translation[:1].upper() + translation[1:] if text[:1].isupper() else translation
 
 
 def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:
@@ -432,12 +442,12 @@ SCRIPT_PLACES: Final = (
 @functools.cache
 def script_texts(language: str) -> tuple[str, bytes]:
     """Translations used by scripts as JSON, and their hash for the URL."""
-    said = {
+    texts = {
         text: words
         for text, words, files in read_messages(catalogue_path(language))
         if any(name.startswith(SCRIPT_PLACES) for name in files)
     }
-    content = json.dumps(said, ensure_ascii=False, separators=(",", ":")).encode()
+    content = json.dumps(texts, ensure_ascii=False, separators=(",", ":")).encode()
     return hashlib.sha256(content).hexdigest()[:16], content
 
 
@@ -447,8 +457,8 @@ def load_catalogue(language: str) -> Catalogue:
     return Catalogue(
         language,
         {
-            text: said
-            for text, said, files in read_messages(catalogue_path(language))
+            text: translation
+            for text, translation, files in read_messages(catalogue_path(language))
             # the sentences of scripts are made in the browser
             if not (PLACEHOLDER.search(text) and all(name.startswith(SCRIPTS) for name in files))
         },
