@@ -20,8 +20,8 @@ class NotFound(ServiceError):  # noqa: N818 - the name of the HTTP status
 
     status = 404
 
-    def __init__(self, what: str, identity: str) -> None:
-        super().__init__("not_found", f"There is no {what} '{identity}', or it has been deleted.")
+    def __init__(self, kind: str, identity: str) -> None:
+        super().__init__("not_found", f"There is no {kind} '{identity}', or it has been deleted.")
 
 
 class NotAllowed(ServiceError):  # noqa: N818 - the name of the HTTP status

@@ -38,14 +38,14 @@ def norm_note(
     bands = norms.comfortable_bands if matched else norms.bands
     band = next(iter(bands.values()), None)
     if band is not None and angles:
-        who = GROUPS.get(band.group, band.group)
+        group = GROUPS.get(band.group, band.group)
         sentences.append(
-            f"{'Comfortable' if matched else 'Norm'}: {band.n} {who}, overground at their comfortable "
+            f"{'Comfortable' if matched else 'Norm'}: {band.n} {group}, overground at their comfortable "
             f"1.25 ± 0.16 m/s, mean ± 1 SD ({band.source})."
         )
     if norms.timing_reason is not None and norms.timing_reason != norms.reason:
         sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
-    elif shown := [
+    elif displayed := [
         r
         for r in rows
         if r.norm is not None
@@ -54,7 +54,7 @@ def norm_note(
         and not is_angle(r.name)
         and r.unit != "°"
     ]:
-        sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
+        sentences.append(f"Timing: {norms.values[displayed[0].name].group} ({displayed[0].norm_source}).")
     if any(r.norm_note == FEW_NOTE for r in rows):
         sentences.append(FEW_NOTE)
     if any(r.name == SPEED and r.norm is not None for r in rows):
@@ -67,10 +67,10 @@ def norm_note(
 
 def _matched_note(norms: Norms) -> str:
     """Reference group that was asked to walk at this speed, and its limitations."""
-    at = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
+    speed = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
     return (
-        f"Norm: {ASKED}{at}, overground, mean ± 1 SD ({SOURCE}). They are not people who are slow from habit "
-        "or age."
+        f"Norm: {ASKED}{speed}, overground, mean ± 1 SD ({SOURCE}). They are not people who are slow from "
+        "habit or age."
     )
 
 
@@ -134,8 +134,8 @@ def _interrupted(panels: Sequence[CurvePanel]) -> list[str]:
         for p in panels
         if any(c.mean_deg is not None and np.isnan(c.mean_deg).any() for c in p.sides.values())
     ]
-    why = "interrupted where the leg model's knee rests on its limit in most strides"
-    return [f"{', '.join(broken).capitalize()}: {why}; nothing is measured there."] if broken else []
+    reason = "interrupted where the leg model's knee rests on its limit in most strides"
+    return [f"{', '.join(broken).capitalize()}: {reason}; nothing is measured there."] if broken else []
 
 
 def _norm_notes(panels: Sequence[CurvePanel]) -> list[str]:

@@ -36,13 +36,13 @@ class SensorChecks:
     notes: tuple[str, ...]
 
 
-def sensor_checks(found: Mapping[str, Any] | None) -> SensorChecks | None:
+def sensor_checks(checks: Mapping[str, Any] | None) -> SensorChecks | None:
     """View of `agreement` in analysis.json; None for older versions or a single sensor."""
-    if found is None or len(found["sensors"]) < 2:
+    if checks is None or len(checks["sensors"]) < 2:
         return None
-    rows = tuple(_row(s) for s in found["sensors"])
-    pairs = [f"{place_words(a)} and {place_words(b)}" for a, b in found["exchanged"]]
-    unclear = [s for s in found["sensors"] if s.get("place_judged_s") is None]
+    rows = tuple(_row(s) for s in checks["sensors"])
+    pairs = [f"{place_words(a)} and {place_words(b)}" for a, b in checks["exchanged"]]
+    unclear = [s for s in checks["sensors"] if s.get("place_judged_s") is None]
     notes = []
     if any(s["sensor"] == "pelvis" for s in unclear):
         notes.append(
@@ -54,9 +54,9 @@ def sensor_checks(found: Mapping[str, Any] | None) -> SensorChecks | None:
             "That a sensor stayed is said where a slip would have been seen for most of the walk. Stand "
             "still before and after it, or walk for longer."
         )
-    if not all(s["clock_judged"] for s in found["sensors"]):
+    if not all(s["clock_judged"] for s in checks["sensors"]):
         notes.append("A clock is judged where a neighbour across a hip, knee or ankle is worn, in walking.")
-    if len(unclear) < len(found["sensors"]):
+    if len(unclear) < len(checks["sensors"]):
         notes.append("Straps that loosen slowly, and a second slip of a sensor, are not found.")
     return SensorChecks(rows, "; ".join(pairs), tuple(notes))
 
@@ -88,7 +88,7 @@ def _place(s: Mapping[str, Any]) -> tuple[str, str]:
             "warn",
         )
     # an older version did not say from when to when it could judge
-    if (judged := s.get("place_judged_s")) is None:
+    if (duration_s := s.get("place_judged_s")) is None:
         return f"Place {NOT_JUDGED}", ""
-    start, end = (format_number(x) for x in judged)
+    start, end = (format_number(x) for x in duration_s)
     return f"Stayed from {start} to {end}\u202fs", "ok"
