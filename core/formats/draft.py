@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagittal.core.errors import FormatError, Notice, Severity
+from sagittal.core.formats.clocks import Repair, repair_clock
+from sagittal.core.formats.clocks.report import refuse_constant, refuse_restart
 from sagittal.core.frames import Floats, Segment
 from sagittal.core.plurals import plural
 from sagittal.core.signals.held_samples import cut_blocks, is_complete
@@ -25,8 +27,12 @@ WRAP_16: Final = 1 << 16
 WRAP_32: Final = 1 << 32
 ASSUMED_RATE_HZ: Final = 100.0
 """Shown, never used for results: the notice `rate_unknown` is an error."""
-MOST_OUT_OF_ORDER: Final = 0.01
-"""Share of rows that may run backwards before we say that the file holds two takes [our choice]."""
+MOST_OFF: Final = 0.02
+"""Share by which a declared rate may differ from that of the time column [our choice: crystals differ by 0.01 %]."""
+ROUNDED: Final = 0.005
+"""Share by which the mean of the usual intervals differs from their median where stamps were rounded."""
+LOSSY: Final = frozenset({"rows_repeated", "rows_unplaced", "stamps_missing"})
+"""Repairs after which something is missing or only estimated."""
 FEW_ROWS: Final = 0.01
 """Share of rows that a file may lose for information only: whether what is missing changes a number is judged
 on the time axis, which reports gaps and filled samples (core/quality/assessment.py) [our choice]."""
@@ -47,7 +53,8 @@ class Draft:
     acc, gyr, mag : (n, 3), quat : (n, 4); SI units, NaN where missing; None without such columns.
     rate_hz : None = the file does not say. wrap : tick at which the clock starts again; None = a device clock
         never does, a counter at 16 bit, or 32 when it shows more.
-    segment : where it is worn, as the file says it; None = it does not.
+    segment : where it is worn, as the file says it; None = it does not. tick : s of the smallest unit in which
+        a device clock is written, 0 = unknown.
     """
 
     device_id: str
@@ -62,6 +69,7 @@ class Draft:
     notices: tuple[Notice, ...] = ()
     wrap: float | None = None
     segment: Segment | None = None
+    tick: float = 0.0
 
 
 def make_draft(
@@ -78,6 +86,7 @@ def make_draft(
     notices: Sequence[Notice] = (),
     wrap: float | None = None,
     segment: Segment | None = None,
+    tick: float = 0.0,
 ) -> Draft:
     """A sensor as its file gives it; a signal without a single number is none, and a gyroscope is missed.
 
@@ -102,7 +111,7 @@ def make_draft(
                 device,
             )
         )
-    return Draft(device, source, clock, ticks, acc, gyr, mag, quat, rate_hz, tuple(told), wrap, segment)
+    return Draft(device, source, clock, ticks, acc, gyr, mag, quat, rate_hz, tuple(told), wrap, segment, tick)
 
 
 def finish(drafts: Sequence[Draft]) -> dict[str, ImuStream]:
@@ -113,10 +122,11 @@ def finish(drafts: Sequence[Draft]) -> dict[str, ImuStream]:
     FormatError
         duplicate_device (two different files of one sensor), counter_restart, empty.
     """
-    drafts = _without_second_copies([_with_rate(d, drafts) for d in drafts])
+    drafts = [_in_order(d) for d in _without_second_copies(drafts)]
+    drafts = [_with_rate(d, drafts) for d in drafts]
     streams: dict[str, ImuStream] = {}
     for clock in sorted({d.clock for d in drafts}):
-        group = [_in_order(d) for d in drafts if d.clock == clock]
+        group = [d for d in drafts if d.clock == clock]
         if clock == "counter":
             group = _shared_counter(group)
         elif any(d.wrap for d in group):
@@ -133,14 +143,9 @@ def _rate(d: Draft) -> float:
 
 
 def _with_rate(d: Draft, all_of_take: Sequence[Draft]) -> Draft:
-    """Fill a rate the file does not name: from its clock, from the other sensors of the take, else say so."""
+    """Fill a rate that neither the file nor its clock gives: from the other sensors of the take, else say so."""
     if d.rate_hz is not None:
         return d
-    ticks = d.ticks[np.isfinite(d.ticks)]
-    if d.clock == "device" and len(ticks) > 1:
-        step = float(np.median(np.diff(ticks)))
-        if step > 0 and np.isfinite(1.0 / step):
-            return replace(d, rate_hz=1.0 / step)
     known = {o.rate_hz for o in all_of_take if o.clock == d.clock and o.rate_hz is not None}
     if len(known) == 1:
         rate = known.pop()
@@ -187,56 +192,87 @@ def _without_second_copies(drafts: Sequence[Draft]) -> list[Draft]:
 
 
 def _in_order(d: Draft) -> Draft:
-    """Unwrap the counter and drop rows that repeat or run backwards."""
-    good = np.isfinite(d.ticks)
-    lost = int(np.count_nonzero(~good))
-    ticks = d.ticks[good]
-    if d.clock == "counter" or d.wrap is not None:
-        ticks = _unwrapped(ticks, _wrap(d, ticks))
-    if not len(ticks):
+    """Give every row its true time: rows sorted, wraps undone, faults of the clock repaired and reported."""
+    seconds = d.clock == "device"
+    wrap = _wrap(d, d.ticks[np.isfinite(d.ticks)]) if d.clock == "counter" or d.wrap is not None else None
+    signals = [d.acc] if d.gyr is None else [d.acc, d.gyr]
+    found = repair_clock(d.ticks, signals, seconds=seconds, wrap=wrap, tick=d.tick)
+    if not len(found.ticks):
         raise FormatError("empty", f"{d.source} has no row with a valid counter or time.", sensor=d.device_id)
-    highest = np.maximum.accumulate(ticks)
-    rising = np.concatenate(([True], ticks[1:] > highest[:-1]))
-    back = int(np.count_nonzero(~rising))
-    if back > max(5, MOST_OUT_OF_ORDER * len(ticks)):
-        t = float(np.argmin(rising)) / _rate(d)
-        raise FormatError(
-            "counter_restart",
-            f"{d.source}: the packet counter or time runs backwards in {back} of {len(ticks)} rows, "
-            f"first at row {int(np.argmin(rising)) + 1}. If the file holds two takes, export them apart.",
-            sensor=d.device_id,
-            t_s=t,
+    if found.constant is not None:
+        return _without_clock(d, found.constant, float(found.ticks[0]))
+    if found.restart is not None:
+        t = float(found.ticks[found.restart] - found.ticks[0]) if seconds else found.restart / _rate(d)
+        raise refuse_restart(d.source, d.device_id, found.restart, len(d.ticks), t)
+    notices = (*d.notices, *(_tell(r, d) for r in found.repairs))
+    rate = d.rate_hz
+    if seconds and len(found.ticks) > 1:
+        measured = 1.0 / (found.step or _measure_step(found.ticks))
+        if rate is not None and abs(measured - rate) > MOST_OFF * rate:
+            notices = (*notices, _contradict(d, rate, measured))
+            rate = None
+        if rate is None and np.isfinite(measured):
+            rate = measured
+    if found.rows is None:
+        kept = replace(d, ticks=found.ticks, rate_hz=rate, notices=notices)
+    else:
+        rows = found.rows
+        kept = replace(
+            d,
+            ticks=found.ticks,
+            acc=d.acc[rows],
+            gyr=None if d.gyr is None else d.gyr[rows],
+            mag=None if d.mag is None else d.mag[rows],
+            quat=None if d.quat is None else d.quat[rows],
+            rate_hz=rate,
+            notices=notices,
         )
-    keep = np.flatnonzero(good)[rising]
-    if not has_whole_row(d.acc[keep]):
+    if not has_whole_row(kept.acc):
         raise FormatError(
             "empty",
             f"{d.source} has no row with both a valid counter and a complete acceleration; export it again.",
             sensor=d.device_id,
         )
-    notices = d.notices
-    if back or lost:
-        notices = (
-            *notices,
-            Notice(
-                "out_of_order",
-                f"{d.source}: {back + lost} {plural(back + lost, 'row', 'rows')} with a repeated, reversed "
-                f"or missing counter {plural(back + lost, 'was', 'were')} left out.",
-                d.device_id,
-                severity=grade_loss(back + lost, len(d.ticks)),
-            ),
-        )
-    if len(keep) == len(d.ticks):
-        return replace(d, ticks=ticks, notices=notices)
-    return replace(
-        d,
-        ticks=ticks[rising],
-        acc=d.acc[keep],
-        gyr=None if d.gyr is None else d.gyr[keep],
-        mag=None if d.mag is None else d.mag[keep],
-        quat=None if d.quat is None else d.quat[keep],
-        notices=notices,
+    return kept
+
+
+def _measure_step(ticks: Floats) -> float:
+    """Usual interval of rising stamps, s; the mean of the usual ones where few decimals make them differ."""
+    steps = np.diff(ticks)
+    middle = float(np.median(steps))
+    mean = float(steps[(steps > 0.5 * middle) & (steps < 1.5 * middle)].mean())
+    return mean if abs(mean - middle) > ROUNDED * middle else middle
+
+
+def _contradict(d: Draft, declared: float, measured: float) -> Notice:
+    return Notice(
+        "rate_contradicted",
+        f"{d.source}: the declared rate is {declared:g} Hz, but by its time column it was recorded at "
+        f"{measured:.4g} Hz; the time column was used. Check the rate and the unit of time.",
+        d.device_id,
     )
+
+
+def _tell(repair: Repair, d: Draft) -> Notice:
+    """What was repaired, as a notice; faults of many rows are a warning."""
+    severity = repair.severity
+    if severity == "info" and repair.code in LOSSY:
+        severity = grade_loss(repair.rows, len(d.ticks))
+    return Notice(repair.code, f"{d.source}: {repair.message}", d.device_id, severity=severity)
+
+
+def _without_clock(d: Draft, distinct: int, value: float) -> Draft:
+    """The rows timed by the declared rate where the stamps are no clock; refused without a rate."""
+    if d.rate_hz is None or d.clock != "device":
+        value = value if d.clock == "device" else np.nan
+        raise refuse_constant(d.source, d.device_id, len(d.ticks), distinct, value)
+    note = Notice(
+        "time_constant",
+        f"{d.source}: nearly all time stamps are equal ({value:.6g}), a spreadsheet has probably rounded them. "
+        f"The declared rate of {d.rate_hz:g} Hz was used instead; lost samples cannot be detected.",
+        d.device_id,
+    )
+    return replace(d, ticks=np.arange(len(d.ticks)) / d.rate_hz, wrap=None, notices=(*d.notices, note))
 
 
 def grade_loss(lost: int, rows: int) -> Severity:
@@ -249,12 +285,6 @@ def _wrap(d: Draft, ticks: Floats) -> float:
     if d.wrap is not None:
         return d.wrap
     return WRAP_16 if not len(ticks) or ticks.max() < WRAP_16 else WRAP_32
-
-
-def _unwrapped(ticks: Floats, wrap: float) -> Floats:
-    """Counter without wraps: steps are taken modulo its range, to the nearer side."""
-    step = np.mod(np.diff(ticks) + wrap / 2, wrap) - wrap / 2
-    return np.concatenate((ticks[:1], ticks[:1] + np.cumsum(step)))
 
 
 def _shared_counter(group: Sequence[Draft]) -> list[Draft]:
@@ -319,7 +349,8 @@ def signal_digest(acc: Floats, gyr: Floats | None, mag: Floats | None) -> str:
 
 def _bits(a: Floats) -> NDArray[np.float32]:
     """float32 in C order with one bit pattern for NaN and one for zero."""
-    b = np.add(a, np.float32(0), order="C", dtype=np.float32, casting="same_kind")
+    with np.errstate(invalid="ignore"):  # a signalling NaN is NaN too
+        b = np.add(a, np.float32(0), order="C", dtype=np.float32, casting="same_kind")
     missing = np.isnan(b)
     if missing.any():
         b[missing] = np.nan

@@ -281,7 +281,8 @@ def test_a_row_without_time_leaves_the_rate_known() -> None:
     lines[50] = ",".join("" if i == 2 else cell for i, cell in enumerate(lines[50].split(",")))
     stream = read("\n".join(lines), rate_hz=None, time_column="X [s]#2").streams["shank_l"]
     assert stream.rate_hz == pytest.approx(100.0)
-    assert [n.code for n in stream.notices] == ["out_of_order"]
+    assert [n.code for n in stream.notices] == ["stamps_missing"]
+    assert len(stream.t_s) == 300
 
 
 def test_titles_that_nobody_asks_for_may_repeat() -> None:
