@@ -41,53 +41,94 @@ def sort_runs(stamps: Floats, widths: Ints, step: float, same: Floats) -> Sorted
     on = np.zeros(m, np.bool_)
     on[chain] = True
     off = np.flatnonzero(~on)
+    at = np.searchsorted(chain, off)
+    groups = np.split(off, np.flatnonzero(np.diff(at)) + 1) if len(off) else []
+    sorting = _Sorting(stamps, widths, step, chain, same)
+    # those that have no room where they are go first: others are not to be timed by a hole that is theirs
+    roomy = [sorting.has_room(group) for group in groups]
+    for group in (g for g, stays in zip(groups, roomy, strict=True) if not stays):
+        sorting.move(group)
+    for group in (g for g, stays in zip(groups, roomy, strict=True) if stays):
+        if sorting.has_room(group):
+            sorting.distrust(group)
+        else:
+            sorting.move(group)
     place = np.arange(m, dtype=np.float64)
-    wrong = np.zeros(m, np.bool_)
-    drop = np.zeros(m, np.bool_)
-    moved, repeated, unplaced = [], [], []
-    along = stamps[chain]
-    taken: dict[int, float] = {}
-    groups = np.split(off, np.flatnonzero(np.diff(np.searchsorted(chain, off))) + 1) if len(off) else []
-    for group in groups:
-        at = int(np.searchsorted(chain, group[0]))
-        rows_here = int(widths[group].sum())
-        room = np.inf
-        if 0 < at < len(chain):
-            p, q = chain[at - 1], chain[at]
-            room = (stamps[q] - stamps[p]) / step - widths[p]
-        for i in group:
-            k = int(np.searchsorted(along, stamps[i], side="left"))
-            near = [chain[j] for j in (k - 1, k) if 0 <= j < len(chain)]
-            twin = next((j for j in near if abs(stamps[j] - stamps[i]) < 0.25 * step), None)
-            if twin is not None and same[twin] == same[i]:
-                drop[i] = True
-                repeated.append(i)
-            elif room >= rows_here - 0.4:
-                wrong[i] = True
-            elif twin is None and 0 < k < len(chain) and _has_room(chain, stamps, widths, step, k, i, taken):
-                place[i] = chain[k - 1] + 0.25 + 0.5 * _share(along[k - 1], along[k], stamps[i])
-                moved.append(i)
-            elif room >= 0.6:
-                wrong[i] = True
-                room -= widths[i]
-            else:
-                drop[i] = True
-                unplaced.append(i)
+    place[list(sorting.moved)] = list(sorting.moved.values())
+    wrong, drop = np.zeros(m, np.bool_), np.zeros(m, np.bool_)
+    wrong[sorting.wrong] = True
+    drop[sorting.repeated + sorting.unplaced] = True
     order = np.argsort(place, kind="stable")
     order = order[~drop[order]]
-    index = lambda rows: np.array(rows, np.int64)  # noqa: E731
-    return SortedRuns(order, wrong[order], index(moved), index(repeated), index(unplaced))
+    moved, repeated, unplaced = (
+        np.array(sorted(x), np.int64) for x in (sorting.moved, sorting.repeated, sorting.unplaced)
+    )
+    return SortedRuns(order, wrong[order], moved, repeated, unplaced)
 
 
-def _has_room(
-    chain: Ints, stamps: Floats, widths: Ints, step: float, k: int, i: int, taken: dict[int, float]
-) -> bool:
-    """Whether run i fits between the runs k − 1 and k of the chain, beside those that were put there before."""
-    room = (stamps[chain[k]] - stamps[chain[k - 1]]) / step - widths[chain[k - 1]] - taken.get(k, 0.0)
-    if room < 0.6:
-        return False
-    taken[k] = taken.get(k, 0.0) + widths[i]
-    return True
+class _Sorting:
+    """Runs beside the chain of those that rise, and the holes of the chain they may belong into.
+
+    Hole k is before the k-th run of the chain.
+    """
+
+    def __init__(self, stamps: Floats, widths: Ints, step: float, chain: Ints, same: Floats) -> None:
+        self._stamps, self._widths, self._step, self._chain, self._same = stamps, widths, step, chain, same
+        self._along = stamps[chain]
+        self._taken: dict[int, float] = {}
+        self.moved: dict[int, float] = {}
+        self.wrong: list[int] = []
+        self.repeated: list[int] = []
+        self.unplaced: list[int] = []
+
+    def _room(self, k: int) -> float:
+        """Rows that are missing in hole k."""
+        if not 0 < k < len(self._chain):
+            return np.inf
+        low = self._chain[k - 1]
+        span = (self._along[k] - self._along[k - 1]) / self._step
+        return float(span - self._widths[low] - self._taken.get(k, 0.0))
+
+    def has_room(self, group: Ints) -> bool:
+        """Whether as many rows are missing where the group is in the file."""
+        at = int(np.searchsorted(self._chain, group[0]))
+        return self._room(at) >= self._widths[group].sum() - 0.4
+
+    def distrust(self, group: Ints) -> None:
+        """Keep the place of a group and ignore its stamps, but for duplicates."""
+        at = int(np.searchsorted(self._chain, group[0]))
+        for i in group.tolist():
+            if self._twin(i)[1]:
+                self.repeated.append(i)
+            else:
+                self.wrong.append(i)
+                self._taken[at] = self._taken.get(at, 0.0) + self._widths[i]
+
+    def move(self, group: Ints) -> None:
+        """Put every run of a group where its stamp belongs, if there is a hole."""
+        at = int(np.searchsorted(self._chain, group[0]))
+        for i in group.tolist():
+            there, equal = self._twin(i)
+            k = int(np.searchsorted(self._along, self._stamps[i], side="left"))
+            if there and equal:
+                self.repeated.append(i)
+            elif not there and 0 < k < len(self._chain) and self._room(k) >= 0.6:
+                share = _share(self._along[k - 1], self._along[k], self._stamps[i])
+                self.moved[i] = float(self._chain[k - 1]) + 0.25 + 0.5 * share
+                self._taken[k] = self._taken.get(k, 0.0) + self._widths[i]
+            elif self._room(at) >= 0.6:
+                self.wrong.append(i)
+                self._taken[at] = self._taken.get(at, 0.0) + self._widths[i]
+            else:
+                self.unplaced.append(i)
+
+    def _twin(self, i: int) -> tuple[bool, bool]:
+        """Whether the chain has a run with this stamp, and whether its signals are equal too."""
+        k = int(np.searchsorted(self._along, self._stamps[i], side="left"))
+        for j in (k - 1, k):
+            if 0 <= j < len(self._chain) and abs(self._along[j] - self._stamps[i]) < 0.25 * self._step:
+                return True, bool(self._same[self._chain[j]] == self._same[i])
+        return False, False
 
 
 def _share(low: float, high: float, value: float) -> float:
