@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from itertools import pairwise
 from typing import Final, Literal
 
 from sagittal.core.formats import live_reader, parquet, text
+from sagittal.core.formats.layout import LINES, find_layout
 from sagittal.core.formats.manifest import is_manifest
 from sagittal.core.formats.vendors import mapping_xml
 from sagittal.core.formats.vendors.registry import find_vendor
@@ -84,21 +84,5 @@ def _sniff_json(data: bytes) -> tuple[Kind, str]:
 
 
 def _is_table(data: bytes) -> bool:
-    """Tell a table by two neighbouring rows with the same number of at least four numbers."""
-    rows = [r for r in text.head_lines(data, 30) if r.strip()]
-    for a, b in pairwise(rows):
-        for separator in text.SEPARATORS:
-            if _numbers(a, separator) >= 4 and _numbers(a, separator) == _numbers(b, separator):
-                return True
-    return False
-
-
-def _numbers(line: bytes, separator: bytes) -> int:
-    n = 0
-    for cell in line.split(separator):
-        try:
-            float(cell.replace(b",", b"."))
-        except ValueError:
-            continue
-        n += 1
-    return n
+    """Tell a table by two neighbouring rows of as many numbers."""
+    return find_layout(text.head_lines(data, LINES)) is not None

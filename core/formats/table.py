@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -14,12 +13,15 @@ import numpy as np
 from sagittal.core.errors import FormatError, ManifestError, Notice
 from sagittal.core.formats import text
 from sagittal.core.formats.draft import Draft, make_draft
+from sagittal.core.formats.layout import LINES, TableLayout, find_layout, guess_separator, has_decimal_comma
 from sagittal.core.formats.source import SourceFile
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, Counter, SourceSpec
+from sagittal.core.formats.time_unit import check_tick, find_tick
 from sagittal.core.frames import Floats
 from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 
-_ROWS_TO_LOOK_AT = 4
+_ROWS_OF_TICKS: Final = 1000
+"""Rows by which a column of whole numbers is recognised."""
 _CHUNK: Final = 1 << 23
 """Bytes of a long table that are read at a time."""
 
@@ -39,14 +41,15 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
         empty, bad_table.
     """
     layout = _lay_out(data, source, spec)
-    body = text.after_lines(data, spec.skip_rows + spec.header_rows)
+    body = text.after_lines(data, layout.first_row)
     if layout.separator == b" ":
-        body = memoryview(squeeze_blanks(bytes(body)))
+        body = memoryview(text.squeeze_blanks(bytes(body)))
     table = _without_blank_end(layout.read(body, source), spec)
-    ticks, clock = _time(table, spec, source)
+    ticks, clock, tick = _time(table, spec, source)
     return [
-        _sensor(device, channels, table, spec, source, ticks, clock)
+        draft
         for device, channels in spec.columns.items()
+        for draft in _sensor(device, channels, table, spec, source, ticks, clock, tick)
     ]
 
 
@@ -55,43 +58,79 @@ def _without_blank_end(table: text.Columns, spec: SourceSpec) -> text.Columns:
     names = [name for channels in spec.columns.values() for _, name in _asked(channels)]
     known = np.flatnonzero(np.isfinite(table.stack(names)).any(axis=1))
     end = known[-1] + 1 if len(known) else None
-    return text.Columns({name: values[:end] for name, values in table.values.items()}, table.notices)
+    values = {name: values[:end] for name, values in table.values.items()}
+    return text.Columns(values, table.notices, table.times)
 
 
 @dataclass(frozen=True)
 class _Layout:
-    """How the rows of one table are cut. titles : of all columns. wanted : columns that are read."""
+    """How the rows of one table are cut.
+
+    Parameters
+    ----------
+    first_row : lines before the rows. titles : of all columns. wanted : columns that are read, as the table names
+        them. times : those of them that may be texts.
+    """
 
     separator: bytes
+    first_row: int
     titles: list[str]
     wanted: list[str]
     comma: bool
+    times: tuple[str, ...]
 
     def read(self, body: memoryview, source: str) -> text.Columns:
         """Rows without a header as columns."""
         return text.read_columns(
-            body, source, self.separator, self.titles, self.wanted, decimal_comma=self.comma
+            body, source, self.separator, self.titles, self.wanted, decimal_comma=self.comma, times=self.times
         )
 
 
 def _lay_out(data: bytes, source: str, spec: SourceSpec) -> _Layout:
     """What the head of a table says; errors as in `read_table`."""
     _check(spec, source)
-    lines = text.head_lines(data, spec.skip_rows + spec.header_rows + _ROWS_TO_LOOK_AT)
-    header = lines[spec.skip_rows : spec.skip_rows + spec.header_rows]
-    rows = [r for r in lines[spec.skip_rows + spec.header_rows :] if r.strip()]
+    lines = text.head_lines(data, (spec.skip_rows or 0) + (spec.header_rows or 0) + LINES)
+    known = spec.separator.encode() if spec.separator else None
+    found = find_layout(lines, known)
+    skip, header = _find_header(lines, spec, found, known)
+    rows = [r for r in lines[skip + header :] if r.strip()]
     if not rows:
         raise FormatError("empty", f"{source} has a header but no samples; record or export it again.")
-    chosen = (
-        spec.separator.encode() if spec.separator else text.guess_separator(rows[: max(1, len(rows) - 1)])
+    separator = (
+        known or (found.separator if found else guess_separator(rows[: max(1, len(rows) - 1)])) or b","
     )
-    separator = chosen or b","
-    if separator == b" ":
-        header, rows = [squeeze_blanks(h) for h in header], [squeeze_blanks(r) for r in rows]
-    titles = find_titles(header, rows[0], separator, spec)
-    return _Layout(
-        separator, titles, _wanted(spec, titles, source), text.has_decimal_comma(rows[0], separator)
-    )
+    titles = _titles(lines[skip : skip + header], rows, separator, spec)
+    wanted = _wanted(spec, titles, source)
+    times = () if spec.time_column is None else (spec.time_column,)
+    return _Layout(separator, skip + header, titles, wanted, has_decimal_comma(rows, separator), times)
+
+
+def _titles(header: list[bytes], rows: list[bytes], separator: bytes, spec: SourceSpec) -> list[str]:
+    squeeze = text.squeeze_blanks if separator == b" " else bytes
+    widest = max(rows[:LINES], key=lambda row: row.count(separator))
+    usual = rows[0] if rows[0].count(separator) == rows[-1].count(separator) else widest
+    return find_titles([squeeze(line) for line in header], squeeze(usual), separator, spec)
+
+
+def _find_header(
+    lines: list[bytes], spec: SourceSpec, found: TableLayout | None, known: bytes | None
+) -> tuple[int, int]:
+    """Lines before the header and of it: as declared, else where the declared columns are named."""
+    if spec.skip_rows is not None:
+        return spec.skip_rows, 1 if spec.header_rows is None else spec.header_rows
+    if found is None:
+        return 0, 1 if spec.header_rows is None else spec.header_rows
+    if spec.header_rows is not None:
+        return max(0, found.first_row - spec.header_rows), spec.header_rows
+    asked = {name.split("#")[0] for _, channels in spec.columns.items() for _, name in _asked(channels)}
+    asked |= {name for name in (spec.time_column, _counted(spec)) if name is not None}
+    separator = known or found.separator
+    candidates = [(found.skip_rows, found.header_rows), *((i, 1) for i in range(found.first_row))]
+    for skip, header in candidates:
+        titles = _titles(lines[skip : skip + header], lines[found.first_row :], separator, spec)
+        if asked <= {*titles, *text.number_columns(titles)}:
+            return skip, header
+    return candidates[0]
 
 
 def estimate_rows(head: bytes, size: int) -> float:
@@ -114,15 +153,15 @@ def open_long_table(file: SourceFile, spec: SourceSpec) -> dict[str, LongStream]
         )
     head, tail = _ends(file)
     layout = _lay_out(head, source, spec)
-    scale = TIME_UNITS[spec.time_unit]
-    body = text.after_lines(head, spec.skip_rows + spec.header_rows)
+    body = text.after_lines(head, layout.first_row)
     first = layout.read(_whole_lines(body), source)
     last = layout.read(_whole_lines(tail), source)
     if spec.time_column is None:
         rate = spec.rate_hz or 0.0
         row = len(bytes(body)) / max(1, len(next(iter(first.values.values()))))
-        start, duration = 0.0, file.size / row / rate
+        start, duration, scale = 0.0, file.size / row / rate, 1.0
     else:
+        scale = _find_scale(first, spec, source)
         times, ends = first.values[spec.time_column] * scale, last.values[spec.time_column] * scale
         rate = spec.rate_hz or 1.0 / float(np.median(np.diff(times[np.isfinite(times)])))
         start, duration = float(times[0]), float(np.nanmax(ends) - times[0])
@@ -133,7 +172,7 @@ def open_long_table(file: SourceFile, spec: SourceSpec) -> dict[str, LongStream]
             rate_hz=rate,
             has_gyro=channels.gyr is not None,
             duration_s=duration,
-            open_blocks=partial(_read_blocks, file, spec, layout, channels, start, rate),
+            open_blocks=partial(_read_blocks, file, spec, layout, channels, start, rate, scale),
         )
         for device, channels in spec.columns.items()
     }
@@ -155,13 +194,19 @@ def _whole_lines(data: memoryview) -> memoryview:
 
 
 def _read_blocks(
-    file: SourceFile, spec: SourceSpec, layout: _Layout, channels: Channels, start: float, rate: float
+    file: SourceFile,
+    spec: SourceSpec,
+    layout: _Layout,
+    channels: Channels,
+    start: float,
+    rate: float,
+    scale: float,
 ) -> Iterator[SampleBlock]:
     """Rows from the first one, a few megabytes at a time."""
     acc_unit, gyr_unit = ACC_UNITS[spec.acc_unit or "m/s2"], GYR_UNITS[spec.gyr_unit or "rad/s"]
     rows = 0
     with file.open() as opened:
-        for _ in range(spec.skip_rows + spec.header_rows):
+        for _ in range(layout.first_row):
             opened.readline()
         rest = b""
         while True:
@@ -170,24 +215,19 @@ def _read_blocks(
             end = len(body) if not data else body.rfind(b"\n") + 1
             body, rest = body[:end], body[end:]
             if body.strip():
-                part = memoryview(squeeze_blanks(body) if layout.separator == b" " else body)
+                part = memoryview(text.squeeze_blanks(body) if layout.separator == b" " else body)
                 table = layout.read(part, file.name)
                 acc = table.stack(channels.acc) * acc_unit
                 gyr = None if channels.gyr is None else table.stack(channels.gyr) * gyr_unit
                 if spec.time_column is None:
                     t_s = (rows + np.arange(len(acc))) / rate
                 else:
-                    t_s = table.values[spec.time_column] * TIME_UNITS[spec.time_unit] - start
+                    t_s = table.values[spec.time_column] * scale - start
                 rows += len(acc)
                 timed = np.isfinite(t_s)
                 yield SampleBlock(t_s[timed], acc[timed], None if gyr is None else gyr[timed])
             if not data:
                 return
-
-
-def squeeze_blanks(data: bytes) -> bytes:
-    """Columns that were lined up with several spaces are one space apart, and none is before the first."""
-    return re.sub(rb"(?m)^ +| +(?=\r?$)", b"", re.sub(rb" +", b" ", data))
 
 
 def _check(spec: SourceSpec, source: str) -> None:
@@ -196,7 +236,7 @@ def _check(spec: SourceSpec, source: str) -> None:
         raise ManifestError(
             "unknown_column", f"{where} names no columns; say which columns of {source} are which sensor."
         )
-    if spec.acc_unit is None:
+    if spec.acc_unit is None and any(c.acc for c in spec.columns.values()):
         raise ManifestError(
             "unit_missing", f"{where}: acc_unit is missing; expected one of {', '.join(ACC_UNITS)}."
         )
@@ -262,16 +302,35 @@ def _counted(spec: SourceSpec) -> str | None:
     return None if spec.counter is None else spec.counter.column
 
 
-def _time(table: text.Columns, spec: SourceSpec, source: str) -> tuple[Floats, str]:
-    """Ticks of every row and what they are (see `Draft`)."""
+def _time(table: text.Columns, spec: SourceSpec, source: str) -> tuple[Floats, str, float]:
+    """Ticks of every row, what they are, and the smallest unit of a clock in s (see `Draft`)."""
     if spec.counter is not None:
         counts = table.values[spec.counter.column]
         _check_counter(counts, spec.counter, source)
-        return counts, "counter"
+        return counts, "counter", 0.0
     if spec.time_column is None:
         n = len(next(iter(table.values.values())))
-        return np.arange(n, dtype=np.float64), "index"
-    return table.values[spec.time_column] * TIME_UNITS[spec.time_unit], "device"
+        return np.arange(n, dtype=np.float64), "index", 0.0
+    scale = _find_scale(table, spec, source)
+    values = table.values[spec.time_column]
+    known = values[np.isfinite(values)][:_ROWS_OF_TICKS]
+    whole = (
+        bool(len(known)) and spec.time_column not in table.times and bool((known == np.round(known)).all())
+    )
+    return values * scale, "device", scale if whole else 0.0
+
+
+def _find_scale(table: text.Columns, spec: SourceSpec, source: str) -> float:
+    """Length in s of the unit of the time column."""
+    if spec.time_column is None or spec.time_column in table.times:
+        return 1.0
+    values = table.values[spec.time_column]
+    if spec.time_unit is None:
+        return find_tick(spec.time_column, values, spec.rate_hz, source)
+    if isinstance(spec.time_unit, float):
+        return spec.time_unit
+    check_tick(spec.time_column, values, spec.time_unit, source)
+    return TIME_UNITS[spec.time_unit]
 
 
 def _check_counter(counts: Floats, counter: Counter, source: str) -> None:
@@ -301,10 +360,24 @@ def _sensor(
     source: str,
     ticks: Floats,
     clock: str,
-) -> Draft:
+    tick: float,
+) -> Iterator[Draft]:
+    """A sensor, or parts of it where the file holds no acceleration."""
     notices = list(table.notices)
-    acc = table.stack(channels.acc) * ACC_UNITS[spec.acc_unit or "m/s2"]
+    wrap = spec.counter.wrap if spec.counter else None
     gyr = None if channels.gyr is None else table.stack(channels.gyr) * GYR_UNITS[spec.gyr_unit or "rad/s"]
+    if channels.acc is None:
+        for part, values in (
+            ("gyr", gyr),
+            ("mag", None if channels.mag is None else table.stack(channels.mag)),
+        ):
+            if values is not None:
+                yield Draft(
+                    device, source, clock, ticks, values, None, None, None, spec.rate_hz, tuple(notices), wrap,
+                    tick=tick, part=part,
+                )  # fmt: skip
+        return
+    acc = table.stack(channels.acc) * ACC_UNITS[spec.acc_unit or "m/s2"]
     if not spec.gravity_included:
         notices.append(
             Notice(
@@ -319,8 +392,7 @@ def _sensor(
     if quat is not None and spec.quat_order == "xyzw":
         quat = quat[:, [3, 0, 1, 2]]
     mag = None if channels.mag is None else table.stack(channels.mag)
-    wrap = spec.counter.wrap if spec.counter else None
-    return make_draft(
+    yield make_draft(
         device, source, clock, ticks, acc=acc, gyr=gyr, mag=mag, quat=quat, rate_hz=spec.rate_hz,
-        notices=notices, wrap=wrap,
+        notices=notices, wrap=wrap, tick=tick,
     )  # fmt: skip

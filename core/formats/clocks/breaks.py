@@ -121,7 +121,9 @@ def _find_strays(level: Floats, pieces: Sequence[tuple[int, int]], far: float) -
     starts = [0, *(b for _, b in pieces)]
     stops = [*(a for a, _ in pieces), len(level)]
     for i, (a, b) in enumerate(zip(starts, stops, strict=True)):
-        around = [x for x in (ends[i - 1] if i else None, sides[i] if i < len(sides) else None) if x is not None]
+        around = [
+            x for x in (ends[i - 1] if i else None, sides[i] if i < len(sides) else None) if x is not None
+        ]
         strays[a:b] = (level[a:b] < min(around) - far) | (level[a:b] > max(around) + far)
     return strays
 
@@ -132,5 +134,3 @@ def _explain(jump: float) -> tuple[float, str] | None:
         if times and abs(times) <= most and abs(jump - times * unit) < _NEAR:
             return times * unit, _MIDNIGHT if times * unit in (-86_400.0, -43_200.0) else why
     return None
-
-

@@ -23,6 +23,8 @@ from sagittal.core.frames import Bools, Floats
 
 _LONG_GAP_S: Final = 30.0
 """A longer step may be a clock that was set."""
+_LEAST_SPAN_S: Final = 1e-6
+"""Stamps that span less are no clock."""
 _FEW_STAMPS: Final = 4e-4
 """Share of different stamps below which a column is no clock."""
 _NARROW: Final = 4096.0
@@ -62,6 +64,8 @@ def repair_clock(
         smallest unit of the column as written, in that unit; 0 = unknown.
     """
     known = np.isfinite(ticks)
+    if seconds and known.sum() > 1 and np.ptp(ticks[known]) < _LEAST_SPAN_S:
+        return RepairedClock(np.flatnonzero(known), ticks[known], constant=len(np.unique(ticks[known])))
     if known.all() and wrap is None and _is_clean(ticks, seconds=seconds):
         return RepairedClock(None, ticks)
     table = np.concatenate(signals, axis=1)
@@ -125,9 +129,7 @@ def _repair(
         again = _find_twice(x, same, runs) & ~strange
         if again.any():
             repairs.append(report.describe_repeats(int(again.sum()), int(rows[again][0])))
-            x, rows, same, filled, strange = (
-                a[~again] for a in (x, rows, same, filled, strange)
-            )
+            x, rows, same, filled, strange = (a[~again] for a in (x, rows, same, filled, strange))
             written = written[~again]
             runs = find_packets(x)
     step = runs.step or step
@@ -232,7 +234,15 @@ def _describe_order(ordered: SortedRuns, runs: Packets, widths: Ints, rows: Ints
 
 
 def _describe_spread(
-    x: Floats, rows: Ints, where: Ints, spread: Spread, wrong: Bools, filled: Bools, runs: Packets, *, seconds: bool
+    x: Floats,
+    rows: Ints,
+    where: Ints,
+    spread: Spread,
+    wrong: Bools,
+    filled: Bools,
+    runs: Packets,
+    *,
+    seconds: bool,
 ) -> list[Repair]:
     out = []
     at = rows[where]

@@ -103,9 +103,7 @@ def _find_floor(delay: Floats, ahead: int) -> Floats:
     return np.asarray(minimum_filter1d(delay, size, origin=-(size // 2), mode="nearest"))
 
 
-def _find_extra(
-    stamps: Floats, widths: Ints, first: Ints, knots: Ints, step: float, rows: int
-) -> Bools:
+def _find_extra(stamps: Floats, widths: Ints, first: Ints, knots: Ints, step: float, rows: int) -> Bools:
     """Rows that repeat a stamp and for which the clock does not catch up: there is no time for them."""
     extra = np.zeros(rows, np.bool_)
     delay = stamps[knots] / step - first[knots]
