@@ -18,6 +18,7 @@ nor manifest."""
 _MAGIC: Final = {
     b"\x89HDF": "HDF5 that is not APDM's (MATLAB 7.3, …)",
     b"MATLAB": "MATLAB",
+    b"\xd0\xcf\x11\xe0": "an old Excel workbook (.xls)",
     b"XTF\x00": "Xsens MTB",
     b"\xfa\xff": "Xsens MTB",
 }
@@ -26,6 +27,7 @@ _TEXT: Final = {
     b"inDegrees=": "OpenSim MOT",
 }
 _ADVICE: Final = {
+    "an old Excel workbook (.xls)": "save it as .xlsx or CSV.",
     "OpenSim STO": "orientations alone are no measurement. Upload the sensors' files; "
     "compare orientations on the tab Algorithms of an analysed session.",
     "OpenSim MOT": "joint angles alone are no measurement. Upload the sensors' files.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
@@ -40,7 +40,7 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
     FormatError
         empty, bad_table.
     """
-    layout = _lay_out(data, source, spec)
+    layout, spec = _lay_out(data, source, spec)
     body = text.after_lines(data, layout.first_row)
     if layout.separator == b" ":
         body = memoryview(text.squeeze_blanks(bytes(body)))
@@ -86,8 +86,8 @@ class _Layout:
         )
 
 
-def _lay_out(data: bytes, source: str, spec: SourceSpec) -> _Layout:
-    """What the head of a table says; errors as in `read_table`."""
+def _lay_out(data: bytes, source: str, spec: SourceSpec) -> tuple[_Layout, SourceSpec]:
+    """What the head of a table says, and the entry with unique names; errors as in `read_table`."""
     _check(spec, source)
     lines = text.head_lines(data, (spec.skip_rows or 0) + (spec.header_rows or 0) + LINES)
     known = spec.separator.encode() if spec.separator else None
@@ -100,9 +100,11 @@ def _lay_out(data: bytes, source: str, spec: SourceSpec) -> _Layout:
         known or (found.separator if found else guess_separator(rows[: max(1, len(rows) - 1)])) or b","
     )
     titles = _titles(lines[skip : skip + header], rows, separator, spec)
+    spec = _with_neighbours(spec, titles)
     wanted = _wanted(spec, titles, source)
     times = () if spec.time_column is None else (spec.time_column,)
-    return _Layout(separator, skip + header, titles, wanted, has_decimal_comma(rows, separator), times)
+    comma = has_decimal_comma(rows, separator)
+    return _Layout(separator, skip + header, titles, wanted, comma, times), spec
 
 
 def _titles(header: list[bytes], rows: list[bytes], separator: bytes, spec: SourceSpec) -> list[str]:
@@ -152,7 +154,7 @@ def open_long_table(file: SourceFile, spec: SourceSpec) -> dict[str, LongStream]
             f"{source} is too long to be timed by a counter; give time_column or rate_hz in the manifest.",
         )
     head, tail = _ends(file)
-    layout = _lay_out(head, source, spec)
+    layout, spec = _lay_out(head, source, spec)
     body = text.after_lines(head, layout.first_row)
     first = layout.read(_whole_lines(body), source)
     last = layout.read(_whole_lines(tail), source)
@@ -291,6 +293,28 @@ def _wanted(spec: SourceSpec, titles: list[str], source: str) -> list[str]:
         if name not in wanted:
             wanted.append(name)
     return wanted
+
+
+def _with_neighbours(spec: SourceSpec, titles: list[str]) -> SourceSpec:
+    """The entry with unique names where a title of several columns can only mean the one next to a named column.
+
+    As under a header of merged cells: "Accelerometer/X", "Y", "Z" are three columns side by side.
+    """
+    names = text.number_columns(titles)
+
+    def complete(group: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        if group is None or group[0] not in names:
+            return group
+        at = names.index(group[0])
+        beside = tuple(titles[at : at + len(group)])
+        alike = all(a in (b, n) for a, b, n in zip(group, beside, names[at:], strict=False))
+        return tuple(names[at : at + len(group)]) if len(beside) == len(group) and alike else group
+
+    columns = {
+        d: Channels(complete(c.acc), complete(c.gyr), complete(c.mag), complete(c.quat))
+        for d, c in spec.columns.items()
+    }
+    return replace(spec, columns=columns)
 
 
 def _asked(c: Channels) -> list[tuple[str, str]]:

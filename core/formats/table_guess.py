@@ -13,11 +13,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagittal.core.errors import FormatError, ManifestError
+from sagittal.core.errors import FormatError, InputError, ManifestError
 from sagittal.core.formats import table, text
 from sagittal.core.formats._sniff import sniff
 from sagittal.core.formats.aliases import segment_in
-from sagittal.core.formats.archive import is_gzip, is_zip
+from sagittal.core.formats.archive import expand, is_gzip, is_zip
 from sagittal.core.formats.draft import Draft
 from sagittal.core.formats.layout import LINES, find_layout
 from sagittal.core.formats.source import SourceFile, stem_of
@@ -109,12 +109,8 @@ def look_into_table(file: SourceFile) -> TableLook | None:
 
     A table without three columns of one acceleration is a TableLook whose `columns` are empty.
     """
-    with file.open() as opened:
-        raw = opened.read(PIECE)
-    if is_zip(raw) or is_gzip(raw):
-        return None
-    data = text.to_utf8(raw)
-    if sniff(data)[0] != "table":
+    data = _read_head(file)
+    if data is None or sniff(data)[0] != "table":
         return None
     shape = find_layout(text.head_lines(data, LINES))
     if shape is None:
@@ -157,10 +153,24 @@ def make_entry(source: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 def read_sample(file: SourceFile, spec: SourceSpec) -> list[Draft]:
     """The sensors of the beginning of a table; raises as `table.read_table`."""
-    with file.open() as opened:
-        data = text.to_utf8(opened.read(PIECE))
+    data = _read_head(file) or b""
     end = data.rfind(b"\n") + 1
     return table.read_table(data[:end] if end and file.size > PIECE else data, file.name, spec)
+
+
+def _read_head(file: SourceFile) -> bytes | None:
+    """Beginning of a table as text, also of a workbook with one sheet; None of other packed files."""
+    with file.open() as opened:
+        raw = opened.read(PIECE)
+    if is_gzip(raw):
+        return None
+    if is_zip(raw):
+        try:
+            (sheet,) = expand([file])
+        except (InputError, ValueError):
+            return None
+        raw = sheet.read()[:PIECE] if sheet.name == file.name else b""
+    return text.to_utf8(raw)
 
 
 def _values(

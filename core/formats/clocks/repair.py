@@ -17,7 +17,7 @@ from sagittal.core.formats.clocks.breaks import mend_breaks
 from sagittal.core.formats.clocks.order import SortedRuns, sort_runs
 from sagittal.core.formats.clocks.report import Repair
 from sagittal.core.formats.clocks.spread import Spread, spread_rows
-from sagittal.core.formats.clocks.step import BURST, Ints, Packets, find_packets, is_bursty
+from sagittal.core.formats.clocks.step import BURST, LARGE, Ints, Packets, find_packets, is_bursty
 from sagittal.core.formats.clocks.wraps import find_wrap, unwrap
 from sagittal.core.frames import Bools, Floats
 
@@ -161,7 +161,10 @@ def _is_clean(x: Floats, *, seconds: bool) -> bool:
     if not seconds:
         return True
     usual = float(np.median(d))
-    return bool(d.max() < _LONG_GAP_S and d.min() > BURST * usual and not is_bursty(x))
+    longest = float(d.max())
+    if longest >= _LONG_GAP_S or d.min() <= BURST * usual:
+        return False
+    return longest <= LARGE * usual or not is_bursty(x)
 
 
 def _fill(x: Floats) -> Floats:

@@ -15,6 +15,8 @@ Ints = NDArray[np.int64]
 BURST: Final = 0.2
 """A step below this share of the usual one is no sampling interval: stamps were given on arrival [chosen: the
 jitter of phones stays above it]."""
+LARGE: Final = 4.0
+"""Usual steps that the pause between two bursts exceeds."""
 _WINDOWS: Final = (512, 128, 32, 8)
 """Stamps over which the interval is measured, the longest that is free of breaks often enough."""
 _BROKEN: Final = 1.6
@@ -61,7 +63,7 @@ def is_bursty(x: Floats) -> bool:
     if len(d) < 50:
         return False
     usual = float(np.median(d))
-    large = d[d > 4.0 * usual]
+    large = d[d > LARGE * usual]
     if len(large) < max(8, len(d) // 600):
         return False
     if np.count_nonzero(every < -0.3 * np.median(large)) > 0.3 * len(large):
@@ -75,7 +77,7 @@ def is_bursty(x: Floats) -> bool:
 
 def _burst_limit(d: Floats) -> float:
     rising = d[d > 0]
-    return 0.3 * float(np.median(rising[rising > 4.0 * np.median(rising)]))
+    return 0.3 * float(np.median(rising[rising > LARGE * np.median(rising)]))
 
 
 def _measure_step(stamps: Floats, widths: Ints, usual: int) -> float | None:
