@@ -149,7 +149,7 @@ def _members(name: str, data: bytes, limits: ArchiveLimits) -> list[SourceFile]:
     names = {f.name for f in found}
     if is_workbook(names):
         return read_sheets(name, data)
-    if _SPREADSHEET <= names:
+    if names >= _SPREADSHEET:
         raise FormatError(
             "unsupported_format", f"{name} is an OpenDocument spreadsheet; save it as .xlsx or CSV."
         )

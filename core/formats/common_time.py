@@ -25,7 +25,7 @@ WRAP_16: Final = 1 << 16
 ASSUMED_RATE_HZ: Final = 100.0
 """Shown, never used for results: the notice `rate_unknown` is an error."""
 MOST_OFF: Final = 0.02
-"""Share by which a declared rate may differ from that of the time column [our choice: crystals differ by 0.01 %]."""
+"""Share by which a declared rate may differ from the time column's [chosen: crystals are off by 1e-4]."""
 ROUNDED: Final = 0.005
 """Share by which the mean of the usual intervals differs from their median where stamps were rounded."""
 LOSSY: Final = frozenset({"rows_repeated", "rows_unplaced", "stamps_missing"})
@@ -61,7 +61,7 @@ def _rate(d: Draft) -> float:
 
 
 def _with_rate(d: Draft, all_of_take: Sequence[Draft]) -> Draft:
-    """Fill a rate that neither the file nor its clock gives: from the other sensors of the take, else say so."""
+    """Fill a rate that neither file nor clock gives: from the other sensors of the take, else report it."""
     if d.rate_hz is not None:
         return d
     known = {o.rate_hz for o in all_of_take if o.clock == d.clock and o.rate_hz is not None}
@@ -187,8 +187,8 @@ def _without_clock(d: Draft, distinct: int, value: float) -> Draft:
         raise refuse_constant(d.source, d.device_id, len(d.ticks), distinct, value)
     note = Notice(
         "time_constant",
-        f"{d.source}: nearly all time stamps are equal ({value:.6g}), a spreadsheet has probably rounded them. "
-        f"The declared rate of {d.rate_hz:g} Hz was used instead; lost samples cannot be detected.",
+        f"{d.source}: nearly all time stamps are equal ({value:.6g}), a spreadsheet has probably rounded "
+        f"them. The declared rate of {d.rate_hz:g} Hz was used instead; lost samples cannot be detected.",
         d.device_id,
     )
     return replace(d, ticks=np.arange(len(d.ticks)) / d.rate_hz, wrap=None, notices=(*d.notices, note))

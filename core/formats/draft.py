@@ -35,9 +35,9 @@ class Draft:
     acc, gyr, mag : (n, 3), quat : (n, 4); SI units, NaN where missing; None without such columns.
     rate_hz : None = the file does not say. wrap : tick at which the clock starts again; None = a device clock
         never does, a counter at 16 bit, or 32 when it shows more.
-    segment : where it is worn, as the file says it; None = it does not. tick : s of the smallest unit in which
-        a device clock is written, 0 = unknown. part : "gyr", "mag", "linear" (acceleration without gravity) or
-        "gravity" where `acc` holds that signal of a sensor whose others are in other files.
+    segment : where it is worn, as the file says it; None = it does not. tick : s of the smallest unit in
+        which a device clock is written, 0 = unknown. part : "gyr", "mag", "linear" (acceleration without
+        gravity) or "gravity" where `acc` holds that signal of a sensor whose others are in other files.
     """
 
     device_id: str

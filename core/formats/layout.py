@@ -1,4 +1,4 @@
-"""How the text of a table is cut: separator, decimal mark, lines before and of the header. The one rule for it."""
+"""How the text of a table is cut: separator, decimal mark, lines before and of the header."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class TableLayout:
 
     Parameters
     ----------
-    separator : between cells. skip_rows : lines before the header. header_rows : lines of the header, 0 = none.
+    separator : between cells. skip_rows : lines before the header. header_rows : of the header, 0 = none.
     columns : cells of a row. index_column : the header has one cell less, the first column has no name.
     decimal_comma : numbers are written 0,5.
     """
@@ -135,7 +135,7 @@ def _count_header(lines: Sequence[bytes], first: int, width: int, separator: byt
         row = cells(lines[first - header - 1], separator)
         ends = next((i for i, c in enumerate(reversed(row)) if c), 0)
         near = len(row) in (width, width - 1) or len(row) - ends <= width <= len(row)
-        partly = header > 0 and 2 <= len(row) < width and row[0] != "" and len(row) >= width // 2
+        partly = header > 0 and 2 <= len(row) < width and row[0] != "" and count_numbers(row, separator) == 0
         names = any(row) and count_numbers(row, separator) <= len(row) // 2
         if not names or not (near or partly) or text.read_separator(lines[first - header - 1]):
             break

@@ -1,4 +1,4 @@
-"""One sensor from several files: acceleration, rate of turn and magnetic field, each on a clock of its own."""
+"""One sensor from several files: acceleration, rate of turn, magnetic field, each on a clock of its own."""
 
 from __future__ import annotations
 
@@ -80,8 +80,8 @@ def _with_gravity(parts: dict[str, Draft]) -> Draft:
     if linear is not None:
         raise FormatError(
             "gravity_removed",
-            f"{linear.source} holds acceleration without gravity, which is needed for orientation. Export the total "
-            "acceleration (TotalAcceleration), or add the file of gravity (Gravity.csv).",
+            f"{linear.source} holds acceleration without gravity, which is needed for orientation. Export "
+            "the total acceleration (TotalAcceleration), or add the file of gravity (Gravity.csv).",
             sensor=linear.device_id,
         )
     one = next(iter(parts.values()))

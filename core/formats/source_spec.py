@@ -36,8 +36,8 @@ class Channels:
 
     Parameters
     ----------
-    acc, gyr, mag : three names each, x, y, z; a sensor's signals may be spread over several files. quat : four
-        names in the order the source declares.
+    acc, gyr, mag : three names each, x, y, z; a sensor's signals may be spread over several files.
+    quat : four names in the order the source declares.
     """
 
     acc: tuple[str, ...] | None = None
@@ -69,8 +69,8 @@ class SourceSpec:
     file : name or pattern with * and ?, compared with the whole path and with its last part.
     skip_rows : lines before the header. header_rows : lines of the header; None = as found in the file.
     index_column : the first column is no signal.
-    rate_hz : nominal sampling rate. time_column, time_unit : where the time is, and its unit or the length of one
-        tick in s, None = found; counter : what counts the samples; without either the rate makes time.
+    rate_hz : nominal sampling rate. time_column, time_unit : where the time is, and its unit or the length of
+        one tick in s, None = as found; counter : what counts the samples; without either the rate makes time.
     gravity_included : False when the device has already removed gravity (not usable, said so).
     columns : sensor id or segment → its columns; empty for formats that name their columns themselves.
     quat_order : "wxyz" or "xyzw". frame : "sensor" or None.
@@ -176,7 +176,7 @@ def _time_unit(node: JsonNode) -> str | float | None:
     if tick is None or not 1e-9 <= tick <= 86_400.0:
         raise ManifestError(
             "manifest_bad_value",
-            f"{node.at('time_unit')} is {tick:g}; expected the length of one tick in seconds, 0.0001 for 0.1 ms.",
+            f"{node.at('time_unit')} is {tick:g}; expected the length of one tick in s, 0.0001 for 0.1 ms.",
         )
     return tick
 

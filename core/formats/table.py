@@ -68,8 +68,8 @@ class _Layout:
 
     Parameters
     ----------
-    first_row : lines before the rows. titles : of all columns. wanted : columns that are read, as the table names
-        them. times : those of them that may be texts.
+    first_row : lines before the rows. titles : of all columns. wanted : columns that are read. times : those
+        of them that may be texts.
     """
 
     separator: bytes
@@ -219,7 +219,7 @@ def _read_blocks(
             if body.strip():
                 part = memoryview(text.squeeze_blanks(body) if layout.separator == b" " else body)
                 table = layout.read(part, file.name)
-                acc = table.stack(channels.acc) * acc_unit
+                acc = table.stack(channels.acc or ()) * acc_unit
                 gyr = None if channels.gyr is None else table.stack(channels.gyr) * gyr_unit
                 if spec.time_column is None:
                     t_s = (rows + np.arange(len(acc))) / rate
@@ -296,7 +296,7 @@ def _wanted(spec: SourceSpec, titles: list[str], source: str) -> list[str]:
 
 
 def _with_neighbours(spec: SourceSpec, titles: list[str]) -> SourceSpec:
-    """The entry with unique names where a title of several columns can only mean the one next to a named column.
+    """The entry with unique names where a repeated title can only mean the column next to a named one.
 
     As under a header of merged cells: "Accelerometer/X", "Y", "Z" are three columns side by side.
     """
@@ -397,8 +397,8 @@ def _sensor(
         ):
             if values is not None:
                 yield Draft(
-                    device, source, clock, ticks, values, None, None, None, spec.rate_hz, tuple(notices), wrap,
-                    tick=tick, part=part,
+                    device, source, clock, ticks, values, None, None, None, spec.rate_hz, tuple(notices),
+                    wrap, tick=tick, part=part,
                 )  # fmt: skip
         return
     acc = table.stack(channels.acc) * ACC_UNITS[spec.acc_unit or "m/s2"]

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, cast
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as compute
+import pyarrow.compute
 import pyarrow.csv as pc
 
 from sagittal.core.errors import FormatError, Notice
@@ -19,6 +19,8 @@ from sagittal.core.formats.draft import grade_loss
 from sagittal.core.frames import Floats
 from sagittal.core.plurals import plural
 
+compute: Any = pyarrow.compute
+"""Its stubs know no overload for many of these calls."""
 SEPARATORS: Final = (b"\t", b";", b",", b"|", b" ")
 MISSING: Final = ["", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "null", "NULL", "-", "None"]
 LARGEST: Final = 1e30
@@ -132,8 +134,8 @@ def read_columns(
     Parameters
     ----------
     body : rows, starting at a line start. names : titles of all columns in order. wanted : some of them, or
-        names that `number_columns` gives them. times : those of them that may hold dates or times of day as text,
-        which are read as seconds.
+        names that `number_columns` gives them. times : those of them that may hold dates or times of day as
+        text, which are read as seconds.
 
     Raises
     ------
@@ -241,8 +243,9 @@ def _read_values(table: _Table, source: str) -> tuple[dict[str, Floats], int, li
         notices.append(
             Notice(
                 "lines_without_values",
-                f"{source}: {lines} {plural(lines, 'line', 'lines')} among the rows {plural(lines, 'is', 'are')} "
-                f"a header again or a comment and {plural(lines, 'was', 'were')} left out.",
+                f"{source}: {lines} {plural(lines, 'line', 'lines')} among the rows "
+                f"{plural(lines, 'is', 'are')} a header again or a comment and "
+                f"{plural(lines, 'was', 'were')} left out.",
                 severity="info",
             )
         )
@@ -251,7 +254,7 @@ def _read_values(table: _Table, source: str) -> tuple[dict[str, Floats], int, li
 
 
 def _as_numbers(found: pa.Table, table: _Table) -> tuple[pa.Table, int, int]:
-    """Text cells as numbers, without the rows that hold texts alone; how many these are, and other bad cells."""
+    """Text cells as numbers, without rows of texts alone; how many these are, and other bad cells."""
     columns, bad = [], np.zeros(len(found), np.int64)
     for name in table.wanted:
         cells = found[name]

@@ -69,8 +69,8 @@ def find_tick(column: str, values: Floats, rate_hz: float | None, source: str) -
         return 1.0 / (rate_hz * step)
     raise ManifestError(
         "unit_missing",
-        f"{source}: column '{column}' advances by {step:g} from row to row, which in s, ms, µs or ns is no rate of a "
-        "motion sensor. Give time_unit as the length of one tick in seconds, for example 0.0001.",
+        f"{source}: column '{column}' advances by {step:g} from row to row, which in s, ms, µs or ns is no "
+        "rate of a motion sensor. Give time_unit as the length of one tick in seconds, for example 0.0001.",
     )
 
 
@@ -90,8 +90,8 @@ def check_tick(column: str, values: Floats, unit: str, source: str) -> None:
         other = fitting[0]
         raise ManifestError(
             "wrong_time_unit",
-            f"{source}: column '{column}' in '{unit}' would mean {rate:.3g} rows per second; in '{other}' it is "
-            f"{1.0 / (step * TIME_UNITS[other]):.4g}. Correct time_unit.",
+            f"{source}: column '{column}' in '{unit}' would mean {rate:.3g} rows per second; in '{other}' it "
+            f"is {1.0 / (step * TIME_UNITS[other]):.4g}. Correct time_unit.",
         )
 
 

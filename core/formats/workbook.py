@@ -16,7 +16,16 @@ from sagittal.core.formats.source import SourceFile
 
 _BOOK: Final = "xl/workbook.xml"
 _BINARY: Final = "xl/workbook.bin"
-_DAMAGE: Final = (zipfile.BadZipFile, KeyError, ValueError, TypeError, IndexError, AttributeError, OSError, SyntaxError)
+_DAMAGE: Final = (
+    zipfile.BadZipFile,
+    KeyError,
+    ValueError,
+    TypeError,
+    IndexError,
+    AttributeError,
+    OSError,
+    SyntaxError,
+)
 
 
 def is_workbook(members: Iterable[str]) -> bool:

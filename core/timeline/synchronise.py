@@ -63,7 +63,7 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
 
 
 def _merge_alike(notices: list[Notice]) -> list[Notice]:
-    """What is said of several sensors in the same words, as of a table that holds them, is said once of all."""
+    """Merge notices of several sensors of one table that have the same words."""
     merged: dict[tuple[str, str], Notice] = {}
     for n in notices:
         key = n.code, n.message

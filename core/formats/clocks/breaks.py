@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -58,8 +59,8 @@ def mend_breaks(x: Floats, step: float, usual: int, *, seconds: bool, wrap: floa
 
     Parameters
     ----------
-    x : (n,) stamps in s, or counts of samples. step : of one row. usual : rows that share a stamp. wrap : of a
-        narrow counter; a lasting jump back in it is a loss of more than half its range.
+    x : (n,) stamps in s, or counts of samples. step : of one row. usual : rows that share a stamp.
+    wrap : of a narrow counter; a lasting jump back in it is a loss of more than half its range.
     """
     y, repairs = _remove_known(x, step) if seconds else (x.copy(), [])
     x = y.copy()
@@ -72,7 +73,7 @@ def mend_breaks(x: Floats, step: float, usual: int, *, seconds: bool, wrap: floa
     if not pieces:
         return Breaks(y, (), None)
     y[_find_strays(level, pieces, _FAR_S if seconds else _FAR_ROWS)] = np.nan
-    for (a, b), (c, d) in zip(pieces[:-1], pieces[1:], strict=True):
+    for (a, b), (c, d) in pairwise(pieces):
         jump = float(np.median(level[c : min(d, c + _EDGE)]) - np.median(level[max(a, b - _EDGE) : b]))
         # rows between two believed stretches belong to the later one where they are at its level
         at = c

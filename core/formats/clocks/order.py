@@ -18,7 +18,7 @@ class SortedRuns:
     Parameters
     ----------
     order : (k,) indices of the runs that are kept. wrong : (k,) whether the stamp of each is to be ignored.
-    moved, repeated, unplaced : indices of runs that were sorted, dropped as duplicates, dropped without a place.
+    moved, repeated, unplaced : runs that were sorted, dropped as duplicates, dropped without a place.
     """
 
     order: Ints
@@ -92,7 +92,7 @@ class _Sorting:
     def has_room(self, group: Ints) -> bool:
         """Whether as many rows are missing where the group is in the file."""
         at = int(np.searchsorted(self._chain, group[0]))
-        return self._room(at) >= self._widths[group].sum() - 0.4
+        return bool(self._room(at) >= self._widths[group].sum() - 0.4)
 
     def distrust(self, group: Ints) -> None:
         """Keep the place of a group and ignore its stamps, but for duplicates."""

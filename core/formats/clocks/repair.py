@@ -1,13 +1,13 @@
 """Stamps or counts of a column as written → true times of its rows (docs/science/timeline.md, "Clocks").
 
-Order of work: rows without a stamp; wraps; rows stored twice; lasting breaks; rows out of order and wrong stamps;
-stamps that several rows share. A column without any of these is returned as it is, to the bit.
+Order of work: rows without a stamp; wraps; rows stored twice; lasting breaks; rows out of order and wrong
+stamps; stamps that several rows share. A column without any of these is returned as it is, to the bit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -59,9 +59,9 @@ def repair_clock(
 
     Parameters
     ----------
-    ticks : (n,) stamps in s or counts of samples, NaN where missing. signals : (n, c) of the same rows, by which
-        duplicates are recognised. seconds : what `ticks` are. wrap : known range of the clock, in the unit of `ticks`. tick :
-        smallest unit of the column as written, in that unit; 0 = unknown.
+    ticks : (n,) stamps in s or counts of samples, NaN where missing. signals : (n, c) of the same rows, by
+        which duplicates are recognised. seconds : what `ticks` are. wrap : known range of the clock, in the
+        unit of `ticks`. tick : smallest unit of the column as written, in that unit; 0 = unknown.
     """
     known = np.isfinite(ticks)
     if seconds and known.sum() > 1 and np.ptp(ticks[known]) < _LEAST_SPAN_S:
@@ -89,66 +89,76 @@ def repair_clock(
     if (lead := int(np.argmax(known[rows]))) > 0:
         x[:lead] = x[lead] - runs.step * np.arange(lead, 0, -1)
         runs = find_packets(x)
-    if wrap is None and (found := find_wrap(x, runs.step, runs.usual, tick, seconds=seconds)) is not None:
+    step = runs.step or 1.0
+    if wrap is None and (found := find_wrap(x, step, runs.usual, tick, seconds=seconds)) is not None:
         repairs.append(_describe_wrap(x, rows, *found))
         x = unwrap(x, found[0])
         runs = find_packets(x)
-    return _repair(x, rows, table[rows], ~known[rows], runs, repairs, seconds=seconds, wrap=wrap)
+    found_rows = _Rows(x, rows, _hash_rows(table[rows]), ~known[rows])
+    return _repair(found_rows, runs, repairs, seconds=seconds, wrap=wrap)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Rows of a file: stamps, place in the file, a number of the signals, whether the stamp was filled in."""
+
+    x: Floats
+    at: Ints
+    same: Floats
+    filled: Bools
+
+    def without(self, drop: Bools) -> _Rows:
+        """All rows but some."""
+        return _Rows(self.x[~drop], self.at[~drop], self.same[~drop], self.filled[~drop])
 
 
 def _repair(
-    x: Floats,
-    rows: Ints,
-    signals: Floats,
-    filled: Bools,
-    runs: Packets,
-    repairs: list[Repair],
-    *,
-    seconds: bool,
-    wrap: float | None,
+    rows: _Rows, runs: Packets, repairs: list[Repair], *, seconds: bool, wrap: float | None
 ) -> RepairedClock:
     """Breaks, order and sharing of stamps whose wraps are undone."""
-    assert runs.step is not None
-    same = _hash_rows(signals)
-    twice = _find_twice(x, same, runs)
-    if twice.any():
-        repairs.append(report.describe_repeats(int(twice.sum()), int(rows[twice][0])))
-        x, rows, same, filled = (a[~twice] for a in (x, rows, same, filled))
-        runs = find_packets(x)
+    rows, runs = _drop_twice(rows, runs, np.zeros(len(rows.x), np.bool_), repairs)
     step = runs.step or 1.0
     narrow = wrap if wrap is not None and wrap <= _NARROW and not seconds else None
-    broken = mend_breaks(x, step, runs.usual, seconds=seconds, wrap=narrow)
+    broken = mend_breaks(rows.x, step, runs.usual, seconds=seconds, wrap=narrow)
     if broken.restart is not None:
-        return RepairedClock(rows, x, step, restart=int(rows[broken.restart]))
+        return RepairedClock(rows.at, rows.x, step, restart=int(rows.at[broken.restart]))
     repairs += broken.repairs
-    written = x
+    written = rows.x
     strange = np.isnan(broken.stamps)
-    x = _join_equal(_fill(broken.stamps), 8.0 * float(np.spacing(np.abs(x).max())))
     if broken.repairs or strange.any():
-        runs = find_packets(x)
-        again = _find_twice(x, same, runs) & ~strange
-        if again.any():
-            repairs.append(report.describe_repeats(int(again.sum()), int(rows[again][0])))
-            x, rows, same, filled, strange = (a[~again] for a in (x, rows, same, filled, strange))
-            written = written[~again]
-            runs = find_packets(x)
-    step = runs.step or step
-    widths = runs.widths(len(x))
-    filled |= strange
-    ordered = sort_runs(runs.stamps, widths, step, np.add.reduceat(same, runs.first))
+        x = _join_equal(_fill(broken.stamps), 8.0 * float(np.spacing(np.abs(written).max())))
+        rows = replace(rows, x=x, filled=rows.filled | strange)
+        before = len(rows.x)
+        rows, runs = _drop_twice(rows, find_packets(x), strange, repairs)
+        if len(rows.x) < before:
+            strange, written = np.zeros(len(rows.x), np.bool_), rows.x
+        step = runs.step or step
+    x, widths = rows.x, runs.widths(len(rows.x))
+    ordered = sort_runs(runs.stamps, widths, step, np.add.reduceat(rows.same, runs.first))
     where = _rows_of(runs.first, widths, ordered.order)
     ignored = ordered.wrong
     if runs.usual > 1:  # the first rows of a run after rows without a stamp may be among these
-        ignored = ignored | (filled[runs.first - 1] & (runs.first > 0))[ordered.order]
+        ignored = ignored | (rows.filled[runs.first - 1] & (runs.first > 0))[ordered.order]
     spread = spread_rows(runs.stamps[ordered.order], widths[ordered.order], ignored, step, runs.usual)
-    repairs += _describe_order(ordered, runs, widths, rows)
+    repairs += _describe_order(ordered, runs, widths, rows.at)
     wrong = np.repeat(ordered.wrong, widths[ordered.order]) | strange[where]
-    written = np.where(strange, written, x)
-    repairs += _describe_spread(written, rows, where, spread, wrong, filled[where], runs, seconds=seconds)
+    found = replace(
+        rows, x=np.where(strange, written, x)[where], at=rows.at[where], filled=rows.filled[where]
+    )
+    repairs += _describe_spread(found, spread, wrong, runs, seconds=seconds)
     keep = ~spread.extra
-    out = RepairedClock(rows[where][keep], spread.ticks[keep], spread.step, ())
-    blind = _find_blind(out.ticks, wrap, seconds=seconds) if wrap is not None else ()
-    return RepairedClock(out.rows, out.ticks, out.step, (*repairs, *blind))
+    blind = _find_blind(spread.ticks[keep], wrap, seconds=seconds) if wrap is not None else ()
+    return RepairedClock(found.at[keep], spread.ticks[keep], spread.step, (*repairs, *blind))
+
+
+def _drop_twice(rows: _Rows, runs: Packets, but: Bools, repairs: list[Repair]) -> tuple[_Rows, Packets]:
+    """Rows without those that were stored twice."""
+    twice = _find_twice(rows.x, rows.same, runs) & ~but
+    if not twice.any():
+        return rows, runs
+    repairs.append(report.describe_repeats(int(twice.sum()), int(rows.at[twice][0])))
+    rows = rows.without(twice)
+    return rows, find_packets(rows.x)
 
 
 def _is_clean(x: Floats, *, seconds: bool) -> bool:
@@ -237,29 +247,22 @@ def _describe_order(ordered: SortedRuns, runs: Packets, widths: Ints, rows: Ints
 
 
 def _describe_spread(
-    x: Floats,
-    rows: Ints,
-    where: Ints,
-    spread: Spread,
-    wrong: Bools,
-    filled: Bools,
-    runs: Packets,
-    *,
-    seconds: bool,
+    rows: _Rows, spread: Spread, wrong: Bools, runs: Packets, *, seconds: bool
 ) -> list[Repair]:
+    """What was done to rows (n,) in their true order."""
     out = []
-    at = rows[where]
     wrong = wrong & ~spread.extra
     if wrong.any():
-        off = np.nanmax(np.abs(x[where][wrong] - spread.ticks[wrong]))
-        out.append(report.describe_wrong(int(wrong.sum()), int(at[wrong].min()), float(off)))
+        off = np.nanmax(np.abs(rows.x[wrong] - spread.ticks[wrong]))
+        out.append(report.describe_wrong(int(wrong.sum()), int(rows.at[wrong].min()), float(off)))
     if spread.extra.any():
-        out.append(report.describe_no_time_left(int(spread.extra.sum()), int(at[spread.extra].min())))
+        first = int(rows.at[spread.extra].min())
+        out.append(report.describe_no_time_left(int(spread.extra.sum()), first))
     if spread.late.any():
-        out.append(report.describe_late(int(spread.late.sum()), int(at[spread.late].min())))
+        out.append(report.describe_late(int(spread.late.sum()), int(rows.at[spread.late].min())))
     if runs.usual > 1:
-        most = int(np.quantile(runs.widths(len(x)), 0.99, method="higher"))
+        most = int(np.quantile(runs.widths(len(rows.x)), 0.99, method="higher"))
         out.append(report.describe_shared(most, 1.0 / spread.step if seconds else None))
-    elif (shared := spread.shared & ~filled).any():
-        out.append(report.describe_equal_neighbours(int(shared.sum()), int(at[shared].min())))
+    elif (shared := spread.shared & ~rows.filled).any():
+        out.append(report.describe_equal_neighbours(int(shared.sum()), int(rows.at[shared].min())))
     return out

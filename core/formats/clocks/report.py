@@ -15,8 +15,8 @@ class Repair:
 
     Parameters
     ----------
-    code : stable identifier, snake_case. rows : number of rows concerned. message : what was found, where, and
-        what was done, without the name of the file.
+    code : stable identifier, snake_case. rows : number of rows concerned. message : what was found, where,
+        and what was done, without the name of the file.
     """
 
     code: str
@@ -81,8 +81,8 @@ def describe_repeats(rows: int, first: int) -> Repair:
     return Repair(
         "rows_repeated",
         rows,
-        f"{rows} {plural(rows, 'row was', 'rows were')} stored twice (first: row {first + 1}); the duplicates "
-        "were removed.",
+        f"{rows} {plural(rows, 'row was', 'rows were')} stored twice (first: row {first + 1}); the "
+        "duplicates were removed.",
     )
 
 
@@ -101,8 +101,8 @@ def describe_late(rows: int, first: int) -> Repair:
     return Repair(
         "stamps_late",
         rows,
-        f"{rows} {plural(rows, 'row has', 'rows have')} the time of a delayed transmission instead of the time "
-        f"of measurement (first: row {first + 1}); {plural(rows, 'it was', 'they were')} spread evenly.",
+        f"{rows} {plural(rows, 'row has', 'rows have')} the time of a delayed transmission instead of the "
+        f"time of measurement (first: row {first + 1}); {plural(rows, 'it was', 'they were')} spread evenly.",
     )
 
 
@@ -122,8 +122,8 @@ def describe_shared(most: int, rate_hz: float | None) -> Repair:
     return Repair(
         "stamps_shared",
         most,
-        f"Up to {most} rows share one time stamp (packets, or times without enough decimals); they were spread "
-        f"evenly{at}.",
+        f"Up to {most} rows share one time stamp (packets, or times without enough decimals); they were "
+        f"spread evenly{at}.",
     )
 
 
@@ -142,8 +142,9 @@ def describe_blind(rows: int, first: int, wrap: float) -> Repair:
     return Repair(
         "counter_blind",
         rows,
-        f"The counter starts again after {wrap:.0f} samples, so {plural(rows, 'a loss', 'each of the losses')} "
-        f"(first: row {first + 1}) may be {wrap:.0f} samples longer, or a multiple of it. Strides next to "
+        f"The counter starts again after {wrap:.0f} samples, so "
+        f"{plural(rows, 'a loss', 'each of the losses')} (first: row {first + 1}) may be {wrap:.0f} "
+        "samples longer, or a multiple of it. Strides next to "
         f"{plural(rows, 'it', 'them')} are left out.",
         "warning",
     )
@@ -154,8 +155,8 @@ def describe_no_time_left(rows: int, first: int) -> Repair:
     return Repair(
         "rows_repeated",
         rows,
-        f"{rows} {plural(rows, 'row repeats', 'rows repeat')} the time or count of the row before (first: row "
-        f"{first + 1}) and {plural(rows, 'was', 'were')} left out.",
+        f"{rows} {plural(rows, 'row repeats', 'rows repeat')} the time or count of the row before (first: "
+        f"row {first + 1}) and {plural(rows, 'was', 'were')} left out.",
     )
 
 
@@ -163,8 +164,8 @@ def refuse_restart(source: str, device: str, row: int, rows: int, t_s: float | N
     """A clock that starts again: two recordings in one file."""
     return FormatError(
         "counter_restart",
-        f"{source}: at row {row + 1} of {rows} the packet counter or time starts again, so the file holds two "
-        "recordings. Export them separately.",
+        f"{source}: at row {row + 1} of {rows} the packet counter or time starts again, so the file holds "
+        "two recordings. Export them separately.",
         sensor=device,
         t_s=t_s,
     )
@@ -183,7 +184,7 @@ def refuse_constant(source: str, device: str, rows: int, distinct: int, value: f
     return FormatError(
         "time_constant",
         f"{source}: {many} of the {rows} time stamps are equal ({value:.6g}); a spreadsheet has probably "
-        "rounded them. Export the file again without opening it in a spreadsheet, or remove the time column "
-        "and give rate_hz in the manifest.",
+        "rounded them. Export the file again without opening it in a spreadsheet, or give rate_hz in the "
+        "manifest.",
         sensor=device,
     )

@@ -1,8 +1,9 @@
 """Dates and times of day as texts → seconds.
 
-Read are ISO 8601 with and without zone and its relatives: "2024-02-07 11:27:27.350", "2024-02-07T11:27:27,350+01:00",
-"2024-02-07 11:27:27:350" (GENEActiv), "2024-02-07T11.27.27.350" (MetaMotion), "20240207_112727.350", "7.2.2024 11:27:27",
-"2/7/2024 11:27:27 AM", "11:27:27.350", "[2024-02-07 11:27:27]". Month or day first is told by all rows of a column.
+Read are ISO 8601 with and without zone and its relatives: "2024-02-07 11:27:27.350",
+"2024-02-07T11:27:27,350+01:00", "2024-02-07 11:27:27:350" (GENEActiv), "2024-02-07T11.27.27.350"
+(MetaMotion), "20240207_112727.350", "7.2.2024 11:27:27", "2/7/2024 11:27:27 AM", "7-Feb-2024 11:27:27",
+"11:27:27.350", "[2024-02-07 11:27:27]". Whether the month or the day comes first is decided by all rows.
 """
 
 from __future__ import annotations
@@ -11,10 +12,12 @@ from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
+import pyarrow.compute
 
 from sagittal.core.frames import Floats
 
+pc: Any = pyarrow.compute
+"""Its stubs know no overload for many of these calls."""
 _TIME: Final = (
     r"(?P<hour>\d{1,2})[:.h]?(?P<minute>\d{2})(?:[:.m]?(?P<second>\d{2})(?:[.,:](?P<fraction>\d{1,9}))?)?s?"
     r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?"

@@ -50,8 +50,8 @@ def find_wrap(x: Floats, step: float, usual: int, tick: float, *, seconds: bool)
 
     Parameters
     ----------
-    x : (n,) stamps. step : of one row. usual : rows that share a stamp. tick : length of the smallest unit of the column as written, in the unit
-        of x, 0 = unknown. seconds : x is in seconds, else it counts samples.
+    x : (n,) stamps. step : of one row. usual : rows that share a stamp. tick : length of the smallest unit
+        of the column as written, in the unit of x, 0 = unknown. seconds : x is in s, else it counts samples.
     """
     if not (np.diff(x) < 0).any():
         return None

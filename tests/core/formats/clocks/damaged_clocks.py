@@ -20,8 +20,8 @@ class DamagedClock:
     Parameters
     ----------
     stamps : (n,) of every row. sample : (n,) number of the sample that the row is. step : true interval.
-    seconds : whether stamps are in s, else counts. causes : codes that should be reported. exact_to : error of
-        the true axis that the fault makes unavoidable, in samples.
+    seconds : whether stamps are in s, else counts. causes : codes that should be reported.
+    packet : rows whose order in time nothing tells.
     """
 
     stamps: Floats
@@ -230,18 +230,19 @@ def delay(clock: DamagedClock, rng: np.random.Generator) -> None:
 FAULTS: dict[str, Callable[[DamagedClock, np.random.Generator], None]] = {
     f.__name__: f
     for f in (
-        share_packets, share_jittered_packets, burst, cut_decimals, one_leaps, zeros, packet_end_leaps, all_leap,
-        swap_packets, send_twice, lose, repeat_stamps, blank, midnight, wrap_ticks, count, start_again, round_all,
-        delay,
+        share_packets, share_jittered_packets, burst, cut_decimals, one_leaps, zeros, packet_end_leaps,
+        all_leap, swap_packets, send_twice, lose, repeat_stamps, blank, midnight, wrap_ticks, count,
+        start_again, round_all, delay,
     )
 }  # fmt: skip
 """Faults by name."""
 
 PAIRS = [
-    ("swap_packets", "send_twice"), ("lose", "swap_packets"), ("one_leaps", "lose"), ("all_leap", "one_leaps"),
-    ("blank", "all_leap"), ("midnight", "one_leaps"), ("share_packets", "lose"), ("send_twice", "all_leap"),
-    ("blank", "swap_packets"), ("lose", "midnight"), ("repeat_stamps", "one_leaps"), ("share_packets", "all_leap"),
-    ("share_packets", "blank"), ("lose", "all_leap"),
+    ("swap_packets", "send_twice"), ("lose", "swap_packets"), ("one_leaps", "lose"),
+    ("all_leap", "one_leaps"), ("blank", "all_leap"), ("midnight", "one_leaps"), ("share_packets", "lose"),
+    ("send_twice", "all_leap"), ("blank", "swap_packets"), ("lose", "midnight"),
+    ("repeat_stamps", "one_leaps"), ("share_packets", "all_leap"), ("share_packets", "blank"),
+    ("lose", "all_leap"),
 ]  # fmt: skip
 """Faults that are also tried together."""
 
