@@ -1,9 +1,8 @@
-"""The languages of the pages: English is written in the sources, the others are catalogues in web/texts.
+"""Languages of the pages: English in the sources, others as catalogues in web/texts.
 
-A message is an English text with `{placeholders}`: what a template, a page module or `core` says. A sentence
-that was made from it, now or in a result stored years ago, is found again by the pattern of the message; what
-stands in its placeholders is translated by itself, numbers and dates by the locale
-(docs/how-to/languages.md).
+A message is an English text with `{placeholders}` from a template, a page module or `core`. A sentence
+formatted from it, now or in a stored result, is recognized by the pattern of the message; the values of its
+placeholders are translated separately, numbers and dates by locale (docs/how-to/languages.md).
 """
 
 from __future__ import annotations
@@ -75,7 +74,7 @@ CITED: Final = re.compile(
 
 
 def choose_language(accepted: str | None) -> str:
-    """The language of the pages that a browser's Accept-Language asks for first.
+    """Choose the language of the pages from a browser's Accept-Language.
 
     >>> choose_language("fr-CH, de-CH;q=0.9, en;q=0.8"), choose_language("de;q=0.2, en")
     ('de', 'en')
@@ -94,11 +93,11 @@ def choose_language(accepted: str | None) -> str:
 
 
 class Catalogue:
-    """The texts of one language.
+    """Translations of one language.
 
     Parameters
     ----------
-    messages : English text with {placeholders} → text of the language with the same, or some of them.
+    messages : English text with {placeholders} → translation with the same placeholders, or some of them.
     """
 
     def __init__(self, language: str, messages: Mapping[str, str]) -> None:
@@ -113,18 +112,18 @@ class Catalogue:
         self._known = functools.lru_cache(maxsize=20_000)(self._find)
 
     def fill(self, message: str, values: Mapping[str, str]) -> str:
-        """The text of a message with values that are said already; English where the catalogue has none."""
+        """Translation of a message with translated values; English if the catalogue has none."""
         return fill_placeholders(self.messages.get(message, message), values)
 
     def find(self, text: str) -> str | None:
-        """A text in this language; None where no part of it is made from a message."""
+        """Translation of a text; None if no part of it matches a message."""
         masked, quotations = self._mask(text)
         known = self._known(masked)
         said = self._loosely(masked.strip()) if known is None else known
         return None if said is None else self._unmask(said, quotations)
 
     def _mask(self, text: str) -> tuple[str, list[str]]:
-        """Put a sign for each quotation, which no message has and no number is part of."""
+        """Replace each quotation by a character that occurs in no message or number."""
         quotations: list[str] = []
 
         def mask(found: re.Match[str]) -> str:
@@ -145,12 +144,12 @@ class Catalogue:
         return said
 
     def translate(self, text: str) -> str:
-        """A text in this language, English where it is made from no message."""
+        """Translation of a text, English if it matches no message."""
         known = self.find(text)
         return text if known is None else known
 
     def _loosely(self, text: str) -> str | None:
-        """A sentence with words of somebody else in it, or sentences of which some are known."""
+        """Translate a sentence with foreign text in it, or several sentences of which some are known."""
         made = self._by_pattern(text, strong=True, loose=True) if len(text) <= LONGEST else None
         made = made or self._by_sentences(_SENTENCE.split(text), partly=True)
         return text if made is None and CITED.search(text) else made
@@ -184,14 +183,14 @@ class Catalogue:
         )
 
     def _before_stop(self, text: str) -> str | None:
-        """A message after which a page has set a full stop."""
+        """Translate a message followed by a full stop added by a page."""
         if text[-1] not in ".:;" or len(text) < 2:
             return None
         before = self._known(text[:-1])
         return None if before is None else before + text[-1]
 
     def _plain(self, text: str) -> str | None:
-        """A date, a number, or a name of capitals."""
+        """Format a date, a number, or a name in capitals."""
         date = _DATE.fullmatch(text)
         if date:
             return self._date(date)
@@ -205,7 +204,7 @@ class Catalogue:
         return None
 
     def _measured(self, text: str) -> str | None:
-        """A number and its unit, or a word and its number."""
+        """Translate a number with its unit, or a word with its number."""
         numbered = _NUMBERED.fullmatch(text)
         if numbered and (word := self._known(numbered[1])) is not None:
             return word + self._localise(numbered[2])
@@ -223,7 +222,7 @@ class Catalogue:
         return self.day(value) if year else str(format_date(value, "d. MMM", locale=self._locale))
 
     def _by_pattern(self, text: str, *, strong: bool, loose: bool = False) -> str | None:
-        """A sentence that was made from a message; `loose` = whatever stands in its placeholders."""
+        """Translate a sentence formatted from a message; `loose` = with any values of its placeholders."""
         for pattern in self._patterns:
             if pattern.is_strong != strong:
                 continue
@@ -234,7 +233,7 @@ class Catalogue:
         return None
 
     def _fill_pattern(self, pattern: _Pattern, values: Mapping[str, str]) -> str:
-        """The text of a message whose values are not said yet; numbers are localised, except in user text."""
+        """Fill a message with untranslated values; numbers are localised, except in user text."""
         said: dict[str, str] = {}
         settled: dict[str, str] = {}
         for n, (name, value) in enumerate(values.items()):
@@ -249,7 +248,7 @@ class Catalogue:
         return re.sub("|".join(settled) or "(?!)", lambda found: settled[found[0]], filled)
 
     def _stands_alone(self, value: str) -> bool:
-        """Whether a value is a word or a message by itself, not a piece of another sentence."""
+        """Whether a value is a single word or complete message rather than part of a sentence."""
         return (
             not re.search(r"\s", value.strip())
             or self._known(value) is not None
@@ -257,7 +256,7 @@ class Catalogue:
         )
 
     def _by_parts(self, text: str) -> str | None:
-        """A text of parts that are messages."""
+        """Translate a text composed of messages."""
         for join in _JOINS:
             if text.count(join) >= MOST_PARTS:
                 continue
@@ -292,7 +291,9 @@ class Catalogue:
         )
 
     def _by_sentences(self, sentences: list[str], *, partly: bool) -> str | None:
-        """Sentences one after another, those of one message together; `partly` = some may stay."""
+        """Translate consecutive sentences, jointly if they form one message; `partly` = allow unknown
+        ones.
+        """
         said: list[str] = []
         found = False
         while sentences and (len(sentences) > 1 or said):
@@ -313,7 +314,7 @@ class Catalogue:
         return " ".join(said) if found else None
 
     def _localise(self, text: str) -> str:
-        """Numbers and dates inside a text as this language writes them."""
+        """Localise numbers and dates within a text."""
         mark = format_decimal(0.1, locale=self._locale)[1]
         return _DECIMAL.sub(rf"\1{mark}\2", _DATE.sub(self._date, text))
 
@@ -323,7 +324,7 @@ class Catalogue:
 
 
 def find_verbatim(message: str) -> frozenset[str]:
-    """Placeholders of a message that hold user text: those in quotation marks, and `IDENTIFIERS`.
+    """Placeholders of a message that contain user text: those in quotation marks, and `IDENTIFIERS`.
 
     >>> sorted(find_verbatim("Sensor {device}: {value} Hz in '{name}' and “{title}”."))
     ['device', 'name', 'title']
@@ -334,7 +335,7 @@ def find_verbatim(message: str) -> frozenset[str]:
 
 
 class _Pattern:
-    """How the sentences of one message look."""
+    """Pattern of the sentences formatted from one message."""
 
     def __init__(self, text: str, said: str) -> None:
         self.said = said
@@ -360,7 +361,7 @@ class _Pattern:
         self._forms = [re.compile(form, re.DOTALL | re.IGNORECASE) for form in dict.fromkeys(forms)]
 
     def match(self, text: str) -> Iterator[dict[str, str]]:
-        """What may stand in the placeholders; nothing if the text is not made from this message."""
+        """Yield possible values of the placeholders; none if the text does not match."""
         if (text.endswith(".") and not self._stops) or self._longest not in text.casefold():
             return
         before: tuple[str, ...] = ()
@@ -372,17 +373,17 @@ class _Pattern:
 
 
 def fill_placeholders(said: str, values: Mapping[str, str]) -> str:
-    """A text with values in the place of its `{placeholders}`; one without a value stays."""
+    """Replace `{placeholders}` by their values; those without a value remain."""
     return PLACEHOLDER.sub(lambda m: values.get(m[1], m[0]), said)
 
 
 def _with_case(text: str, said: str) -> str:
-    """A capital where the English begins with one; German nouns keep theirs."""
+    """Capitalize if the English text is capitalized; German nouns keep their capitals."""
     return said[:1].upper() + said[1:] if text[:1].isupper() else said
 
 
 def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:
-    """Message, text and the files it comes from, of every translated message of a .po file."""
+    """Yield message, translation and source files of every translated message of a .po file."""
     with path.open("rb") as file:
         for entry in read_po(file):
             if entry.id and entry.string:
@@ -390,7 +391,7 @@ def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:
 
 
 def catalogue_path(language: str) -> Path:
-    """Where the texts of a language are."""
+    """Path of a language's catalogue."""
     return Path(__file__).parent / "texts" / f"{language}.po"
 
 
@@ -430,7 +431,7 @@ SCRIPT_PLACES: Final = (
 
 @functools.cache
 def script_texts(language: str) -> tuple[str, bytes]:
-    """What the scripts say in a language as JSON, and the hash of it that its address carries."""
+    """Translations used by scripts as JSON, and their hash for the URL."""
     said = {
         text: words
         for text, words, files in read_messages(catalogue_path(language))
@@ -442,7 +443,7 @@ def script_texts(language: str) -> tuple[str, bytes]:
 
 @functools.cache
 def load_catalogue(language: str) -> Catalogue:
-    """The catalogue of a language other than that of the sources, read once."""
+    """Load the catalogue of a language other than English, cached."""
     return Catalogue(
         language,
         {

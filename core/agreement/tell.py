@@ -1,4 +1,4 @@
-"""Words for what the sensors say about each other."""
+"""Messages of the consistency checks between sensors."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ KEPT: Final = "The recording itself keeps its own times."
 
 
 def say_lag(lag: SensorLag) -> str:
-    """Whose clock is late, by how much."""
+    """Message about a late clock."""
     ms, sd = 1e3 * abs(lag.lag_s), 1e3 * lag.sd_s
     verb, which = "is" if lag.sure else "seems", "late" if lag.lag_s > 0 else "early"
     return f"The clock of {list_sensors(lag.sensors)} {verb} {ms:.0f} ± {sd:.0f} ms {which}"
 
 
 def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
-    """Say whose clock is late, and what was done about it."""
+    """Notice about a late clock and its correction."""
     said = say_lag(lag)
     if not lag.sure:
         return Notice(
@@ -54,7 +54,7 @@ def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
 
 
 def tell_drift(drift: SensorDrift, params: LagParams) -> Notice:
-    """Say whose clock runs slow or fast."""
+    """Notice about a clock that runs slow or fast."""
     ms, sd = 1e3 * abs(drift.change_s), 1e3 * drift.sd_s
     which = "slow" if drift.change_s > 0 else "fast"
     done = "its samples were laid where they belong. " if params.repair else "it was left so. "
@@ -67,13 +67,13 @@ def tell_drift(drift: SensorDrift, params: LagParams) -> Notice:
 
 
 def say_exchange(exchange: SensorExchange) -> str:
-    """Which sensors were put on each other's segments."""
+    """Message about swapped sensors."""
     whose = " and ".join(f"{a} with {b}" for a, b in exchange.swap)
     return f"The joints show that sensors are exchanged: {whose}."
 
 
 def tell_exchange(exchange: SensorExchange, params: ExchangeParams) -> Notice:
-    """Say which sensors were put on each other's segments."""
+    """Notice about swapped sensors."""
     done = (
         "The take was analysed with them the right way round. Look who wears what and correct it."
         if params.repair
@@ -87,7 +87,7 @@ def tell_exchange(exchange: SensorExchange, params: ExchangeParams) -> Notice:
 
 
 def say_slip(slip: SensorSlip) -> str:
-    """Which sensor slipped, when and how far."""
+    """Message about a slipped sensor, with time and angle."""
     angle, sd = np.degrees(abs(slip.turn_rad)), np.degrees(slip.sd_rad)
     if slip.at_rest:
         return (
@@ -98,7 +98,7 @@ def say_slip(slip: SensorSlip) -> str:
 
 
 def tell_slip(slip: SensorSlip, params: SlipParams) -> Notice:
-    """Say which sensor slipped, when, how far, and what follows from it."""
+    """Notice about a slipped sensor, with time, angle and consequences."""
     if not params.repair:
         done = "It was left so, as this analysis was told to. Angles beside it are withheld from there on."
     elif slip.at_rest:
@@ -122,7 +122,7 @@ def tell_slip(slip: SensorSlip, params: SlipParams) -> Notice:
 
 
 def tell_left_over(lag: SensorLag) -> Notice:
-    """Say that a lag is left after the repair."""
+    """Notice about a lag that remains after correction."""
     return Notice(
         "clocks_disagree",
         f"After the repair {list_sensors(lag.sensors)} still seems {1e3 * abs(lag.lag_s):.0f} ms off the "
@@ -132,7 +132,7 @@ def tell_left_over(lag: SensorLag) -> Notice:
 
 
 def list_sensors(sensors: Sequence[str]) -> str:
-    """Name sensors in a sentence.
+    """List sensors in a sentence.
 
     >>> list_sensors(["thigh_l", "shank_l", "foot_l"])
     'thigh_l, shank_l and foot_l'

@@ -1,4 +1,4 @@
-"""Words for the same while samples come: nothing is repaired yet, the analysis of the take does that."""
+"""Messages of the streaming consistency checks: nothing is corrected until the recording is analysed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ AGAIN: Final = "sensors_agree_again"
 
 
 def tell_lag_now(lag: SensorLag, params: LagParams, t_s: float) -> Notice:
-    """Say whose clock is late."""
+    """Notice about a late clock."""
     if not lag.sure:
         todo = "One joint alone shows it. Synchronise the sensors and record again."
         return Notice("clocks_disagree", f"{say_lag(lag)}. {todo}", lag.sensors[0], t_s)
@@ -31,7 +31,7 @@ def tell_lag_now(lag: SensorLag, params: LagParams, t_s: float) -> Notice:
 
 
 def tell_exchange_now(exchange: SensorExchange, t_s: float) -> Notice:
-    """Say which sensors were put on each other's segments."""
+    """Notice about swapped sensors."""
     return Notice(
         "sensors_exchanged",
         f"{say_exchange(exchange)} The live figure is wrong; the analysis of the take puts it right. Correct "
@@ -42,7 +42,7 @@ def tell_exchange_now(exchange: SensorExchange, t_s: float) -> Notice:
 
 
 def tell_slip_now(slip: SensorSlip) -> Notice:
-    """Say which sensor slipped, when and how far."""
+    """Notice about a slipped sensor, with time and angle."""
     return Notice(
         "sensor_slipped",
         f"{say_slip(slip)} Angles beside it are wrong from there on. Fasten the sensor and calibrate again.",
@@ -52,7 +52,7 @@ def tell_slip_now(slip: SensorSlip) -> Notice:
 
 
 def take_back(told: Notice, sensors: tuple[str, ...], t_s: float) -> Notice:
-    """Say that what was told holds no more."""
+    """Notice that an earlier notice no longer holds."""
     what = {
         "sensors_exchanged": "The sensors of {} fit where they are worn now.",
         "sensor_slipped": "The sensor on {} sits as it did before it slipped.",

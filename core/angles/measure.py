@@ -1,4 +1,4 @@
-"""Orientations of a take → its joint angles, zeroed on standing (docs/science/joint-angles.md)."""
+"""Orientations of a recording → joint angles relative to standing (docs/science/joint-angles.md)."""
 
 from __future__ import annotations
 
@@ -32,23 +32,24 @@ def measure_angles(
     posture: Posture = "standing",
     dropped: Collection[str] = (),
 ) -> JointAngles:
-    """Angles of every joint whose two segments are there, zeroed on the mean over a window.
+    """Angles of every joint with both segments available, zeroed on the mean over a window.
 
     Parameters
     ----------
     orientations : segment orientations in W.
     zero : window whose mean angles are subtracted, seconds.
-    poses : of an estimator that knows more segments than have a sensor. A joint that has not both its sensors
-        takes its angles from there; `diagnostics["estimated"]` names them.
-    standing_deg : goniometer angles of that standing; kept beside the angles, not added.
-    posture : what was done in that window. From the mean of walking no goniometer leads to the anatomical
-        zero.
-    dropped : angles taken from `poses` that nobody wants: they have a zero and notices, and are not held.
+    poses : pose estimate covering more segments than have a sensor. A joint without both sensors takes its
+    angles from it; `diagnostics["estimated"]` lists them.
+    standing_deg : goniometer angles in the same standing posture; stored with the angles, not added.
+    posture : activity in that window. With the mean of walking, goniometer angles cannot provide the
+    anatomical zero.
+    dropped : angles from `poses` that are not requested: their zero and notices are computed, their samples
+    are not stored.
 
     Returns
     -------
     JointAngles; a joint with a missing segment has no entry and a notice `joint_missing`, a joint whose |b|
-    passes 80° a notice `gimbal`, one without signal while standing is left out with `no_standing_zero`.
+    exceeds 80° a notice `gimbal`; a joint without signal while standing is omitted with `no_standing_zero`.
     """
     kernel = AngleKernel.between(tuple(orientations.q), () if poses is None else tuple(poses.q))
     standing = kernel.measure(*_stack(orientations, poses, index_window(zero, orientations.rate_hz)))
@@ -87,7 +88,9 @@ def measure_angles(
 
 
 def _stack(orientations: Orientations, poses: Poses | None, part: slice) -> tuple[Floats, Bools]:
-    """Orientations (n, S, 4) of the sensors' segments, then the figure's, and where known (n, S); a part."""
+    """Orientations (n, S, 4) of the sensor segments, then of the pose estimate, and validity (n, S); for a
+    slice.
+    """
     q = [x[part] for x in orientations.q.values()]
     known = [orientations.valid[s][part] for s in orientations.q]
     if poses is not None:
@@ -100,7 +103,7 @@ def _stack(orientations: Orientations, poses: Poses | None, part: slice) -> tupl
 
 
 def _find_missing_joints(orientations: Orientations, kernel: AngleKernel) -> list[Notice]:
-    """A notice for every joint that has no angles."""
+    """One notice for every joint without angles."""
     notices: list[Notice] = []
     for side in SIDES:
         for joint, proximal, distal in list_leg_joints(side):
@@ -115,7 +118,7 @@ def _find_missing_joints(orientations: Orientations, kernel: AngleKernel) -> lis
 
 
 def _find_gimbal(locked: Bools, kernel: AngleKernel, t_s: Floats) -> list[Notice]:
-    """A notice for every joint whose frontal angle is beyond the limit; `locked` (n, names)."""
+    """One notice for every joint whose frontal angle exceeds the gimbal limit; `locked` (n, names)."""
     notices: list[Notice] = []
     for side in SIDES:
         for joint, _, _ in list_leg_joints(side):

@@ -1,4 +1,4 @@
-"""Which pose estimator the working sensors allow, and what is used when one of them failed."""
+"""Selection of the pose estimator by the working sensors, and the fallback after a failure."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ LEAST_SLIPPED: Final = 0.25
 
 @dataclass(frozen=True)
 class Choice:
-    """What a take can be estimated with.
+    """Estimators available for a recording.
 
     Parameters
     ----------
-    segments : with a working sensor, in the order of docs/science/erkf.md. failed : without.
-    possible : estimators, best first. order : those to try, of them; the one asked for alone.
+    segments : with a working sensor, in the order of docs/science/erkf.md. failed : with a failed sensor.
+        possible : estimators, best first. order : those to try; only the requested one if any.
     reduced : see `Poses.reduced`.
     """
 
@@ -54,7 +54,7 @@ class Choice:
 
 
 def list_possible_estimators(segments: Iterable[Segment]) -> tuple[Estimator, ...]:
-    """Estimators that can run on these segments, the one taken by default first."""
+    """Estimators that can run on these segments, the default one first."""
     worn = set(segments)
     found = [e.name for e in (L7S_3I, L7S_2I) if e.runs_on(worn)]
     if ERKF.runs_on(worn):
@@ -68,16 +68,16 @@ def list_possible_estimators(segments: Iterable[Segment]) -> tuple[Estimator, ..
 def choose(
     calibrated: CalibratedRecording, orientations: Orientations, requested: Requested, least_valid: float
 ) -> Choice:
-    """Look which sensors work and what they allow.
+    """Determine the working sensors and the estimators they allow.
 
     Parameters
     ----------
-    least_valid : share of the take a sensor must be there for; below it has failed. One that slipped may be
-        there for less.
+    least_valid : minimum fraction of the recording with data for a working sensor; lower for a sensor that
+        slipped.
 
     Raises
     ------
-    EstimationError `estimator_impossible` when the requested one needs sensors that are not there.
+    EstimationError `estimator_impossible` if the requested one needs sensors that are unavailable.
     """
     worn = {s: calibrated.recording.sensors[s] for s in WHOLE if s in calibrated.recording.sensors}
     share = {s: float(np.mean(x.valid)) for s, x in worn.items()}
@@ -105,11 +105,11 @@ def _without_standing(
     notices: tuple[Notice, ...],
     failed: tuple[Segment, ...],
 ) -> Choice:
-    """No estimator: each begins with how a person stands, and a mean posture is 10° off that.
+    """No estimator: each starts from standing, and a mean walking posture deviates from that by 10°.
 
     Raises
     ------
-    EstimationError `estimator_impossible` when one was asked for.
+    EstimationError `estimator_impossible` if one was requested.
     """
     if requested != AUTO:
         raise EstimationError(

@@ -1,4 +1,4 @@
-"""Parameters of the stages mounting and poses."""
+"""Parameters of the mounting and pose stages."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class PoseParams:
 
     Parameters
     ----------
-    estimator : "auto" picks by what is worn.
-    least_valid : share of the take a sensor must be there for (our choice).
-    arms : of the places of sensors and joints. anchor : of the figure without a filter.
+    estimator : "auto" selects by the available sensors.
+    least_valid : minimum fraction of the recording with data from a sensor (our choice).
+    arms : of sensor positions and joint centres. anchor : of the poses without a filter.
 
     Raises
     ------

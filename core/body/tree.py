@@ -1,9 +1,9 @@
-"""The kinematic tree the pose filters run on: IMUs, and the joints that hold them together.
+"""The kinematic tree of the pose filters: IMUs, and the joints that link them.
 
-Nothing in a filter knows about legs: it sees sensors, joint centres in sensor axes, hinge axes and which
-sensors come to rest on the floor. Trees of people are made from a body model, how the sensors sit
-(calibration) and where (places.py). Where no joint links two sensors, as with two feet alone, they are
-filtered side by side.
+Filters know nothing about legs: they use sensors, joint centres in sensor axes, hinge axes and the set of
+sensors that come to rest on the floor. Trees of people are built from a body model, the sensor-to-segment
+alignment (calibration) and sensor positions (places.py). Sensors without a common joint, such as two feet
+alone, are filtered independently.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Joint:
 
     Parameters
     ----------
-    proximal, distal : indices of the sensors. r_proximal, r_distal : (3,) the centre in their axes, m.
+    proximal, distal : indices of the sensors. r_proximal, r_distal : (3,) joint centre in their axes, m.
     e_proximal, e_distal : (3,) unit hinge axis in their axes, or None.
     """
 
@@ -62,7 +62,7 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class ImuTree:
-    """What the filters know about the set-up.
+    """The sensor set-up as used by the filters.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class ImuTree:
         return [i for i in range(len(self.imus)) if i not in below]
 
     def forward(self) -> Floats:
-        """The segments' anterior axes (n, 3) in sensor axes."""
+        """Anterior axes (n, 3) of the segments in sensor axes."""
         return rotate(conjugate(self.q_mount), np.array([1.0, 0.0, 0.0]))
 
     def segments(self, p: Floats, q: Floats) -> tuple[Floats, Floats]:
@@ -192,20 +192,19 @@ def person_tree(
     places: Mapping[Segment, Floats] | None = None,
     centres: Mapping[tuple[Segment, Segment], Floats] | None = None,
 ) -> ImuTree:
-    """The tree of the worn sensors; neighbours on the body are joined, knees are hinges.
+    """The tree of the available sensors; neighbours on the body are linked, knees are hinges.
 
     Parameters
     ----------
     mounts : segment → (3, 3) R_segment_sensor (`SegmentCalibration.R_segment_sensor`).
     segments : in this order, a `PRESETS` entry or any other set.
-    places : segment → (3,) sensor in segment axes, m; nominal where not given.
-    centres : (proximal, distal) → (3,) the joint's centre in the axes of the proximal segment, m; by the body
-        model where not given.
+    places : segment → (3,) sensor position in segment axes, m; nominal if not given. centres : (proximal,
+        distal) → (3,) joint centre in the axes of the proximal segment, m; from the body model if not given.
 
     Raises
     ------
-    EstimationError `segments_missing` when one of `segments` has no mount, `segment_length` when a length of
-    the body model is not positive; and those of `ImuTree`.
+    EstimationError `segments_missing` if one of `segments` has no mount, `segment_length` if a length of the
+    body model is not positive; and those of `ImuTree`.
     """
     _check_mounts(mounts, segments)
     _check_lengths(body)
@@ -242,9 +241,9 @@ def person_tree(
 
 
 def walker3(leg_m: float = 0.92, hip_width_m: float = 0.39, pelvis_sensor_m: float = 0.08) -> ImuTree:
-    """The three bodies of Potter et al. 2021: a pelvis and two straight legs on hip hinges, sensors unturned.
+    """The three bodies of Potter et al. 2021: a pelvis and two straight legs on hip hinges, sensors aligned.
 
-    Sensors sit above the middle of the hips and at the ends of the legs (fig 1, data set 1).
+    Sensors are above the midpoint of the hips and at the ends of the legs (fig 1, data set 1).
     """
     lateral, up, axis = 0.5 * hip_width_m, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     joints = tuple(

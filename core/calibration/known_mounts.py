@@ -1,8 +1,8 @@
-"""Calibration of a take whose mountings are known: its rest is to be found, and whether they hold.
+"""Calibration of a recording with known sensor alignment: find its rest, and verify the alignment.
 
-A mounting that was agreed on and not kept gives wrong angles with confidence. In standing the long axis of a
-segment is about vertical; who squats turns thigh and shank about the axis to the right, the shank forward and
-the thigh backward.
+An alignment that differs from the protocol would give wrong angles without any sign of it. In standing the
+long axis of a segment is about vertical; in a squat thigh and shank rotate about the axis to the right, the
+shank forward and the thigh backward.
 """
 
 from __future__ import annotations
@@ -51,20 +51,20 @@ def calibrate_with_mounts(
     params: RestParams | None = None,
     after_s: float = 0.0,
 ) -> CalibratedRecording:
-    """Take mountings as they are, and biases, norms and the zero of angles from the first standing.
+    """Use known alignments, and take biases, gravity norms and the zero of angles from the first standing.
 
-    The first rest of 2 s or more, else the longest; of it the last 8 s. Movement follows it.
+    The first rest of 2 s or more, else the longest; of it the last 8 s, before movement starts.
 
     Parameters
     ----------
-    mounts : segment → (3, 3) R_segment_sensor. method : where they come from: "fixed_offset", "table_top".
-    score : how certain they are, as `SegmentCalibration.score`: `FIXED_OFFSET`, `TABLE_TOP`.
-    after_s : rests before this are not of the person.
+    mounts : segment → (3, 3) R_segment_sensor. method : their origin: "fixed_offset", "table_top".
+    score : their certainty, as `SegmentCalibration.score`: `FIXED_OFFSET`, `TABLE_TOP`.
+    after_s : earlier rests are ignored, because the sensors are not yet on the body.
 
     Raises
     ------
-    CalibrationError `no_segment` where no sensor of the take has a mounting, `mounting_not_as_agreed`.
-    SignalError `no_rest`, `rest_too_short`, `not_still`, `unit_suspect`.
+    CalibrationError `no_segment` if no sensor of the recording has a known alignment,
+    `mounting_not_as_agreed`. SignalError `no_rest`, `rest_too_short`, `not_still`, `unit_suspect`.
     """
     params = params or RestParams()
     worn = [s for s in mounts if s in recording.sensors]
@@ -103,7 +103,7 @@ def calibrate_with_mounts(
 
 
 def _check_mounts(calibrated: CalibratedRecording) -> None:
-    """Refuse a mounting that standing or the movement contradicts; a lifted leg moves as it likes."""
+    """Reject an alignment that standing or movement contradicts; a lifted leg is not checked."""
     recording, zero = calibrated.recording, calibrated.calibration.zero
     stands = find_standing_legs(calibrated)
     standing = index_window(zero, recording.rate_hz)

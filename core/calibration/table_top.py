@@ -1,4 +1,4 @@
-"""Table-top calibration: sensors lie on a table as agreed and are carried to the body.
+"""Table-top calibration: sensors start on a table in a specified orientation and are carried to the body.
 
 Kianifar et al.: the gyroscope is integrated from the table to the leg. The person stands still and faces
 along the arrow on the table (docs/science/squat.md, "From the table").
@@ -23,19 +23,20 @@ from sagittal.core.signals.rest import QuietParams, Window, find_rest_windows, f
 
 @dataclass(frozen=True)
 class TableTopParams:
-    """What the protocol asks for (docs/science/squat.md, "From the table").
+    """Protocol requirements (docs/science/squat.md, "From the table").
 
     Parameters
     ----------
-    longest_s : between the two rests. edge_s : a rest may begin so late and end so early in the take.
-    still_s, still : the quietest part of the rest on the table, and the most that its rate may vary, SD in
-        rad/s: what a hand holds varies more.
-    mean_s : of the rest on the body. slope : device against the table it should lie flat on, rad.
-    drift : tilt at the end that gravity takes off and that is told of, rad.
-    facing : of the person from the arrow, left positive, rad.
+    longest_s : longest time between the two rests. edge_s : tolerance for the first rest to begin after the
+    start and the last to end before the end of the recording.
+    still_s, still : length of the quietest part of the rest on the table, and the maximum SD of its rate in
+    rad/s: a hand-held sensor varies more.
+    mean_s : averaging time of the rest on the body. slope : maximum tilt of the device on the table, rad.
+    drift : tilt error at the end, corrected by gravity, above which a notice is given, rad.
+    facing : of the person relative to the arrow, left positive, rad.
     table : (w, x, y, z) device on the table in arrow axes: x along the arrow, z up.
-    stand_s : shortest standing with all sensors on. worn : a sensor whose vertical has turned so far from
-        that on the table is on the body, rad.
+    stand_s : shortest standing with all sensors attached. worn : a sensor whose vertical has rotated by more
+    than this since the table counts as attached to the body, rad.
     """
 
     rest: QuietParams = field(default_factory=QuietParams)
@@ -54,12 +55,13 @@ class TableTopParams:
 
 @dataclass(frozen=True, eq=False)
 class TableTopMounts:
-    """How the sensors sit.
+    """Sensor-to-segment alignment from the table-top protocol.
 
     Parameters
     ----------
     R_segment_sensor : segment → (3, 3). gyro_bias : segment → (3,) rad/s, on the table.
-    drift_rad : segment → tilt that gravity took off at the end. moved_s : segment → time between the rests.
+    drift_rad : segment → tilt error corrected by gravity at the end. moved_s : segment → time between the
+    rests.
     """
 
     R_segment_sensor: Mapping[Segment, Floats]
@@ -70,7 +72,7 @@ class TableTopMounts:
 
 
 def calibrate_table_top(recording: UniformRecording, params: TableTopParams | None = None) -> TableTopMounts:
-    """Find how every sensor of a take sits, from its way from the table to a person who stands neutral.
+    """Estimate the alignment of every sensor, tracking it from the table to a person in neutral standing.
 
     Raises
     ------
@@ -80,7 +82,7 @@ def calibrate_table_top(recording: UniformRecording, params: TableTopParams | No
     References
     ----------
     Kianifar et al. 2019, "Calibration protocol", equations 2 to 5, doi:10.1177/2055668318813455. There the
-    increment is written as the matrix itself; tilts are not corrected and no rest is asked for.
+    increment is written as the matrix itself; tilts are not corrected and no rest is required.
     """
     params = params or TableTopParams()
     if not recording.sensors:
@@ -108,9 +110,9 @@ def calibrate_table_top(recording: UniformRecording, params: TableTopParams | No
 
 
 def find_worn_standing(recording: UniformRecording, params: TableTopParams | None = None) -> Window:
-    """The first standing in which every sensor has left the table, of a take that goes on after it.
+    """First standing with every sensor off the table, in a recording that continues after it.
 
-    While one sensor is put on the others lie still, so rest alone does not tell.
+    While one sensor is being attached the others are still, so stillness alone is not sufficient.
 
     Raises
     ------
@@ -138,7 +140,7 @@ def find_worn_standing(recording: UniformRecording, params: TableTopParams | Non
 
 
 def crop(recording: UniformRecording, end_s: float) -> UniformRecording:
-    """The take up to a time."""
+    """The recording up to a time."""
     part = slice(0, index_window((0.0, end_s), recording.rate_hz).stop)
     sensors = {
         s: SensorSignals(
@@ -163,7 +165,7 @@ def _turned(signals: SensorSignals, rate_hz: float, a: Window, b: Window) -> flo
 def _find_ends(
     recording: UniformRecording, segment: Segment, params: TableTopParams
 ) -> tuple[Window, Window]:
-    """The rests of a sensor on the table and on the body."""
+    """The rest periods of a sensor on the table and on the body."""
     end_s = len(recording.t_s) / recording.rate_hz
     rests = find_rest_windows(recording, params.rest, (segment,))
     if not rests or rests[0][0] > params.edge_s:
@@ -214,9 +216,9 @@ def _find_ends(
 def _find_stillest(
     recording: UniformRecording, segment: Segment, rest: Window, params: TableTopParams
 ) -> tuple[Window, float]:
-    """The part of a rest in which the rate varies least, and its standard deviation, rad/s.
+    """The part of a rest with the least variation of the rate, and its standard deviation, rad/s.
 
-    A rest may end with the onset of a slow movement, which is no bias.
+    A rest may end with the onset of a slow movement, which must not enter the bias.
     """
     part, width = index_window(rest, recording.rate_hz), round(params.still_s * recording.rate_hz)
     gyr = recording.sensors[segment].gyr
@@ -228,7 +230,7 @@ def _find_stillest(
 
 
 def _lie_on_table(segment: Segment, force: Floats, params: TableTopParams) -> Floats:
-    """Orientation (4,) of a device on the table, in arrow axes; gravity says how level it lies."""
+    """Orientation (4,) of a device on the table, in arrow axes, levelled by gravity."""
     q = np.array(params.table) / np.linalg.norm(params.table)
     level = _turn_upright(rotate(q, force))
     slope = float(2.0 * acos(min(1.0, abs(float(level[0])))))
@@ -252,7 +254,7 @@ def _carry(
     rate_hz: float,
     params: TableTopParams,
 ) -> tuple[Floats, float]:
-    """Orientation (4,) on the body in arrow axes, and the tilt that gravity took off, rad."""
+    """Orientation (4,) on the body in arrow axes, and the tilt error corrected by gravity, rad."""
     gyr = np.ascontiguousarray(signals.gyr[part.stop - 1 :] - bias)
     q = np.empty((len(gyr), 4))
     integrate_turns(gyr, 1.0 / rate_hz, start, q)
@@ -263,7 +265,7 @@ def _carry(
 
 
 def _turn_upright(force: Floats) -> Floats:
-    """The shortest turn (4,) that takes a vector (3,) to the vertical."""
+    """The shortest rotation (4,) that maps a vector (3,) to the vertical."""
     up = force / np.linalg.norm(force)
     axis = np.array([up[1], -up[0], 0.0])
     sine = float(np.linalg.norm(axis))
@@ -277,8 +279,8 @@ def _turn_upright(force: Floats) -> Floats:
 def integrate_turns(gyr, dt, start, out):  # type: ignore[no-untyped-def]
     """Write orientations (n, 4) of a sensor with rates (n, 3), start (4,) at the first sample.
 
-    R ← R Exp(ω Δt) of Kianifar equations 4 and 5 (their increment is the matrix of a body-fixed turn, so it
-    stands on the right); the rate of a step is the mean of both its ends.
+    R ← R Exp(ω Δt) of Kianifar equations 4 and 5 (their increment is the matrix of a body-fixed rotation, so
+    it multiplies from the right); the rate of a step is the mean of the rates at its ends.
     """
     h = 0.5 * dt
     out[0] = start

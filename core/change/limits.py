@@ -1,8 +1,8 @@
-"""How much a figure must change to be more than measurement error, and to matter.
+"""How much a parameter must change to exceed measurement error, and to be clinically important.
 
 docs/science/change.md, "Limits and their sources". MDC: the minimal detectable change at 95 % unless its
-source says otherwise. MCID: the minimal clinically important difference. Each was found on certain people
-with a certain method; both are printed beside it.
+source states otherwise. MCID: the minimal clinically important difference. Each limit was determined in a
+certain population with a certain method; both are printed with it.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ FEWEST: Final = 5
 
 @dataclass(frozen=True)
 class ChangeLimit:
-    """A smallest change of one figure.
+    """Smallest detectable or important change of one parameter.
 
     Parameters
     ----------
-    value : in the unit of the figure. people : who it was found on. source : where.
+    value : in the unit of the parameter. people : population it was determined in. source : reference.
     """
 
     value: float
@@ -38,11 +38,12 @@ class ChangeLimit:
 
 @dataclass(frozen=True)
 class Repeatability:
-    """Measurement error of a figure from people measured repeatedly without treatment.
+    """Measurement error of a parameter, from people measured repeatedly without treatment.
 
     Parameters
     ----------
-    sem : standard error of measurement, within people. mdc95 : 1.96 √2 sem. people, repeats : behind it.
+    sem : standard error of measurement, within people. mdc95 : 1.96 √2 sem. people, repeats : numbers it is
+    based on.
     """
 
     sem: float
@@ -52,7 +53,7 @@ class Repeatability:
 
     @property
     def limit(self) -> ChangeLimit:
-        """As a limit of change."""
+        """Return this repeatability as a limit of change."""
         return ChangeLimit(
             self.mdc95,
             f"{self.people} people of this clinic",
@@ -61,7 +62,8 @@ class Repeatability:
 
 
 def estimate_repeatability(values: Sequence[Sequence[float]]) -> Repeatability | None:
-    """Measurement error from one list of values per person; None with fewer than five people measured twice.
+    """Estimate measurement error from one list of values per person; None with fewer than five people
+    measured twice.
 
     SEM² = pooled variance within people (Weir 2005, J Strength Cond Res 19:231).
     """
@@ -74,12 +76,12 @@ def estimate_repeatability(values: Sequence[Sequence[float]]) -> Repeatability |
 
 
 def find_detectable_change(name: str, baseline: float, limb: Limb | None = None) -> ChangeLimit | None:
-    """MDC of a parameter; None where no source has one.
+    """MDC of a parameter; None if no source reports one.
 
     Parameters
     ----------
-    baseline : value before; speed has limits by how fast somebody walked.
-    limb : None = no side is affected: the larger limit of the two.
+    baseline : earlier value; limits for speed depend on the walking speed.
+    limb : None = no affected side: the larger of the two limits.
     """
     entry = CATALOGUE.get(name)
     key = None if entry is None else entry.change
@@ -96,7 +98,7 @@ def detectable_ratio(name: str) -> ChangeLimit | None:
 
 
 def find_relevant_change(name: str, limb: Limb | None = None) -> ChangeLimit | None:
-    """MCID of a parameter or score; None where no source has one."""
+    """MCID of a parameter or score; None if no source reports one."""
     entry = CATALOGUE.get(name)
     key = name if entry is None else entry.change
     if key in _BY_LIMB:

@@ -1,4 +1,4 @@
-"""What a file is, decided by its content, never by its name."""
+"""File type detection by content, never by name."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ _TABLE: Final = (
 
 
 def advise(what: str) -> str:
-    """What to do with a known format that is not read."""
+    """Advice for a recognised format that is not supported."""
     return _ADVICE.get(what, _TABLE)
 
 
 def sniff(data: bytes) -> tuple[Kind, str]:
-    """Kind of a file and its name for people.
+    """File kind and its display name.
 
     Parameters
     ----------

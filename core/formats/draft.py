@@ -31,7 +31,7 @@ class Draft:
 
     Parameters
     ----------
-    clock : what `ticks` (n,) are: "counter" packet counter as written, "device" seconds, "index" row number.
+    clock : kind of `ticks` (n,): "counter" packet counter as written, "device" seconds, "index" row number.
     acc, gyr, mag : (n, 3), quat : (n, 4); SI units, NaN where missing; None without such columns.
     rate_hz : None = the file does not say. wrap : tick at which the clock starts again; None = a device clock
         never does, a counter at 16 bit, or 32 when it shows more.
@@ -72,7 +72,7 @@ def make_draft(
     segment: Segment | None = None,
     tick: float = 0.0,
 ) -> Draft:
-    """A sensor as its file gives it; a signal without a single number is none, and a gyroscope is missed.
+    """Draft of one sensor; a signal without any number is absent, and a missing gyroscope gives a notice.
 
     Raises
     ------
@@ -99,20 +99,20 @@ def make_draft(
 
 
 def grade_loss(lost: int, rows: int) -> Severity:
-    """Severity of rows that a file lost: information up to `FEW_ROWS`, a warning beyond."""
+    """Severity of lost rows in a file: information up to `FEW_ROWS`, a warning above."""
     return "info" if lost <= FEW_ROWS * rows else "warning"
 
 
 def digest(d: Draft) -> str:
-    """Of the signals in single precision, so that a stored and re-read stream keeps its digest."""
+    """Digest of the signals in single precision, so that a stored and reread stream has the same digest."""
     return signal_digest(d.acc, d.gyr, d.mag)
 
 
 def signal_digest(acc: Floats, gyr: Floats | None, mag: Floats | None) -> str:
-    """What tells the samples of one sensor from those of another, (n, 3) each, for `digest`.
+    """Fingerprint of the samples of one sensor, (n, 3) each, for `digest`.
 
-    SHA-256 over weighted sums of `_SUMMED` words of 64 bits, in a quarter of the time that it takes over the
-    words. Who wants to can make two takes with one digest; a copy is found by it, nothing is secured.
+    SHA-256 over weighted sums of `_SUMMED` words of 64 bits, four times as fast as over the words themselves.
+    Collisions can be constructed deliberately; it serves to detect copies, not for security.
     """
     h = hashlib.sha256()
     for name, a in (("acc", acc), ("gyr", gyr), ("mag", mag)):

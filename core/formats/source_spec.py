@@ -1,4 +1,4 @@
-"""An entry of the manifest's `sources`: how a file is cut into columns and what they are."""
+"""An entry of the manifest's `sources`: how to split a file into columns, and their meaning."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ class Channels:
 
 @dataclass(frozen=True)
 class Counter:
-    """A column of a table that counts samples, so that lost rows are lost time.
+    """A table column that counts samples, so that lost rows are recognised as lost time.
 
     Parameters
     ----------
-    column : its name; it goes up by 1 per sample. wrap : it starts again from 0 at this count, None = 16 bit
-        (32 bit when it shows more).
+    column : its name; increases by 1 per sample. wrap : it restarts from 0 at this count, None = 16 bit (32
+        bit if it has larger values).
     """
 
     column: str
@@ -62,7 +62,7 @@ class Counter:
 
 @dataclass(frozen=True)
 class SourceSpec:
-    """How one file (or all files that match a pattern) is to be read; None = the file says so itself.
+    """How to read one file (or all files that match a pattern); None = determined by the file itself.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class SourceSpec:
     frame: str | None = None
 
     def covers(self, name: str) -> bool:
-        """Tell whether this entry speaks of the file `name`."""
+        """Whether this entry applies to the file `name`."""
         last = name.replace("\\", "/").rsplit("/", 1)[-1]
         return self.file in (name, last) or fnmatchcase(name, self.file) or fnmatchcase(last, self.file)
 
@@ -106,12 +106,11 @@ _SOURCE_KEYS: Final = (
 
 
 def read_source(node: JsonNode) -> SourceSpec:
-    """One entry of the manifest's `sources`.
+    """Parse one entry of the manifest's `sources`.
 
     Raises
     ------
-    ManifestError
-        manifest_unknown_key, manifest_bad_value, unknown_unit, unsupported_frame; with the place.
+    ManifestError manifest_unknown_key, manifest_bad_value, unknown_unit, unsupported_frame; with the path.
     """
     node.only(*_SOURCE_KEYS)
     if node.text("file") is None:
@@ -143,7 +142,7 @@ def read_source(node: JsonNode) -> SourceSpec:
 
 
 def _counter(node: JsonNode) -> tuple[Counter | None, float | None]:
-    """What counts the samples of a table, if anything does, and samples per second."""
+    """Sample counter of a table, if any, and samples per second."""
     rate = _rate(node)
     inner = node.child("counter")
     if not inner.keys:

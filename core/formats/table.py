@@ -54,7 +54,7 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
 
 
 def _without_blank_end(table: text.Columns, spec: SourceSpec) -> text.Columns:
-    """Drop the rows at the end in which no sensor has a value, as where an EMG was recorded for longer."""
+    """Drop trailing rows without any sensor value, as in exports with a longer EMG recording."""
     names = [name for channels in spec.columns.values() for _, name in _asked(channels)]
     known = np.flatnonzero(np.isfinite(table.stack(names)).any(axis=1))
     end = known[-1] + 1 if len(known) else None
@@ -80,7 +80,7 @@ class _Layout:
     times: tuple[str, ...]
 
     def read(self, body: memoryview, source: str) -> text.Columns:
-        """Rows without a header as columns."""
+        """Parse rows without header into columns."""
         return text.read_columns(
             body, source, self.separator, self.titles, self.wanted, decimal_comma=self.comma, times=self.times
         )
@@ -136,16 +136,17 @@ def _find_header(
 
 
 def estimate_rows(head: bytes, size: int) -> float:
-    """How many lines a text of so many bytes has, by its beginning; 0 for what is no text."""
+    """Estimated number of lines of a text of this size, from its beginning; 0 for other content."""
     return size * head.count(b"\n") / max(1, len(head)) if text.is_text(head) else 0.0
 
 
 def open_long_table(file: SourceFile, spec: SourceSpec) -> dict[str, LongStream]:
-    """The sensors of a table that is too long to hold: rows are read a few megabytes at a time.
+    """The sensors of a table too long for memory: rows are read in chunks of a few megabytes.
 
     Raises
     ------
-    ManifestError, FormatError as `read_table`; and `counter_too_long`: a long table needs a time or a rate.
+    ManifestError, FormatError as `read_table`; and `counter_too_long`: a long table requires a time column or
+    a rate.
     """
     source = file.name
     if spec.counter is not None:
@@ -181,7 +182,7 @@ def open_long_table(file: SourceFile, spec: SourceSpec) -> dict[str, LongStream]
 
 
 def _ends(file: SourceFile) -> tuple[bytes, memoryview]:
-    """Beginning of a table, and whole lines of its end."""
+    """Beginning of a table, and complete lines of its end."""
     with file.open() as opened:
         head = opened.read(_CHUNK)
         opened.seek(max(0, file.size - _CHUNK // 8))
@@ -190,7 +191,7 @@ def _ends(file: SourceFile) -> tuple[bytes, memoryview]:
 
 
 def _whole_lines(data: memoryview) -> memoryview:
-    """Up to the last end of a line; all of it without one."""
+    """Data up to the last line end; all of it without one."""
     end = bytes(data).rfind(b"\n") + 1
     return data[:end] if end else data
 
@@ -204,7 +205,7 @@ def _read_blocks(
     rate: float,
     scale: float,
 ) -> Iterator[SampleBlock]:
-    """Rows from the first one, a few megabytes at a time."""
+    """Iterate over the rows from the first one, in chunks of a few megabytes."""
     acc_unit, gyr_unit = ACC_UNITS[spec.acc_unit or "m/s2"], GYR_UNITS[spec.gyr_unit or "rad/s"]
     rows = 0
     with file.open() as opened:
@@ -257,7 +258,7 @@ def _check(spec: SourceSpec, source: str) -> None:
 
 
 def find_titles(header: list[bytes], row: bytes, separator: bytes, spec: SourceSpec) -> list[str]:
-    """Column titles; several header rows are joined by "/", a table without a header counts 1, 2, 3 …"""
+    """Column titles; several header rows are joined by "/", a table without a header is numbered 1, 2, 3 …"""
     cells = row.count(separator) + 1
     parts = [text.split(line, separator) for line in header]
     parts = [[*p, *[""] * (cells - len(p))][:cells] if len(p) >= cells else p for p in parts]
@@ -358,7 +359,7 @@ def _find_scale(table: text.Columns, spec: SourceSpec, source: str) -> float:
 
 
 def _check_counter(counts: Floats, counter: Counter, source: str) -> None:
-    """Refuse a column that does not count samples: time would run at another speed."""
+    """Reject a column that does not count samples, which would distort time."""
     steps = np.diff(counts[np.isfinite(counts)])
     step = float(np.median(steps)) if len(steps) else 1.0
     if step != 1.0:

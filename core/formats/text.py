@@ -1,4 +1,4 @@
-"""Number tables from text, fast: decoding, separators and pyarrow's CSV reader with errors made readable."""
+"""Fast parsing of numeric text tables: decoding, separators and pyarrow's CSV reader with readable errors."""
 
 from __future__ import annotations
 
@@ -42,12 +42,14 @@ class Columns:
     times: frozenset[str] = frozenset()
 
     def stack(self, names: Sequence[str]) -> Floats:
-        """Columns side by side, (n, len(names))."""
+        """Columns as an array (n, len(names))."""
         return np.stack([self.values[name] for name in names], axis=-1)
 
 
 def to_utf8(data: bytes) -> bytes:
-    """Strip a byte order mark; turn UTF-16 (Excel's "Unicode text") and Latin-1 into UTF-8; binary passes."""
+    """Strip a byte order mark; convert UTF-16 (Excel's "Unicode text") and Latin-1 to UTF-8; pass binary
+    data through.
+    """
     if data[:3] == b"\xef\xbb\xbf":
         data = data[3:]
     elif data[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -62,12 +64,12 @@ def to_utf8(data: bytes) -> bytes:
 
 
 def is_text(data: bytes) -> bool:
-    """Tell text by the absence of NUL in its head."""
+    """Whether the head contains no NUL byte."""
     return b"\0" not in data[:_HEAD]
 
 
 def head_lines(data: bytes, most: int = 64) -> list[bytes]:
-    """First lines without line ends; a line longer than 1 MB is cut."""
+    """First lines without line ends; lines longer than 1 MB are truncated."""
     lines: list[bytes] = []
     at = 0
     while len(lines) < most and at < len(data):
@@ -79,13 +81,13 @@ def head_lines(data: bytes, most: int = 64) -> list[bytes]:
 
 
 def read_separator(first: bytes) -> bytes | None:
-    """What a first line "sep=," names, None without one; a tab may be written as two letters."""
+    """Separator from a first line "sep=,", None without one; a tab may be written as an escape sequence."""
     found = re.match(rb'"?sep=(\\t|[,;\t|])', first)
     return None if found is None else b"\t" if found[1] == rb"\t" else found[1]
 
 
 def after_lines(data: bytes, n: int) -> memoryview:
-    """What follows the first n lines, without a copy."""
+    """The data after the first n lines, without a copy."""
     at = 0
     for _ in range(n):
         at = data.find(b"\n", at) + 1
@@ -95,18 +97,18 @@ def after_lines(data: bytes, n: int) -> memoryview:
 
 
 def split(line: bytes, separator: bytes) -> list[str]:
-    """Cells of a line as text, quotes and blanks stripped."""
+    """Cells of a line as text, without quotes and surrounding blanks."""
     text = line.decode("utf-8", errors="replace")
     return [c.strip().strip('"').strip() for c in text.split(separator.decode())]
 
 
 def first_row(body: memoryview) -> bytes:
-    """First line of rows without a header, as far as it is shorter than 64 kB."""
+    """First line of rows without a header, up to 64 kB."""
     return bytes(body[:_HEAD]).split(b"\n", 1)[0].rstrip(b"\r")
 
 
 def fit_names(names: Sequence[str], body: memoryview, separator: bytes) -> list[str]:
-    """Names of a row's cells where rows end with separators that the header line does not have, or it has."""
+    """Names for the cells of a row if rows and header differ in trailing separators."""
     cells = first_row(body).count(separator) + 1
     named = list(names)
     while len(named) > cells and not named[-1].strip():
@@ -139,9 +141,8 @@ def read_columns(
 
     Raises
     ------
-    FormatError
-        bad_table when most rows do not have the columns of the header, ambiguous_column when several columns
-        have a wanted title.
+    FormatError bad_table if most rows do not have the columns of the header, ambiguous_column if several
+        columns have a wanted title.
     """
     titles, names = names, number_columns(names)
     _check_titles(titles, names, wanted, source)
@@ -207,7 +208,7 @@ class _Table:
 
 
 def _check_titles(titles: Sequence[str], names: Sequence[str], wanted: Sequence[str], source: str) -> None:
-    """Raise `ambiguous_column` where several columns have a wanted title."""
+    """Raise `ambiguous_column` if several columns have a wanted title."""
     for name in wanted:
         if name not in names and name in titles:
             raise FormatError(
@@ -275,7 +276,7 @@ def _as_numbers(found: pa.Table, table: _Table) -> tuple[pa.Table, int, int]:
 
 
 def _check_rows(rows: int, broken: Sequence[int], columns: int, source: str) -> list[Notice]:
-    """A notice of rows without the columns of the header; `bad_table` where most are."""
+    """A notice on rows without the columns of the header; `bad_table` if most are."""
     if rows == 0 or len(broken) > max(2, rows // 2):
         raise FormatError(
             "bad_table",
@@ -298,7 +299,7 @@ def _check_rows(rows: int, broken: Sequence[int], columns: int, source: str) -> 
 
 
 def _as_utf8(body: memoryview) -> memoryview:
-    """The same where it is UTF-8; a text with NUL in its head may be anything behind it."""
+    """The data as valid UTF-8; text with a NUL only after its head may contain anything."""
     if np.frombuffer(body, np.uint8).max(initial=0) < 128:
         return body
     data = bytes(body)
@@ -310,7 +311,7 @@ def _as_utf8(body: memoryview) -> memoryview:
 
 
 def _as_floats(column: pa.ChunkedArray[Any]) -> Floats:
-    """Arrow column to float64 with NaN for null and for what no sensor or clock gives."""
+    """Arrow column to float64 with NaN for null and for values impossible for sensors and clocks."""
     return _plausible(np.array(column.to_numpy(), np.float64))
 
 
@@ -320,9 +321,9 @@ def _plausible(x: Floats) -> Floats:
 
 
 def number_columns(titles: Sequence[str]) -> list[str]:
-    """Return one unique name per column.
+    """One unique name per column.
 
-    A title that several columns share is numbered: "X [s]#1", "X [s]#2", … A blank title becomes "column 3",
+    A title shared by several columns is numbered: "X [s]#1", "X [s]#2", … A blank title becomes "column 3",
     by its position.
     """
     titles = [title or f"column {i}" for i, title in enumerate(titles, 1)]
@@ -342,7 +343,7 @@ def number_columns(titles: Sequence[str]) -> list[str]:
 
 
 def describe_columns(titles: Sequence[str], title: str) -> str:
-    """List the columns that share a title: unique name, position and neighbours of each."""
+    """The columns that share a title: unique name, position and neighbours of each."""
     names = number_columns(titles)
     listed = []
     for i in [i for i, t in enumerate(titles) if t == title]:

@@ -1,7 +1,7 @@
-"""Look at a take's set-up and propose what would put it right, one kind of mistake at a time.
+"""Check the set-up of a recording and propose a correction, one kind of mistake at a time.
 
-Wrong units hide wrong axes, and wrong axes hide wrong labels: the first kind that is found is proposed, the
-next once that is confirmed and the take is analysed again.
+Wrong units mask wrong axes, and wrong axes mask wrong labels: the first kind detected is proposed, the next
+one after confirmation and another analysis.
 """
 
 from __future__ import annotations
@@ -37,11 +37,12 @@ def propose_repair(
     params: SetupParams | None = None,
     agreement: AgreementParams | None = None,
 ) -> SetupRepair | None:
-    """What is wrong with units or axes, before the sensors are compared with each other; None = nothing seen.
+    """Errors in units or axes, checked before the sensors are compared with each other; None if none are
+    detected.
 
     Parameters
     ----------
-    recording : as read. uniform : the same take on its axis.
+    recording : as read. uniform : the same recording on the uniform axis.
     """
     params, agreement = params or SetupParams(), agreement or AgreementParams()
     worn = {s: recording.streams[x.device_id] for s, x in uniform.sensors.items()}
@@ -49,7 +50,7 @@ def propose_repair(
 
 
 def propose_labels(uniform: UniformRecording, agreed: Agreement) -> SetupRepair | None:
-    """What the sensors say of each other beyond the exchanges that an analysis undoes by itself."""
+    """Label errors found by comparing sensors, other than swaps that an analysis corrects automatically."""
     exchange = agreed.exchange
     if exchange is not None and exchange.mirrored:
         turned = {uniform.sensors[s].device_id: SensorCorrection(acc_axes=AGAINST) for s in exchange.mirrored}
@@ -67,7 +68,9 @@ def propose_labels(uniform: UniformRecording, agreed: Agreement) -> SetupRepair 
 
 
 def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
-    """Factors of sensors whose unit physics refuses, where exactly one simple change satisfies it."""
+    """Scale factors of sensors with a physically impossible unit, if exactly one simple change resolves
+    it.
+    """
     corrections: dict[str, SensorCorrection] = {}
     said: list[str] = []
     for segment, stream in worn.items():
@@ -100,7 +103,7 @@ def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
 
 
 def _list_remaining(stream: ImuStream, correction: SensorCorrection) -> set[str]:
-    """Codes of what is refused of a sensor that was put right."""
+    """Codes of the errors that remain for a sensor after correction."""
     acc = correction.correct_acc(stream.acc)
     gyr = None if stream.gyr is None else correction.correct_gyr(stream.gyr)
     return _list_errors(stream, measure_signal(acc, gyr, stream.rate_hz), acc)
@@ -114,7 +117,7 @@ def _list_errors(stream: ImuStream, facts: Facts, acc: Floats) -> set[str]:
 def _propose_axes(
     uniform: UniformRecording, params: SetupParams, agreement: AgreementParams
 ) -> SetupRepair | None:
-    """Gyroscopes that do not carry gravity where their accelerometer finds it."""
+    """Corrections of gyroscopes that do not rotate gravity consistently with their accelerometer."""
     found = {s: fit_axes(x, uniform.rate_hz, params) for s, x in uniform.sensors.items()}
     wrong = {s: f.misfits for s, f in found.items() if f is not None and f.misfits is not None}
     if not wrong:
@@ -156,9 +159,9 @@ def _correct_gyr(gyr: Floats, acc_axes: tuple[str, ...]) -> SensorCorrection:
 def _choose_axes(
     wrong: Mapping[Segment, Floats], judged: int, params: SetupParams
 ) -> dict[Segment, Floats] | None:
-    """What each gyroscope is to be multiplied by; None where several fit alike.
+    """Correction matrix for each gyroscope; None if several fit equally well.
 
-    Sensors of one export are read alike: where most of them are wrong they are judged together.
+    Sensors of one export are parsed alike: if most of them are wrong they are judged together.
     """
     if 2 * len(wrong) > judged and len(wrong) > 1:
         # every sensor counts by how well it can be told
@@ -171,17 +174,17 @@ def _choose_axes(
 
 
 def _choose_one(misfits: Floats, params: SetupParams) -> Floats | None:
-    """The only one of `CHOICES` that is not ruled out; all signs round where that is the best of several."""
+    """The only one of `CHOICES` not ruled out; inversion of all signs if that is the best of several."""
     best = int(np.argmin(misfits))
     alone = np.count_nonzero(misfits <= params.distinct * misfits[best]) == 1
     return np.asarray(CHOICES[best]) if alone or best == REVERSED else None
 
 
 def _leaves_hands_open(gyr: Floats) -> bool:
-    """Whether an accelerometer in a mirror is as likely as a right one, by what its gyroscope needs.
+    """Whether a left-handed accelerometer is as plausible as a correct one, given the gyroscope correction.
 
-    With all signs round the file may have left-handed axes; what is a rotation of the gyroscope may as well
-    be a sign of the accelerometer. Else it would take two mistakes.
+    If all signs are inverted the file may have left-handed axes; a rotation of the gyroscope may equally be a
+    sign error of the accelerometer. Otherwise two mistakes would be required.
     """
     a_unit = np.array_equal(gyr, gyr[0, 0] * np.eye(3)) and gyr[0, 0] > 0.0
     return not a_unit and bool(np.linalg.det(gyr) > 0.0 or np.array_equal(gyr, -np.eye(3)))
@@ -190,10 +193,10 @@ def _leaves_hands_open(gyr: Floats) -> bool:
 def _judge_hands(
     uniform: UniformRecording, gyr: Mapping[Segment, Floats], agreement: AgreementParams
 ) -> frozenset[Segment] | None:
-    """Those whose accelerometer must be turned round too, once gyroscopes go with them; None = unknown.
+    """Segments whose accelerometer must be inverted along with the gyroscope; None = unknown.
 
-    Left-handed axes of a whole export make a mirror image, which only the hips tell, left and right of the
-    way the feet go. Exchanged legs would look the same: one mistake is likelier than two.
+    Left-handed axes of a whole export produce a mirror image, which only the hips reveal, left and right of
+    the direction of the feet. Swapped legs would look the same; one mistake is likelier than two.
     """
     fixed = {
         s: x.change(gyr=np.ascontiguousarray(x.gyr @ gyr[s].T)) if s in gyr else x
@@ -216,7 +219,7 @@ LOOK_HZ: Final = 50.0
 
 
 def _propose_legs(uniform: UniformRecording) -> SetupRepair | None:
-    """Left and right exchanged, where the pelvis is pushed to the side of the leg that is said to stand."""
+    """Propose swapped legs if the pelvis accelerates towards the leg labelled as the stance leg."""
     pelvis = uniform.sensors.get("pelvis")
     pair = next((p for p in (FOOT, SHANK, THIGH) if set(p.values()) <= set(uniform.sensors)), None)
     if pelvis is None or pair is None:

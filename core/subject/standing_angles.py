@@ -1,8 +1,8 @@
-"""Joint angles of quiet standing as a goniometer reads them: the link from our zero to the anatomical one.
+"""Goniometer angles in quiet standing: the offset between our zero and the anatomical zero.
 
-Our calibration makes the person's own standing the zero (docs/science/joint-angles.md, "Zero"). Who stands
-with a knee bent by 10° has every knee angle 10° too small against any reference, until somebody enters these
-10°.
+The calibration defines the person's own standing posture as zero (docs/science/joint-angles.md, "Zero"). If a
+person stands with 10° of knee flexion, every knee angle is 10° too small compared with references until this
+value is entered.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LIMIT_DEG: Final = 60.0
 
 
 def check_standing(standing_deg: Mapping[str, float]) -> None:
-    """Refuse names that no angle has and angles nobody stands with.
+    """Reject unknown angle names and implausible standing angles.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The short code of a take → a token for its stream, as the tablet's page does it."""
+"""Exchange of a trial's short pairing code for a stream token, like the tablet page."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sagittal.server.live.sender import LiveError
 
 @dataclass(frozen=True)
 class PairingResult:
-    """What a code opens: `socket` is a whole ws:// or wss:// address."""
+    """Result of pairing: `socket` is a complete ws:// or wss:// URL."""
 
     token: str
     take: str
@@ -25,7 +25,7 @@ class PairingResult:
 
 
 def pair(address: str, code: str) -> PairingResult:
-    """Pair with the server at an http:// or https:// address.
+    """Pair with the server at an http:// or https:// URL.
 
     Raises
     ------

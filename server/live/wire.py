@@ -1,6 +1,6 @@
-"""What browsers get: live frames, strides, cues and notices as JSON, angles in degrees, undefined is null.
+"""JSON for browsers: live frames, strides, cues and notices, angles in degrees, undefined is null.
 
-Runs in the estimator process; the web process passes the bytes on.
+Runs in the estimator process; the web process forwards the bytes.
 """
 
 from __future__ import annotations
@@ -57,12 +57,12 @@ encode = partial(msgspec.json.encode, enc_hook=encode_user_text)
 def frame(
     shown: LiveFrame, trail: Iterable[AngleTrail], slow: Mapping[str, Any], phase: Mapping[Side, float | None]
 ) -> bytes:
-    """A frame with the angles since the last one that was sent, without the closing brace.
+    """A frame with the angles since the last one sent, without the closing brace.
 
     Parameters
     ----------
-    trail : of this frame and those before it that were not sent. slow : its `slow_part`, or an earlier one.
-    phase : per side the share of the running cycle, 0 to 100, None where unknown.
+    trail : angles of this frame and earlier unsent ones. slow : its `slow_part`, or an earlier one.
+    phase : percentage of the current cycle per side, 0 to 100, None if unknown.
     """
     body = {
         "type": "frame",
@@ -84,11 +84,11 @@ def slow_part(
     guided: GuidedTestView | None = None,
     calibration: msgspec.Raw | None = None,
 ) -> dict[str, Any]:
-    """What of a frame is for reading and need not be made anew for every one: calibration, sensors, test.
+    """Parts of a frame that change slowly and are reused: calibration, sensors, test.
 
     Parameters
     ----------
-    calibration : its `describe_calibration`, where that has been made.
+    calibration : result of `describe_calibration`, if available.
     """
     health = [_health(row, battery.get(row.id)) for row in shown.health]
     return {
@@ -99,12 +99,12 @@ def slow_part(
 
 
 def describe_calibration(view: CalibrationView | None) -> msgspec.Raw:
-    """Where calibration stands."""
+    """State of the calibration."""
     return msgspec.Raw(encode(_calibration(view)))
 
 
 def tell_test(view: GuidedTestView) -> dict[str, Any]:
-    """Where a functional test stands; its figures are those of the catalogue, in its units."""
+    """State of a functional test, with results in units of the catalogue."""
     result = view.result
     return {
         "phase": view.phase,
@@ -140,7 +140,7 @@ def _segment(part: TimedSegment) -> dict[str, Any]:
 
 
 def pose(shown: LiveFrame) -> FigurePose | None:
-    """The figure of a frame, None while there is none."""
+    """Pose of the avatar in a frame, None if unavailable."""
     segments = [name for name in shown.q if name in shown.p]
     if not segments:
         return None
@@ -154,7 +154,7 @@ def pose(shown: LiveFrame) -> FigurePose | None:
 
 
 def stride(told: LiveStride) -> dict[str, Any]:
-    """A stride; it comes again with the same `n` when its end is refined or its distances are known."""
+    """A stride; sent again with the same `n` when its end is refined or its distances become available."""
     duration = told.end_s - told.start_s
     off = None if told.foot_off_s is None else 100.0 * (told.foot_off_s - told.start_s) / duration
     return {
@@ -175,22 +175,22 @@ def stride(told: LiveStride) -> dict[str, Any]:
 
 
 def cue(given: Cue) -> dict[str, Any]:
-    """Message of a cue for the screens."""
+    """Message of a cue for screens."""
     return {"type": "cue", **given.to_json()}
 
 
 def feedback(state: FeedbackState) -> dict[str, Any]:
-    """Where the feedback stands."""
+    """State of the feedback."""
     return {"type": "feedback", **state.to_json()}
 
 
 def announce_calibration(shown: LiveFrame) -> dict[str, Any]:
-    """That calibration has come to an end, and how."""
+    """Message that calibration has ended, with its outcome."""
     return {"type": "calibration", "method": shown.method, "calibration": _calibration(shown.calibration)}
 
 
 def notice(given: Notice) -> dict[str, Any]:
-    """A notice in the words of the pages."""
+    """A notice in the wording of the pages."""
     return {"type": "notice", **_notice(given)}
 
 
@@ -207,7 +207,7 @@ def _notice(given: Notice) -> dict[str, Any]:
 
 
 def judge_calibration(score: CalibrationScore) -> dict[str, Any]:
-    """The verdict in words: of every failed check where, why and what to do."""
+    """Outcome of a calibration in words: location, reason and remedy of each failed check."""
     said = [c.to_json() for c in score.checks]
     redo = [
         {
@@ -262,7 +262,7 @@ def _health(row: SensorHealth, battery_pct: float | None) -> dict[str, Any]:
 
 
 def _judged(row: SensorHealth, battery_pct: float | None) -> tuple[str, str]:
-    """Worst first: state and words of a sensor; no words while all is well."""
+    """State and messages of a sensor, worst first; no messages if it is fine."""
     if row.segment is None:
         return "none", "not used"
     if row.silent_s > STALE_S:

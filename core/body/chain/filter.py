@@ -1,6 +1,6 @@
-"""Joint angles of a chain from its sensors, sample by sample or a whole take at once.
+"""Joint angles of a chain from its sensors, sample by sample or for a whole recording.
 
-A filter that is given the samples in blocks of any size gives the same bits as one that is given all.
+Results are bit-identical for any division of the samples into blocks.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ START_STEPS: Final = 15
 
 @dataclass(frozen=True)
 class ChainFilterParams:
-    """What is expected of sensors and movement (docs/science/squat.md, "Parameters").
+    """Noise model of sensors and movement (docs/science/squat.md, "Parameters").
 
     Parameters
     ----------
-    gyr_noise, acc_noise : rad/s, m/s², of a sample, errors of the model included.
-    jerk : rad/s³/√Hz of a joint. yaw : rad, of the virtual sensor that holds the hip's rotation at zero.
+    gyr_noise, acc_noise : rad/s, m/s², per sample, including model errors.
+    jerk : rad/s³/√Hz of a joint. yaw : rad, of the virtual sensor that constrains hip rotation to zero.
 
     Raises
     ------
@@ -66,12 +66,12 @@ class ChainMotion:
 
 
 class ChainFilter:
-    """One extended Kalman filter per sensor, each on the estimate of those below it.
+    """One extended Kalman filter per sensor, each based on the estimates of those below it.
 
     Parameters
     ----------
-    rest_force : (S, 3) mean specific force of the sensors while the chain stood still, m/s². The filter
-        starts in the pose that gravity shows, with all angles about the vertical zero.
+    rest_force : (S, 3) mean specific force of the sensors in quiet standing, m/s². The filter starts in the
+        pose determined by gravity, with all angles about the vertical zero.
 
     Raises
     ------
@@ -116,12 +116,12 @@ class ChainFilter:
         _stand(self._arrays, chain.start_sd, force, self._noise.acc, self._x, self._P)
 
     def advance(self, gyr: Floats, acc: Floats, valid: Bools | None = None) -> ChainMotion:
-        """Run over the next samples.
+        """Process the next samples.
 
         Parameters
         ----------
-        gyr, acc : (n, S, 3) rad/s, bias taken off, and m/s². valid : (n, S), None = all. While a sensor is
-            silent the joints of its group are held, and their `sd` grows.
+        gyr, acc : (n, S, 3) bias-corrected rad/s, and m/s². valid : (n, S), None = all. During data loss of a
+            sensor the joints of its group are held constant while their `sd` grows.
 
         Raises
         ------
@@ -151,7 +151,7 @@ class ChainFilter:
 def _stand(
     chain: ChainArrays, start_sd: Floats, force: Floats, acc_noise: float, x: Floats, P: Floats
 ) -> None:
-    """Write the pose in which a chain at rest reads `force`, x (J, 3), and its covariance P (S, n, n)."""
+    """Write the pose in which a chain at rest measures `force`, x (J, 3), and its covariance P (S, n, n)."""
     s = make_scratch(P.shape[1])
     below = np.zeros((6, 3))
     below[:3] = chain.base

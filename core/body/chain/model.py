@@ -1,7 +1,7 @@
-"""A chain of hinges with sensors on its links, and the leg as one.
+"""Chain of hinge joints with sensors on its links, and the leg as such a chain.
 
-Where Kianifar et al. use Denavit-Hartenberg frames a joint here is an axis and the way to it from the joint
-before: the poses are the same (docs/science/squat.md, "Chain").
+Where Kianifar et al. use Denavit-Hartenberg frames, a joint here is an axis and its offset from the previous
+joint: the poses are the same (docs/science/squat.md, "Chain").
 """
 
 from __future__ import annotations
@@ -36,16 +36,17 @@ TILTS: Final = 2.0
 
 @dataclass(frozen=True, eq=False)
 class RevoluteChain:
-    """Hinges one after the other on a base that does not move, and one sensor on the last link of each group.
+    """Serial hinge joints on a fixed base, with one sensor on the last link of each group.
 
     Parameters
     ----------
-    axes : (J, 3) unit, and offsets : (J, 3) m from the joint before, both in the link below the joint.
+    axes : (J, 3) unit, and offsets : (J, 3) m from the previous joint, both in the axes of the link below the
+        joint.
     first : (S + 1,) first joint of each sensor's group, ending with J.
     places : (S, 3) m of the sensors from the last joint of their group. mounts : (S, 3, 3) sensor to link.
     base : (3, 3) link of the base to world.
-    bounded : (J,) True for angles that a virtual sensor holds about zero.
-    start_sd : (J,) rad, of the angles before anything was measured.
+    bounded : (J,) True for angles constrained to about zero by a virtual sensor.
+    start_sd : (J,) rad, initial uncertainty of the angles.
 
     Raises
     ------
@@ -90,7 +91,7 @@ class RevoluteChain:
             raise ParameterError("bad_joint", "RevoluteChain: an axis is not of length 1.")
 
     def links(self, angles: Floats) -> list[Floats]:
-        """Orientations (n, 3, 3) in the world of the links that carry sensors, from angles (n, J)."""
+        """World orientations (n, 3, 3) of the links that carry sensors, from angles (n, J)."""
         from sagittal.core.rotation import exp, to_matrix
 
         found, R = [], np.broadcast_to(self.base, (len(angles), 3, 3))
@@ -107,7 +108,7 @@ def leg_segments(side: Side) -> tuple[Segment, Segment, Segment]:
 
 
 def require_leg(side: Side, there: Collection[Segment]) -> tuple[Segment, Segment, Segment]:
-    """`leg_segments`, all of which must be there.
+    """`leg_segments`, checked to be all available.
 
     Raises
     ------
@@ -125,7 +126,7 @@ def require_leg(side: Side, there: Collection[Segment]) -> tuple[Segment, Segmen
 
 
 def build_leg_chain(geometry: LegGeometry, mounts: Mapping[Segment, Floats]) -> RevoluteChain:
-    """The leg on its foot, which stands neutral: seven hinges, three sensors.
+    """The leg above its neutral foot: seven hinges, three sensors.
 
     Parameters
     ----------

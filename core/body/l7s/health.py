@@ -1,4 +1,4 @@
-"""What an L7S run says about itself (docs/reference/estimators.md, "Health")."""
+"""Health of an L7S run (docs/reference/estimators.md, "Health")."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ LEVEL: Final[tuple[Protocol, ...]] = ("squat", "activity", "tug")
 
 
 def l7s_health(poses: Poses) -> tuple[HealthFinding, ...]:
-    """Judge a run of `l7s_poses` by its own quantities."""
+    """Judge a run of `l7s_poses` by its own diagnostics."""
     d = cast("dict[str, Any]", poses.diagnostics)
     found = []
     for side in d["hinge_m"]:
@@ -174,7 +174,7 @@ TOLD: Final[Mapping[str, tuple[str, str]]] = {
 
 
 def list_health_notices(findings: Sequence[HealthFinding]) -> tuple[Notice, ...]:
-    """What of it a person must be told; the worst of each kind."""
+    """Notices for the user on the health of the run; only the worst of each kind."""
     notices = {}
     for f in sorted((f for f in findings if f.verdict != "good"), key=lambda f: f.value):
         if f.name in TOLD:
@@ -186,7 +186,7 @@ def list_health_notices(findings: Sequence[HealthFinding]) -> tuple[Notice, ...]
 
 
 def l7s_notices(protocol: Protocol) -> tuple[Notice, ...]:
-    """What must be said about a take that this estimator is not made for."""
+    """Notice for recordings of protocols that L7S is not designed for."""
     if protocol not in LEVEL:
         return ()
     message = (
