@@ -130,6 +130,7 @@ MORE_THAN_ONE: Final = (
     # shown or refused because there are several
     "{takes} takes", "in {still} parts", "{segments} sensors are there", "{chosen} visits fit",
     "{t_s} days; at most", "{days} days, expected", "{value} samples at {rate} Hz", "{value} samples of {id}",
+    "starts again after {wrap} samples",
     "The file has {size} bytes", "announced with {size} bytes", "{offset} of {size} bytes",
     # "4 left and 1 right strides"
     "{counted} strides",

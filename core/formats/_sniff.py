@@ -6,8 +6,8 @@ import json
 from typing import Final, Literal
 
 from sagittal.core.formats import live_reader, parquet, text
-from sagittal.core.formats.layout import LINES, find_layout
 from sagittal.core.formats.manifest import is_manifest
+from sagittal.core.formats.tables.layout import LINES, find_layout
 from sagittal.core.formats.vendors import mapping_xml
 from sagittal.core.formats.vendors.registry import find_vendor
 

@@ -20,7 +20,7 @@ from typing import Final
 
 from sagittal.core.errors import ArchiveError, FormatError
 from sagittal.core.formats.source import SourceFile
-from sagittal.core.formats.workbook import is_workbook, read_sheets
+from sagittal.core.formats.tables.workbook import is_workbook, read_sheets
 
 ZIP_MAGIC = (b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")
 GZIP_MAGIC = b"\x1f\x8b"

@@ -14,8 +14,9 @@ from typing import Final
 import numpy as np
 
 from sagittal.core.errors import FormatError, Notice
-from sagittal.core.formats import layout, text
+from sagittal.core.formats import text
 from sagittal.core.formats.source_spec import TIME_UNITS
+from sagittal.core.formats.tables import layout
 from sagittal.core.frames import Floats
 
 _STO_MARK: Final = b"endheader"

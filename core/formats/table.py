@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
@@ -13,10 +12,22 @@ import numpy as np
 from sagittal.core.errors import FormatError, ManifestError, Notice
 from sagittal.core.formats import text
 from sagittal.core.formats.draft import Draft, make_draft
-from sagittal.core.formats.layout import LINES, TableLayout, find_layout, guess_separator, has_decimal_comma
 from sagittal.core.formats.source import SourceFile
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, Counter, SourceSpec
-from sagittal.core.formats.time_unit import check_tick, find_tick
+from sagittal.core.formats.tables.header import (
+    complete_names,
+    find_header,
+    join_titles,
+    list_asked,
+    list_wanted,
+)
+from sagittal.core.formats.tables.layout import (
+    LINES,
+    find_layout,
+    guess_separator,
+    has_decimal_comma,
+)
+from sagittal.core.formats.tables.time_unit import check_tick, find_tick
 from sagittal.core.frames import Floats
 from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 
@@ -55,7 +66,7 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
 
 def _without_blank_end(table: text.Columns, spec: SourceSpec) -> text.Columns:
     """Drop trailing rows without any sensor value, as in exports with a longer EMG recording."""
-    names = [name for channels in spec.columns.values() for _, name in _asked(channels)]
+    names = [name for channels in spec.columns.values() for _, name in list_asked(channels)]
     known = np.flatnonzero(np.isfinite(table.stack(names)).any(axis=1))
     end = known[-1] + 1 if len(known) else None
     values = {name: values[:end] for name, values in table.values.items()}
@@ -92,47 +103,19 @@ def _lay_out(data: bytes, source: str, spec: SourceSpec) -> tuple[_Layout, Sourc
     lines = text.head_lines(data, (spec.skip_rows or 0) + (spec.header_rows or 0) + LINES)
     known = spec.separator.encode() if spec.separator else None
     found = find_layout(lines, known)
-    skip, header = _find_header(lines, spec, found, known)
+    skip, header = find_header(lines, spec, found, known)
     rows = [r for r in lines[skip + header :] if r.strip()]
     if not rows:
         raise FormatError("empty", f"{source} has a header but no samples; record or export it again.")
     separator = (
         known or (found.separator if found else guess_separator(rows[: max(1, len(rows) - 1)])) or b","
     )
-    titles = _titles(lines[skip : skip + header], rows, separator, spec)
-    spec = _with_neighbours(spec, titles)
-    wanted = _wanted(spec, titles, source)
+    titles = join_titles(lines[skip : skip + header], rows, separator, spec)
+    spec = complete_names(spec, titles)
+    wanted = list_wanted(spec, titles, source)
     times = () if spec.time_column is None else (spec.time_column,)
     comma = has_decimal_comma(rows, separator)
     return _Layout(separator, skip + header, titles, wanted, comma, times), spec
-
-
-def _titles(header: list[bytes], rows: list[bytes], separator: bytes, spec: SourceSpec) -> list[str]:
-    squeeze = text.squeeze_blanks if separator == b" " else bytes
-    widest = max(rows[:LINES], key=lambda row: row.count(separator))
-    usual = rows[0] if rows[0].count(separator) == rows[-1].count(separator) else widest
-    return find_titles([squeeze(line) for line in header], squeeze(usual), separator, spec)
-
-
-def _find_header(
-    lines: list[bytes], spec: SourceSpec, found: TableLayout | None, known: bytes | None
-) -> tuple[int, int]:
-    """Lines before the header and of it: as declared, else where the declared columns are named."""
-    if spec.skip_rows is not None:
-        return spec.skip_rows, 1 if spec.header_rows is None else spec.header_rows
-    if found is None:
-        return 0, 1 if spec.header_rows is None else spec.header_rows
-    if spec.header_rows is not None:
-        return max(0, found.first_row - spec.header_rows), spec.header_rows
-    asked = {name.split("#")[0] for _, channels in spec.columns.items() for _, name in _asked(channels)}
-    asked |= {name for name in (spec.time_column, _counted(spec)) if name is not None}
-    separator = known or found.separator
-    candidates = [(found.skip_rows, found.header_rows), *((i, 1) for i in range(found.first_row))]
-    for skip, header in candidates:
-        titles = _titles(lines[skip : skip + header], lines[found.first_row :], separator, spec)
-        if asked <= {*titles, *text.number_columns(titles)}:
-            return skip, header
-    return candidates[0]
 
 
 def estimate_rows(head: bytes, size: int) -> float:
@@ -255,76 +238,6 @@ def _check(spec: SourceSpec, source: str) -> None:
         )
     if spec.quat_order is None and any(c.quat for c in spec.columns.values()):
         raise ManifestError("manifest_bad_value", f"{where}: quat columns need quat_order, 'wxyz' or 'xyzw'.")
-
-
-def find_titles(header: list[bytes], row: bytes, separator: bytes, spec: SourceSpec) -> list[str]:
-    """Column titles; several header rows are joined by "/", a table without a header is numbered 1, 2, 3 …"""
-    cells = row.count(separator) + 1
-    parts = [text.split(line, separator) for line in header]
-    parts = [[*p, *[""] * (cells - len(p))][:cells] if len(p) >= cells else p for p in parts]
-    if not parts:
-        return [str(i + 1) for i in range(cells)]
-    width = max(len(p) for p in parts)
-    names = ["/".join(p[i] for p in parts if i < len(p) and p[i]) for i in range(width)]
-    if spec.index_column and width == cells - 1:
-        names = ["", *names]
-    return [*names, *[""] * (cells - len(names))]
-
-
-def _wanted(spec: SourceSpec, titles: list[str], source: str) -> list[str]:
-    names = text.number_columns(titles)
-    there = names[1:] if spec.index_column else names
-    wanted: list[str] = []
-    asked = [(f"columns.{d}.{kind}", n) for d, c in spec.columns.items() for kind, n in _asked(c)]
-    for path, clock in (("time_column", spec.time_column), ("counter.column", _counted(spec))):
-        if clock is not None:
-            asked.append((path, clock))
-            there = names
-    for path, name in asked:
-        if name not in names and name in titles:
-            raise ManifestError(
-                "ambiguous_column",
-                f"{path}: expected the name of one column, but {titles.count(name)} columns of {source} are "
-                f"called '{name}'. Give one of these names: {text.describe_columns(titles, name)}.",
-            )
-        if name not in there:
-            near = difflib.get_close_matches(name, there, 1, 0.4)
-            hint = f"did you mean '{near[0]}'?" if near else f"columns found: {', '.join(there[:20])}."
-            raise ManifestError("unknown_column", f"{path}: {source} has no column '{name}'; {hint}")
-        if name not in wanted:
-            wanted.append(name)
-    return wanted
-
-
-def _with_neighbours(spec: SourceSpec, titles: list[str]) -> SourceSpec:
-    """The entry with unique names where a repeated title can only mean the column next to a named one.
-
-    As under a header of merged cells: "Accelerometer/X", "Y", "Z" are three columns side by side.
-    """
-    names = text.number_columns(titles)
-
-    def complete(group: tuple[str, ...] | None) -> tuple[str, ...] | None:
-        if group is None or group[0] not in names:
-            return group
-        at = names.index(group[0])
-        beside = tuple(titles[at : at + len(group)])
-        alike = all(a in (b, n) for a, b, n in zip(group, beside, names[at:], strict=False))
-        return tuple(names[at : at + len(group)]) if len(beside) == len(group) and alike else group
-
-    columns = {
-        d: Channels(complete(c.acc), complete(c.gyr), complete(c.mag), complete(c.quat))
-        for d, c in spec.columns.items()
-    }
-    return replace(spec, columns=columns)
-
-
-def _asked(c: Channels) -> list[tuple[str, str]]:
-    groups = (("acc", c.acc), ("gyr", c.gyr), ("mag", c.mag), ("quat", c.quat))
-    return [(kind, name) for kind, group in groups for name in group or ()]
-
-
-def _counted(spec: SourceSpec) -> str | None:
-    return None if spec.counter is None else spec.counter.column
 
 
 def _time(table: text.Columns, spec: SourceSpec, source: str) -> tuple[Floats, str, float]:

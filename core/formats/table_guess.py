@@ -19,9 +19,10 @@ from sagittal.core.formats._sniff import sniff
 from sagittal.core.formats.aliases import segment_in
 from sagittal.core.formats.archive import expand, is_gzip, is_zip
 from sagittal.core.formats.draft import Draft
-from sagittal.core.formats.layout import LINES, find_layout
 from sagittal.core.formats.source import SourceFile, stem_of
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, SourceSpec
+from sagittal.core.formats.tables.header import find_titles
+from sagittal.core.formats.tables.layout import LINES, find_layout
 from sagittal.core.frames import GRAVITY, Floats
 
 PIECE: Final = 1 << 21
@@ -120,7 +121,7 @@ def look_into_table(file: SourceFile) -> TableLook | None:
     squeeze = text.squeeze_blanks if separator == b" " else bytes
     spec = SourceSpec(file=file.name, skip_rows=skip, header_rows=header, index_column=index_column)
     first = squeeze(lines[rows_from])
-    titles = table.find_titles([squeeze(x) for x in lines[skip:rows_from]], first, separator, spec)
+    titles = find_titles([squeeze(x) for x in lines[skip:rows_from]], first, separator, spec)
     names = text.number_columns(titles)
     shown = [
         text.split(squeeze(line), separator) for line in lines[rows_from : rows_from + SHOWN] if line.strip()

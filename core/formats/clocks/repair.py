@@ -16,7 +16,7 @@ from sagittal.core.formats.clocks import report
 from sagittal.core.formats.clocks.breaks import mend_breaks
 from sagittal.core.formats.clocks.order import SortedRuns, sort_runs
 from sagittal.core.formats.clocks.report import Repair
-from sagittal.core.formats.clocks.spread import Spread, spread_rows
+from sagittal.core.formats.clocks.spread import RowTimes, spread_rows
 from sagittal.core.formats.clocks.step import BURST, LARGE, Ints, Packets, find_packets, is_bursty
 from sagittal.core.formats.clocks.wraps import find_wrap, unwrap
 from sagittal.core.frames import Bools, Floats
@@ -247,7 +247,7 @@ def _describe_order(ordered: SortedRuns, runs: Packets, widths: Ints, rows: Ints
 
 
 def _describe_spread(
-    rows: _Rows, spread: Spread, wrong: Bools, runs: Packets, *, seconds: bool
+    rows: _Rows, spread: RowTimes, wrong: Bools, runs: Packets, *, seconds: bool
 ) -> list[Repair]:
     """What was done to rows (n,) in their true order."""
     out = []

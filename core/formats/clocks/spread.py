@@ -27,7 +27,7 @@ _NEIGHBOURS: Final = 5
 
 
 @dataclass(frozen=True)
-class Spread:
+class RowTimes:
     """Times of rows.
 
     Parameters
@@ -43,7 +43,7 @@ class Spread:
     step: float
 
 
-def spread_rows(stamps: Floats, widths: Ints, wrong: Bools, step: float, usual: int) -> Spread:
+def spread_rows(stamps: Floats, widths: Ints, wrong: Bools, step: float, usual: int) -> RowTimes:
     """Give every row a time.
 
     Parameters
@@ -93,7 +93,7 @@ def spread_rows(stamps: Floats, widths: Ints, wrong: Bools, step: float, usual: 
     ticks[slots > x[-1]] = y[-1] + (slots[slots > x[-1]] - x[-1]) * step
     out = np.full(rows, np.nan)
     out[~extra] = ticks
-    return Spread(out, extra, late, shared, step)
+    return RowTimes(out, extra, late, shared, step)
 
 
 def _find_floor(delay: Floats, ahead: int) -> Floats:

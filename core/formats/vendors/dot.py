@@ -17,9 +17,9 @@ from sagittal.core.errors import FormatError, Notice
 from sagittal.core.formats import text
 from sagittal.core.formats.aliases import segment_in
 from sagittal.core.formats.draft import WRAP_32, Draft, make_draft
-from sagittal.core.formats.layout import first_rows, has_decimal_comma
 from sagittal.core.formats.source import stem_of
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, SourceSpec
+from sagittal.core.formats.tables.layout import first_rows, has_decimal_comma
 from sagittal.core.frames import Floats
 
 LABEL: Final = "Movella DOT CSV"

@@ -17,9 +17,9 @@ from sagittal.core import rotation
 from sagittal.core.errors import FormatError, Notice
 from sagittal.core.formats import text
 from sagittal.core.formats.draft import Draft
-from sagittal.core.formats.layout import has_decimal_comma
 from sagittal.core.formats.source import stem_of
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, SourceSpec
+from sagittal.core.formats.tables.layout import has_decimal_comma
 from sagittal.core.frames import Floats
 
 _ACC: Final = ("Acc_X", "Acc_Y", "Acc_Z")

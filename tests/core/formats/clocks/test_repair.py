@@ -67,7 +67,7 @@ def test_jitter_of_a_phone_and_losses_are_no_fault() -> None:
 
 
 def test_a_clock_that_was_set_back_is_joined_and_said() -> None:
-    t = np.arange(4000) * 0.01 + 50.0
+    t = np.arange(4000.0) * 0.01 + 50.0
     t[2000:] -= 1.3
     found = repair_clock(t, [np.random.default_rng(0).normal(size=(4000, 3))], seconds=True)
     assert [r.code for r in found.repairs] == ["clock_set_back"]

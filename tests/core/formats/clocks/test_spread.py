@@ -17,7 +17,7 @@ def test_packets_are_spread_and_a_lost_one_is_a_hole() -> None:
 
 
 def test_a_row_for_which_the_clock_has_no_time_is_left_out() -> None:
-    stamps, widths = np.arange(100) * 0.01, np.ones(100, np.int64)
+    stamps, widths = np.arange(100.0) * 0.01, np.ones(100, np.int64)
     widths[50] = 2
     found = spread_rows(stamps, widths, np.zeros(100, np.bool_), 0.01, 1)
     assert np.flatnonzero(found.extra).tolist() == [51]

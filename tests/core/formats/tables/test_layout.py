@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from sagittal.core.formats.layout import find_layout, guess_separator, has_decimal_comma
+from sagittal.core.formats.tables.layout import find_layout, guess_separator, has_decimal_comma
 
 
 def shape(*lines: str) -> tuple[str, int, int, bool] | None:
     found = find_layout([line.encode() for line in lines])
-    return found and (found.separator.decode(), found.skip_rows, found.header_rows, found.decimal_comma)
+    if found is None:
+        return None
+    return found.separator.decode(), found.skip_rows, found.header_rows, found.decimal_comma
 
 
 def test_semicolons_with_a_decimal_comma_in_every_column_are_not_cut_at_the_commas() -> None:

@@ -5,7 +5,6 @@ Dates come as ISO 8601. Needs openpyxl: pip install 'sagittal[xlsx]'.
 
 from __future__ import annotations
 
-import datetime as dt
 import io
 import zipfile
 from collections.abc import Iterable
@@ -79,10 +78,8 @@ def _cell(value: Any) -> str:
         return ""
     if isinstance(value, float):
         return repr(value)
-    if isinstance(value, dt.datetime):
-        return value.isoformat(sep=" ", timespec="microseconds")
-    if isinstance(value, dt.time):
-        return value.isoformat(timespec="microseconds")
-    if isinstance(value, dt.timedelta):
+    if hasattr(value, "isoformat"):  # a date, a time of day or both
+        return str(value.isoformat()).replace("T", " ")
+    if hasattr(value, "total_seconds"):
         return repr(value.total_seconds())
     return " ".join(str(value).split())

@@ -12,7 +12,7 @@ import pytest
 from sagittal.core.errors import FormatError
 from sagittal.core.formats.archive import expand
 from sagittal.core.formats.source import SourceFile
-from sagittal.core.formats.workbook import is_workbook, read_sheets
+from sagittal.core.formats.tables.workbook import is_workbook, read_sheets
 
 
 def book(*sheets: list[list[object]]) -> bytes:

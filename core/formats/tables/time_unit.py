@@ -27,7 +27,7 @@ _UNITS: Final = {"s": "s", "m": "ms", "u": "us", "µ": "us", "n": "ns"}
 _DAY: Final = 86_400.0
 
 
-def named_unit(column: str) -> str | None:
+def read_unit(column: str) -> str | None:
     """The unit that the name of a column ends with."""
     found = _NAMED.search(column)
     if found is None:
@@ -55,7 +55,7 @@ def find_tick(column: str, values: Floats, rate_hz: float | None, source: str) -
     ManifestError `unit_missing`: no known unit gives the rate of an inertial sensor.
     """
     step = measure_step(values)
-    named = named_unit(column)
+    named = read_unit(column)
     if step is None:
         return TIME_UNITS[named or "s"]
     fitting = _fitting(step, rate_hz)
