@@ -1,4 +1,4 @@
-"""Text that a person entered or uploaded, as a type: pages show it unchanged in every language."""
+"""User-entered or uploaded text as a type: pages show it unchanged in every language."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any, Final
 
 
 class UserText(str):
-    """Text that a person entered or uploaded; it is never translated and its numbers are never localised.
+    """Text entered or uploaded by a user; never translated, nor are its numbers localised.
 
     Parts of it, changes of case and sums with other texts are user text too. An f-string, `format` and
-    `str.join` return a plain `str`: inside a sentence the text is put in quotation marks by `quote`, or given
-    to a message as a value.
+    `str.join` return a plain `str`: within a sentence, quote the text with `quote` or pass it to a message as
+    a value.
 
     >>> [type(text).__name__ for text in (UserText("Left knee")[:4], "Of " + UserText("Left"))]
     ['UserText', 'UserText']
@@ -21,11 +21,11 @@ class UserText(str):
     __slots__ = ()
 
     def __html__(self) -> str:
-        """Escape the text; templates that join it with their own words leave the result as it is."""
+        """Escape the text; the result is plain markup, which templates can join with their own text."""
         return escape(str(self)).replace("&quot;", "&#34;").replace("&#x27;", "&#39;")
 
     def __radd__(self, before: str) -> UserText:
-        """Return user text after another text."""
+        """Return user text after concatenation with a preceding text."""
         return UserText(before + str(self))
 
 
@@ -50,7 +50,7 @@ for _name in _KEEPING:
 
 
 def mark_user_text(value: Any) -> Any:
-    """Mark every text of a value as user text, in lists and in mappings, whose keys are marked too.
+    """Mark all texts in a value as user text, including lists, mappings and their keys.
 
     >>> type(mark_user_text({"sensors": ["Left foot"]})["sensors"][0]).__name__
     'UserText'
@@ -78,7 +78,7 @@ def encode_user_text(value: object) -> str:
 
 
 def quote(text: str) -> str:
-    """Return user text in quotation marks, which no language looks into, for a sentence; else the text.
+    """Return user text in quotation marks, which are never translated; other text unchanged.
 
     >>> quote(UserText("Pain, left knee")), quote("too short")
     ('“Pain, left knee”', 'too short')

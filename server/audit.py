@@ -1,12 +1,12 @@
-"""The audit trail: append-only rows sealed with the hash of the one before, in the change's own transaction.
+"""Audit trail: append-only rows chained by hash, written in the transaction of the change.
 
     with db.write() as c:
         c.execute(...)
         audit.record(c, actor, "patient.renamed", "patient", pid, {"fields": ["code"]})
 
-Rows of what is only looked at go through server/trail.py. One row per opened or changed resource; never a
-patient's code or name in `detail` (it outlives an erasure).
-Triggers forbid UPDATE and DELETE; who gets around them breaks the chain, which `sagittal check` sees.
+Rows for read access go through server/trail.py. One row per opened or changed resource; `detail` never
+contains a patient's code or name, as it outlives an erasure. Triggers forbid UPDATE and DELETE; bypassing
+them breaks the chain, which `sagittal check` detects.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ GENESIS = "0" * 64
 
 
 class Actor(Protocol):
-    """Who does something: a signed-in person."""
+    """A signed-in user who performs an action."""
 
     @property
     def user_id(self) -> str:
-        """Row of `user`."""
+        """Primary key in `user`."""
 
     @property
     def name(self) -> str:
@@ -48,7 +48,7 @@ def record(
     *,
     at: dt.datetime | None = None,
 ) -> None:
-    """Append one row; the connection must be a writing one, actor None = the system itself, at None = now."""
+    """Append one row on a writing connection; actor None = the system, at None = now."""
     token = getattr(actor, "token_id", None)  # who asks by an API token (server/auth/identity.py)
     last = c.execute(select(audit.c.seq, audit.c.hash).order_by(audit.c.seq.desc()).limit(1)).first()
     row = {
@@ -72,9 +72,9 @@ def list_entries(c: Connection, *, before: int | None = None, limit: int = 100) 
 
 
 def find_problems(c: Connection) -> list[str]:
-    """Where the chain is broken: changed rows, removed rows, a cut-off beginning or end.
+    """Breaks in the chain: changed or removed rows, or a truncated beginning or end.
 
-    A whole database that is older than the one before is not seen here but in storage/high_water.py.
+    A database replaced as a whole by an older copy is detected by storage/high_water.py instead.
     """
     found = []
     expected, previous = 1, GENESIS
@@ -93,7 +93,7 @@ def find_problems(c: Connection) -> list[str]:
 
 
 def _seal(row: Mapping[str, Any]) -> str:
-    """sha256 over every column but the hash itself, as canonical JSON."""
+    """SHA-256 over every column except the hash, as canonical JSON."""
     content = {k: v.astimezone(dt.UTC).isoformat() if k == "at" else v for k, v in row.items() if k != "hash"}
     text = json.dumps(content, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()

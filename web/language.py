@@ -1,4 +1,4 @@
-"""The languages of the pages: English is written in the sources, the others are catalogues in web/texts.
+"""Languages of the pages: English in the sources, others as catalogues in web/texts.
 
 A message is an English text with `{placeholders}`; a `Message` of core holds it together with its values.
 Each is written as its type asks: a number by the locale, a word of the product by the catalogue, user text as
@@ -45,7 +45,7 @@ LANGUAGES: Final[Mapping[str, str]] = {
 
 
 def choose_language(accepted: str | None) -> str:
-    """The language of the pages that a browser's Accept-Language asks for first.
+    """Choose the language of the pages from a browser's Accept-Language.
 
     >>> choose_language("fr-CH, de-CH;q=0.9, en;q=0.8"), choose_language("de;q=0.2, en")
     ('de', 'en')
@@ -64,11 +64,11 @@ def choose_language(accepted: str | None) -> str:
 
 
 class Catalogue:
-    """The texts of one language.
+    """Translations of one language.
 
     Parameters
     ----------
-    messages : English text with {placeholders} → text of the language with the same, or some of them.
+    messages : English text with {placeholders} → translation with the same placeholders, or some of them.
     """
 
     def __init__(self, language: str, messages: Mapping[str, str]) -> None:
@@ -81,17 +81,22 @@ class Catalogue:
         return SentenceFinder(self.messages, self._values)
 
     def find(self, text: str) -> str | None:
-        """A text in this language; None where no part of it is made from a message."""
-        said = self._render(text) if isinstance(text, Message) else self.messages.get(text)
+        """Translation of a text; None if the catalogue does not have it.
+
+        Only a sentence that carries no template is compared with the patterns of all messages.
+        """
+        if isinstance(text, Message):
+            return self._render(text)
+        said = self.messages.get(text)
         return self._sentences.find(text) if said is None else said
 
     def translate(self, text: str) -> str:
-        """A text in this language, English where it is made from no message."""
+        """Translation of a text, English if it matches no message."""
         known = self.find(text)
         return text if known is None else known
 
     def fill(self, message: str, values: Mapping[str, str]) -> str:
-        """The text of a message with values that are said already; English where the catalogue has none."""
+        """Translation of a message with translated values; English if the catalogue has none."""
         return fill_placeholders(self.messages.get(message, message), values)
 
     def day(self, value: dt.date | dt.datetime) -> str:
@@ -119,7 +124,7 @@ class Catalogue:
 
 
 def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:
-    """Message, text and the files it comes from, of every translated message of a .po file."""
+    """Yield message, translation and source files of every translated message of a .po file."""
     with path.open("rb") as file:
         for entry in read_po(file):
             if entry.id and entry.string:
@@ -127,7 +132,7 @@ def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:
 
 
 def catalogue_path(language: str) -> Path:
-    """Where the texts of a language are."""
+    """Path of a language's catalogue."""
     return TEXTS / f"{language}.po"
 
 
@@ -167,7 +172,7 @@ SCRIPT_PLACES: Final = (
 
 @functools.cache
 def script_texts(language: str) -> tuple[str, bytes]:
-    """What the scripts say in a language as JSON, and the hash of it that its address carries."""
+    """Translations used by scripts as JSON, and their hash for the URL."""
     said = {
         text: words
         for text, words, files in read_messages(catalogue_path(language))
@@ -179,7 +184,7 @@ def script_texts(language: str) -> tuple[str, bytes]:
 
 @functools.cache
 def load_catalogue(language: str) -> Catalogue:
-    """The catalogue of a language other than that of the sources, read once."""
+    """Load the catalogue of a language other than English, cached."""
     return Catalogue(
         language,
         {

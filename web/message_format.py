@@ -61,12 +61,12 @@ class ValueFormat:
 
 @functools.cache
 def has_words(message: str) -> bool:
-    """Whether something of a message is to be translated."""
+    """Whether a message contains anything to translate."""
     return re.search(r"[^\W\d_]{2}", PLACEHOLDER.sub(" ", _ENTITY.sub(" ", message))) is not None
 
 
 def fill_placeholders(said: str, values: Mapping[str, str]) -> str:
-    """A text with values in the place of its `{placeholders}`; one without a value stays."""
+    """Replace `{placeholders}` by their values; those without a value remain."""
     return PLACEHOLDER.sub(lambda m: values.get(m[1], m[0]), said)
 
 

@@ -1,8 +1,8 @@
-"""The texts of a template: what stands between tags and in the attributes that people read.
+"""Translatable texts of templates, between tags and in user-visible attributes.
 
-Templates are written in English without marks. For another language `speak_template` puts a call around every
-text and every value shown there; `list_texts` gives the same messages to the catalogue. What a person typed
-or uploaded is `UserText` and is shown as it is.
+Templates are written in English without markers. For other languages `speak_template` wraps every text and
+displayed value in a call; `list_texts` lists the same messages for the catalogue. User input is `UserText`
+and is displayed unchanged.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ _PARSER: Final = Environment()  # noqa: S701 - only reads expressions
 
 
 def speak_template(source: str) -> str:
-    """The source with each text and shown value inside a call of `say` or, in attributes, `say_plain`."""
+    """Wrap each text and displayed value in a call of `say` or, in attributes, `say_plain`."""
     return "".join(_walk(source, lambda run, how: _speak(run, how)))
 
 
 def list_texts(source: str) -> Iterator[str]:
-    """Every message of a template: its texts, and the strings in its expressions that read like one."""
+    """All messages of a template: its texts, and strings in expressions that look like text."""
     found: list[str] = []
 
     def keep(run: str, how: str) -> str:
@@ -55,9 +55,9 @@ def _is_plural(call: nodes.Call) -> bool:
 
 
 class _Run:
-    """What stands between two tags or statements: text and `{{ expressions }}` in turn.
+    """Alternating text and `{{ expressions }}` between two tags or statements.
 
-    `lead` and `trail` are the white space around; `pieces` are text (even) and expressions (odd).
+    `lead` and `trail` are surrounding white space; `pieces` are text (even) and expressions (odd).
     """
 
     def __init__(self, run: str) -> None:
@@ -81,7 +81,9 @@ class _Run:
 
 
 def _walk(source: str, speak: Callable[[str, str], str]) -> Iterator[str]:
-    """The source in order, each run of text and values through `speak`, those of attributes too."""
+    """Yield the source in order, with runs of text and values, including attributes, passed through
+    `speak`.
+    """
     run = ""
     for part in _TOKEN.split(source):
         if part.startswith("{{") and not _is_markup(part):
@@ -103,7 +105,7 @@ def _attribute(found: re.Match[str], speak: Callable[[str, str], str]) -> str:
 
 
 def _is_markup(expression: str) -> bool:
-    """Whether an expression is a macro's call, or HTML made elsewhere: no part of a sentence."""
+    """Whether an expression is a macro call or ready-made HTML rather than part of a sentence."""
     inner = expression[2:-2].strip("-").strip()
     called = re.match(r"(\w+)\(", inner)
     is_macro = called is not None and called[1] != "plural"
@@ -138,9 +140,9 @@ def _quote(text: str) -> str:
 
 
 def _variants(run: _Run) -> list[tuple[str, tuple[str, dict[str, str]]]]:
-    """Messages of a run with their conditions and values; several where a word depends on a condition.
+    """Messages of a run with their conditions and values; several if a word depends on a condition.
 
-    The first is that of every condition being false.
+    The first is for all conditions being false.
     """
     found: list[tuple[str, list[str], dict[str, str]]] = [("", [], {})]
     for i, piece in enumerate(run.pieces):
@@ -164,7 +166,7 @@ def _variants(run: _Run) -> list[tuple[str, tuple[str, dict[str, str]]]]:
 
 
 def _read_choice(expression: str) -> tuple[str, str, str] | None:
-    """The words where a condition holds, the condition, and the words where it does not."""
+    """Text if a condition holds, the condition, and text if it does not."""
     if counted := _PLURAL.fullmatch(expression):
         return counted[2], f"({counted[1]}) == 1", counted[3]
     either = _EITHER.fullmatch(expression)
@@ -172,7 +174,7 @@ def _read_choice(expression: str) -> tuple[str, str, str] | None:
 
 
 def _name(expression: str, taken: Container[str]) -> str:
-    """A name for a value: the last of its path."""
+    """Placeholder name of a value: the last component of its path."""
     path = re.match(r"[\w.\[\]']*", expression.lstrip("("))
     words: list[str] = re.findall(r"[A-Za-z_]+", path[0] if path else "") or ["value"]
     name = words[-1]
@@ -210,7 +212,7 @@ def _strings(node: nodes.Node) -> Iterator[str]:
 
 
 def reads_like_text(text: str) -> bool:
-    """Whether a string of a program reads like words for people: a capital or a space, and no code."""
+    """Whether a string of a program is user-visible text: it has a capital or a space and is not code."""
     plain = PLACEHOLDER.sub("x", text)
     return (
         re.search(r"[a-z]{2} \w|\w [a-z]{2}|^[A-Z][a-z]", plain) is not None

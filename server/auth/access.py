@@ -1,4 +1,4 @@
-"""The door of every route: a dependency that declares the route's action and lets in only who may do it."""
+"""Access control for routes: a dependency that declares the action of a route and enforces its permission."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from sagittal.server.trail import AuditTrail
 
 
 class RouteAccess:
-    """Dependency of one route; `action` is what the walk over all routes reads."""
+    """Dependency of one route; `action` is read by the check over all routes."""
 
     def __init__(self, action: Action) -> None:
         self.action = action
 
     def __call__(self, connection: HTTPConnection) -> Identity | None:
-        """Return who is asking; raise Problem 401 without a sign-in, 403 without the right.
+        """Return the identity of the caller; raise Problem 401 if not signed in, 403 if not permitted.
 
-        404 where the clinic has care teams and the address names something of a patient of others.
+        Raises 404 if the clinic has care teams and the path refers to a patient outside the caller's teams.
         """
         counts = self.action is not Action.WATCH_SIGN_IN
         identity = identify(connection, connection.path_params, counts=counts)
@@ -48,7 +48,7 @@ class RouteAccess:
 
 
 def _note_try(connection: HTTPConnection, who: Identity) -> None:
-    """Write down whom somebody outside the care team tried to open; the answer is that of an unknown id."""
+    """Record an attempt to open a patient outside the care team; the response is as for an unknown id."""
     db: Database = connection.app.state.db
     trail: AuditTrail = connection.app.state.trail
     with db.read() as c:
@@ -58,16 +58,18 @@ def _note_try(connection: HTTPConnection, who: Identity) -> None:
 
 
 def require(action: Action) -> Any:
-    """Declare a route's action: `who: Annotated[Identity, require(Action.UPLOAD)]`, http or websocket."""
+    """Declare a route's action: `user: Annotated[Identity, require(Action.UPLOAD)]`, for HTTP or
+    websocket.
+    """
     return Depends(RouteAccess(action))
 
 
 def identify(connection: HTTPConnection, parts: Mapping[str, str], *, counts: bool = True) -> Identity | None:
-    """Return who asks on this connection for what parts of an address name, None when nobody is known.
+    """Return the identity on this connection with its access to the path parameters; None if anonymous.
 
     Parameters
     ----------
-    counts : it is activity.
+    counts : whether the request counts as activity and prolongs the sign-in.
     """
     bearer = read_bearer(connection)
     if bearer is not None:
@@ -80,17 +82,17 @@ def identify(connection: HTTPConnection, parts: Mapping[str, str], *, counts: bo
 
 
 def opens(connection: HTTPConnection, who: Identity, parts: Mapping[str, str]) -> bool:
-    """Whether a person may open what parts of an address name (server/auth/sight.py)."""
+    """Whether the user may open the resources given by path parameters (server/auth/sight.py)."""
     db: Database = connection.app.state.db
     with db.read() as c:
         return may_open(c, who, parts)
 
 
 def find_end(connection: HTTPConnection, **parts: str) -> str | None:
-    """Why what stays open must end: not_signed_in, or not_found where a patient may be opened no longer.
+    """Reason why a long-lived connection must close: `not_signed_in`, or `not_found` if access was withdrawn.
 
-    None while the sign-in goes on and still opens this; asking counts as no activity. Without `parts`: what
-    the address of the connection names.
+    Returns None while the sign-in is valid and still grants access; the check does not count as activity.
+    `parts` default to the path parameters of the connection.
     """
     who = identify(connection, parts or connection.path_params, counts=False)
     if who is None:
@@ -99,12 +101,12 @@ def find_end(connection: HTTPConnection, **parts: str) -> str | None:
 
 
 async def wait_for_end(find: Callable[[], str | None]) -> str:
-    """Return why what stays open must end, when it must.
+    """Wait until a long-lived connection must close and return the reason.
 
     Parameters
     ----------
-    find : asked in a thread every `CHECK_EVERY_S`, as `find_end`; asked again while the database is away, for
-        nobody can be put out then.
+    find : such as `find_end`, called in a thread every `CHECK_EVERY_S`. Database errors are ignored and the
+        check is repeated.
     """
     while True:
         await asyncio.sleep(CHECK_EVERY_S)

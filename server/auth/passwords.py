@@ -1,4 +1,4 @@
-"""Passwords: argon2id, at most two at a time, and the same cost whether or not the account exists."""
+"""Password hashing with argon2id: at most two at a time, in equal time whether or not the account exists."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pwdlib import PasswordHash
 from pwdlib.exceptions import PwdlibError
 from pwdlib.hashers.argon2 import Argon2Hasher
 
+from sagittal.core.message import Message
 from sagittal.server.http.problems import Problem
 
 MIN_LENGTH = 12  # OWASP ASVS 4.0.3, 2.1.1
@@ -25,20 +26,25 @@ PATIENCE_S = 5.0
 
 
 def hash_password(password: str) -> str:
-    """Return the argon2id hash of a new password; raise Problem when it is too short or too long."""
+    """Return the argon2id hash of a new password; raise Problem if it is too short or too long."""
     if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
         raise Problem(
             422,
             "weak_password",
-            f"A password needs {MIN_LENGTH} to {MAX_LENGTH} characters; this one has {len(password)}. "
-            "A few unrelated words make a good one.",
+            Message(
+                "A password needs {MIN_LENGTH} to {MAX_LENGTH} characters; this one has {password}. "
+                "A few unrelated words make a good one.",
+                MIN_LENGTH=MIN_LENGTH,
+                MAX_LENGTH=MAX_LENGTH,
+                password=len(password),
+            ),
         )
     with _slot():
         return _HASHER.hash(password)
 
 
 def verify_password(password: str, stored: str | None) -> bool:
-    """Tell whether the password is right; None (no such account) takes as long as a wrong password."""
+    """Whether the password is correct; None (no such account) takes as long as a wrong password."""
     if len(password) > MAX_LENGTH:
         password = ""
     nobody = _nobody()
@@ -52,7 +58,7 @@ def verify_password(password: str, stored: str | None) -> bool:
 
 @functools.cache
 def _nobody() -> str:
-    """Return the hash that unknown names are checked against; made at the first sign-in, not at import."""
+    """Return the hash that unknown names are checked against, computed at the first sign-in."""
     with _slot():
         return _HASHER.hash("no account has this password")
 

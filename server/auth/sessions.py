@@ -1,4 +1,4 @@
-"""Sign-ins kept on the server: they end when idle, after twelve hours, at sign-out, or when revoked."""
+"""Sign-in sessions on the server: they end when idle, after twelve hours, at sign-out, or when revoked."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MOST_KEPT: Final = 1000
 
 @dataclasses.dataclass(frozen=True)
 class _Login:
-    """One sign-in as it is stored, or as it is kept while the disk refuses to be written."""
+    """One sign-in as stored in the database, or in memory while the disk is not writable."""
 
     user_id: str
     last_seen_at: dt.datetime
@@ -36,16 +36,16 @@ class _Login:
 
 
 class Logins:
-    """The open sign-ins.
+    """Open sign-ins.
 
-    While the disk refuses to be written, people still come in, stay and go: what cannot be stored is kept in
-    memory and ends with the process.
+    While the disk is not writable, users can still sign in, work and sign out: sessions are then held in
+    memory and end with the process.
 
     Parameters
     ----------
     db : the database.
-    idle, absolute : life without activity, and life in all (docs/how-to/operations.md, "Settings").
-    clock : aware time now.
+    idle, absolute : lifetime without activity, and in total (docs/how-to/operations.md, "Settings").
+    clock : returns the current time, aware.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Logins:
         self._ended: set[str] = set()  # ends that the disk refused
 
     def start(self, c: Connection, user_id: str, replaces: str | None) -> str:
-        """Open a sign-in and return its new token; the token the browser came with, if any, ends here."""
+        """Open a sign-in and return its new token; the browser's previous token, if any, is revoked."""
         at = self._clock()
         if replaces is not None:
             self.end(c, token_hash(replaces))
@@ -85,7 +85,7 @@ class Logins:
         return token
 
     def keep(self, user_id: str, replaces: str | None) -> str | None:
-        """Open a sign-in in memory, when the disk refuses to store it; None when too many are kept."""
+        """Open a sign-in in memory while the disk is not writable; None if there are too many."""
         at = self._clock()
         if replaces is not None:
             self._forget(token_hash(replaces))
@@ -97,21 +97,23 @@ class Logins:
         return token
 
     def find(self, token: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
-        """Return who holds this token and count the visit as activity; None when it is unknown or over.
+        """Return the identity for a token and count the request as activity; None if unknown or expired.
 
         Parameters
         ----------
-        parts : of the address that is asked for, to tell whether they may be opened.
+        parts : path parameters, for which access is determined as well.
         """
         return self.touch(token_hash(token), parts)
 
     def look(self, token: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
-        """Return the same without counting it as activity."""
+        """Return the identity for a token without counting the request as activity."""
         found = self._open(token_hash(token), self._clock(), parts)
         return None if found is None else found[1]
 
     def seconds_left(self, login_id: str) -> float:
-        """Seconds until a sign-in ends if nobody does anything; 0 when it is over. Not activity itself."""
+        """Seconds until a sign-in expires without activity; 0 if it has expired. Does not count as
+        activity.
+        """
         at = self._clock()
         found = self._open(login_id, at)
         if found is None:
@@ -120,7 +122,9 @@ class Logins:
         return (min(login.expires_at, login.last_seen_at + self._idle) - at).total_seconds()
 
     def touch(self, login_id: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
-        """Count a running view or replay as activity; None when the sign-in is over, so the view must end."""
+        """Count a running view or replay as activity; None if the sign-in has ended and the view must
+        close.
+        """
         at = self._clock()
         found = self._open(login_id, at, parts)
         if found is None:
@@ -132,7 +136,7 @@ class Logins:
         return identity
 
     def close(self, login_id: str) -> None:
-        """End one sign-in, also on a disk that refuses to be written."""
+        """End one sign-in, also while the disk is not writable."""
         try:
             with self._db.write() as c:
                 self.end(c, login_id)
@@ -147,7 +151,7 @@ class Logins:
         c.execute(delete(login_session).where(login_session.c.token_sha256 == login_id))
 
     def end_all(self, c: Connection, user_id: str, but: str | None = None) -> None:
-        """End every sign-in of one person, except the one (by its login id) that asks for it."""
+        """End every sign-in of one user, except the one with the given login id."""
         for login_id in [k for k, v in self._kept.items() if v.user_id == user_id and k != but]:
             self._kept.pop(login_id, None)
         c.execute(
@@ -159,7 +163,7 @@ class Logins:
     def _open(
         self, login_id: str, at: dt.datetime, parts: Mapping[str, str] = NOTHING
     ) -> tuple[_Login, Identity] | None:
-        """The sign-in with who it is, None when it is unknown or over."""
+        """The sign-in and its identity, None if it is unknown or expired."""
         if login_id in self._ended:
             return None
         kept = self._kept.get(login_id)
@@ -210,6 +214,6 @@ class Logins:
         self._seen[login_id] = at
 
     def _forget(self, login_id: str) -> None:
-        """End a sign-in in memory; a stored one ends by itself when it is idle."""
+        """End a sign-in in memory; a stored one expires when idle."""
         if self._kept.pop(login_id, None) is None:
             self._ended.add(login_id)

@@ -1,6 +1,6 @@
-"""Counts failed sign-ins per account and per address, so that guessing a password takes years.
+"""Limits failed sign-ins per account and per address, so that guessing a password takes years.
 
-One web server counts in memory; several count together, in the database.
+A single web server counts in memory; several share their counts in the database.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Protocol, TypeVar
 from sqlalchemy import ColumnElement, Connection, and_, delete, insert, select
 from sqlalchemy.exc import OperationalError
 
+from sagittal.core.message import Message
 from sagittal.server.http.problems import Problem
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.refusal import refusal_of
@@ -36,35 +37,35 @@ Found = TypeVar("Found")
 
 
 class FailureTimes(Protocol):
-    """When what failed, by key."""
+    """Times of failures by key."""
 
     def list_times(self, key: Key) -> Sequence[float]:
-        """Times of a key, the oldest first."""
+        """Times of a key, oldest first."""
 
     def add(self, key: Key, at: float) -> None:
-        """Note a failure."""
+        """Add a failure."""
 
     def remove(self, key: Key, at: float) -> None:
-        """Take one back; one that is not there is fine."""
+        """Remove a recorded failure; no error if absent."""
 
     def clear(self, key: Key) -> None:
-        """Forget those of a key."""
+        """Remove all failures of a key."""
 
     def clear_account(self, account: str) -> None:
-        """Forget those of an account, from wherever they came."""
+        """Remove all failures of an account, from any address."""
 
     def forget(self, before: float) -> None:
-        """Forget old ones, now or later."""
+        """Remove expired failures, now or later."""
 
 
 class FailureStore(Protocol):
-    """Where they are kept."""
+    """Storage of failures."""
 
     def work(self, do: Callable[[FailureTimes], Found]) -> Found:
-        """Call `do` while nobody else reads or writes them, and return what it returns."""
+        """Call `do` with exclusive access to the failures and return its result."""
 
     def look(self, do: Callable[[FailureTimes], Found]) -> Found:
-        """The same for what only reads."""
+        """Call `do` for read-only access and return its result."""
 
 
 class Throttle:
@@ -72,7 +73,7 @@ class Throttle:
 
     Parameters
     ----------
-    clock : seconds; of all web servers the same where they count together.
+    clock : seconds; common to all web servers that share counts.
     """
 
     def __init__(
@@ -82,9 +83,9 @@ class Throttle:
         self._store: FailureStore = FailuresInMemory() if store is None else store
 
     def begin(self, account: str, address: str) -> float:
-        """Check, and count this attempt as a failure before the password is looked at; returns its time.
+        """Check the limit, count this attempt as a failure before verification, and return its time.
 
-        A burst of guesses cannot all pass before the first of them has failed.
+        Counting first keeps a burst of guesses from passing before the first of them has failed.
         """
 
         # who is stopped already costs others no turn
@@ -97,7 +98,7 @@ class Throttle:
         return self._store.work(do)
 
     def withdraw(self, account: str, address: str, at: float) -> None:
-        """Take back an attempt that `begin` counted: it was right, or nobody could look at it."""
+        """Remove an attempt counted by `begin`: it succeeded, or could not be verified."""
 
         def do(times: FailureTimes) -> None:
             for key in _keys(account, address):
@@ -106,7 +107,7 @@ class Throttle:
         self._store.work(do)
 
     def check(self, account: str, address: str) -> None:
-        """Raise Problem 429 with Retry-After while one of the two has failed too often."""
+        """Raise Problem 429 with Retry-After while the account or the address has failed too often."""
         self._store.look(lambda times: self._require(times, account, address))
 
     def fail(self, account: str, address: str) -> None:
@@ -114,11 +115,11 @@ class Throttle:
         self._store.work(lambda times: self._count(times, account, address))
 
     def succeed(self, account: str, address: str) -> None:
-        """Forget the failures of somebody who mistyped a few times and has now signed in."""
+        """Clear the failures of this account from this address after a successful sign-in."""
         self._store.work(lambda times: times.clear((account, address)))
 
     def forgive(self, account: str) -> None:
-        """Forget all failures of an account: an administrator has given it a new password."""
+        """Clear all failures of an account, after an administrator has set a new password."""
         self._store.work(lambda times: times.clear_account(account))
 
     def _require(self, times: FailureTimes, account: str, address: str) -> None:
@@ -130,7 +131,10 @@ class Throttle:
             raise Problem(
                 429,
                 "too_many_attempts",
-                f"Too many failed attempts. Wait {minutes} min and try again, or ask an administrator.",
+                Message(
+                    "Too many failed attempts. Wait {minutes} min and try again, or ask an administrator.",
+                    minutes=minutes,
+                ),
                 headers={"Retry-After": str(seconds)},
             )
 
@@ -143,7 +147,7 @@ class Throttle:
 
 
 class FailuresInMemory:
-    """Those of one process."""
+    """Failures of one process."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -182,14 +186,14 @@ class FailuresInMemory:
             del self._failures[key]
 
     def forget(self, before: float) -> None:
-        """See FailureTimes; when there are many."""
+        """See FailureTimes; runs only when there are many entries."""
         if len(self._failures) > _MAX_KEYS:
             for key in [k for k, times in self._failures.items() if times[-1] <= before]:
                 del self._failures[key]
 
 
 class SharedFailures:
-    """Those of all web servers, in the database; in memory while its disk refuses to be written."""
+    """Failures of all web servers, in the database; in memory while its disk is not writable."""
 
     def __init__(self, db: Database) -> None:
         self._db, self._memory = db, FailuresInMemory()
@@ -205,14 +209,14 @@ class SharedFailures:
             return self._memory.work(do)
 
     def look(self, do: Callable[[FailureTimes], Found]) -> Found:
-        """See FailureStore; those that wait in memory count too."""
+        """See FailureStore; includes failures not yet written."""
         self._memory.work(do)
         with self._db.read() as c:
             return do(_FailureRows(c))
 
 
 class _FailureRows:
-    """Those of one transaction."""
+    """Failures within one transaction."""
 
     def __init__(self, c: Connection) -> None:
         self._c = c

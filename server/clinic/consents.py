@@ -1,7 +1,7 @@
-"""What a patient has agreed to: for what, since when, where it is written, and until when.
+"""Consents of patients: purpose, date, evidence and withdrawal.
 
-Nothing is overwritten: whoever no longer agrees gets a day of withdrawal, and may agree anew later. It leaves
-with the patient only.
+Consents are never overwritten: a withdrawal is recorded with its date, and consent can be given again later.
+They are deleted only together with the patient.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, insert, select, update
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import patients
 from sagittal.server.errors import Conflict, NotFound, ServiceError
@@ -20,12 +21,12 @@ from sagittal.server.storage.schema.tables import new_id, now, user
 
 @dataclass(frozen=True)
 class Consent:
-    """One thing that a patient agreed to.
+    """Consent of a patient for one purpose.
 
     Parameters
     ----------
-    purpose : one of CONSENT_PURPOSES. evidence : where it is written, "signed form, file 12".
-    withdrawn_on : None = it holds. by : name of who wrote it down, None = the program.
+    purpose : one of CONSENT_PURPOSES. evidence : reference to the document, "signed form, file 12".
+    withdrawn_on : None = in force. by : name of the user who recorded it, None = the program.
     """
 
     id: str
@@ -47,7 +48,7 @@ def give(
     evidence: str,
     given_on: dt.date | None = None,
 ) -> Consent:
-    """Write down that a patient agreed, today unless said otherwise.
+    """Record a consent, dated today by default.
 
     Raises
     ------
@@ -57,11 +58,21 @@ def give(
     today = now().date()
     day = given_on or today
     if purpose not in CONSENT_PURPOSES:
-        raise ServiceError("bad_value", f"'{purpose}' is no purpose; expected {', '.join(CONSENT_PURPOSES)}.")
+        raise ServiceError(
+            "bad_value",
+            Message(
+                "'{purpose}' is no purpose; expected {CONSENT_PURPOSES}.",
+                purpose=purpose,
+                CONSENT_PURPOSES=", ".join(CONSENT_PURPOSES),
+            ),
+        )
     if not 1 <= len(evidence.strip()) <= 200:
         raise ServiceError("bad_value", "Say in 1 to 200 characters where the consent is written.")
     if not dt.date(1900, 1, 1) <= day <= today:
-        raise ServiceError("bad_value", f"The day is {day.isoformat()}. Expected today or an earlier day.")
+        raise ServiceError(
+            "bad_value",
+            Message("The day is {isoformat}. Expected today or an earlier day.", isoformat=day.isoformat()),
+        )
     if any(one.purpose == purpose and one.withdrawn_on is None for one in of_patient(c, patient_id)):
         raise Conflict("agreed_already", "This is written down already and holds.")
     consent_id = new_id()
@@ -82,7 +93,7 @@ def give(
 
 
 def withdraw(c: Connection, actor: audit.Actor | None, consent_id: str) -> Consent:
-    """Write down that a patient no longer agrees, from today; raises NotFound, Conflict withdrawn_already."""
+    """Record a withdrawal as of today; raises NotFound, Conflict withdrawn_already."""
     found = get(c, consent_id)
     if found.withdrawn_on is not None:
         raise Conflict("withdrawn_already", "That it was withdrawn is written down already.")
@@ -101,7 +112,7 @@ def get(c: Connection, consent_id: str) -> Consent:
 
 
 def of_patient(c: Connection, patient_id: str) -> list[Consent]:
-    """What a patient agreed to, what holds first, then the latest."""
+    """Consents of a patient, those in force first, then the latest."""
     query = _QUERY.where(consent.c.patient_id == patient_id)
     ordered = query.order_by(consent.c.withdrawn_on.is_not(None), consent.c.given_on.desc(), consent.c.id)
     return [Consent(**row._asdict()) for row in c.execute(ordered)]

@@ -1,4 +1,4 @@
-"""Dated notes about a patient: what was agreed, tried or observed on a day, in a therapist's own words."""
+"""Dated free-text notes of therapists about a patient."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, delete, insert, select
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import patients
 from sagittal.server.clinic.calendar_days import require_day
@@ -18,7 +19,7 @@ MOST_CHARACTERS = 10_000
 
 @dataclass(frozen=True)
 class PatientNote:
-    """A note; `by`, `by_id` = name and account of who wrote it, None = the program."""
+    """A note; `by`, `by_id` = name and account of the author, None = the program."""
 
     id: str
     patient_id: str
@@ -36,11 +37,14 @@ def add(
     content: str,
     written_on: dt.date | None = None,
 ) -> PatientNote:
-    """Add a note, of today unless said otherwise; raises NotFound, ServiceError bad_value."""
+    """Add a note, dated today by default; raises NotFound, ServiceError bad_value."""
     patients.get(c, patient_id)
     text = content.strip()
     if not 1 <= len(text) <= MOST_CHARACTERS:
-        raise ServiceError("bad_value", f"A note has 1 to {MOST_CHARACTERS:,} characters.")
+        raise ServiceError(
+            "bad_value",
+            Message("A note has 1 to {MOST_CHARACTERS:,} characters.", MOST_CHARACTERS=MOST_CHARACTERS),
+        )
     note_id = new_id()
     c.execute(
         insert(patient_note).values(
@@ -57,21 +61,22 @@ def add(
 
 
 def may_remove(note: PatientNote, actor: audit.Actor | None, *, of_others: bool) -> bool:
-    """Whether somebody who may write notes may remove this one: their own, or others' if so allowed."""
+    """Whether a user may remove this note: their own, or any if `of_others`."""
     return of_others or actor is None or note.by_id in {None, actor.user_id}
 
 
 def remove(c: Connection, actor: audit.Actor | None, note_id: str, *, of_others: bool = False) -> None:
-    """Remove a note for good; raises NotFound, NotAllowed not_yours.
+    """Delete a note; raises NotFound, NotAllowed not_yours.
 
     Parameters
     ----------
-    of_others : a note that somebody else wrote too.
+    of_others : also permit notes of other authors.
     """
     found = get(c, note_id)
     if not may_remove(found, actor, of_others=of_others):
         raise NotAllowed(
-            "not_yours", f"{found.by} wrote this note. Ask that person or an administrator to remove it."
+            "not_yours",
+            Message("{by} wrote this note. Ask that person or an administrator to remove it.", by=found.by),
         )
     c.execute(delete(patient_note).where(patient_note.c.id == note_id))
     audit.record(c, actor, "note.removed", "patient", found.patient_id, {"note_id": note_id})
@@ -86,7 +91,7 @@ def get(c: Connection, note_id: str) -> PatientNote:
 
 
 def of_patient(c: Connection, patient_id: str) -> list[PatientNote]:
-    """The notes about a patient, of the latest day first."""
+    """Notes about a patient, latest day first."""
     query = _QUERY.where(patient_note.c.patient_id == patient_id)
     rows = c.execute(query.order_by(patient_note.c.written_on.desc(), patient_note.c.created_at.desc()))
     return [PatientNote(**row._asdict()) for row in rows]

@@ -1,4 +1,4 @@
-"""Sessions: one visit's recordings of a patient, and in what state they are."""
+"""Sessions: the recordings of one visit of a patient, and their state."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, bindparam, case, exists, func, insert, select, update
 
 from sagittal.core.frames import PROTOCOLS, Protocol
+from sagittal.core.message import Message
 from sagittal.core.subject.condition import (
     CHOICES,
     Footwear,
@@ -45,16 +46,16 @@ CHANGEABLE = frozenset({"title", "performed_on", "protocol", "height_m", *CHOICE
 
 @dataclass(frozen=True)
 class Session:
-    """A session with its patient's code and the state its pages show.
+    """A session with its patient's code and the state shown on pages.
 
     Parameters
     ----------
     state : empty (no files), uploaded, running (a job is queued or running), done (has a result), failed (the
         last job failed and there is no result).
     height_m : measured at this visit, None = use the patient's.
-    pace, aid, orthosis, shoes : how it was walked (core/subject/condition.py), None = not stated.
-    feedback : biofeedback was given; a live take sets it by itself.
-    has_video : a video was set beside its take.
+    pace, aid, orthosis, shoes : walking condition (core/subject/condition.py), None = not recorded.
+    feedback : biofeedback was given; set automatically by live trials.
+    has_video : a video is synchronised with its trial.
     """
 
     id: str
@@ -75,7 +76,7 @@ class Session:
     state: str
 
     def walked(self, belt_speed_mps: float | None = None) -> WalkingCondition:
-        """The condition of its take; the speed of a belt is in the manifest of its recording."""
+        """Walking condition of its trial; treadmill speed is in the manifest of its recording."""
         return WalkingCondition(
             self.pace,
             self.aid,
@@ -89,7 +90,7 @@ class Session:
 
 @dataclass(frozen=True)
 class WalkedSession:
-    """What a list needs of an analysed walk to find the one that it is compared with."""
+    """Attributes of an analysed walk that determine which walk it is compared with."""
 
     id: str
     performed_on: dt.date
@@ -112,7 +113,7 @@ def create(
 
     Parameters
     ----------
-    condition : pace, aid, orthosis, shoes, feedback as of `Session`; not stated without them.
+    condition : pace, aid, orthosis, shoes, feedback as in `Session`; not recorded if omitted.
     """
     if c.execute(select(patient.c.id).where(patient.c.id == patient_id)).first() is None:
         raise NotFound("patient", patient_id)
@@ -135,7 +136,7 @@ def create(
 def change(
     c: Connection, actor: audit.Actor | None, session_id: str, values: Mapping[str, object]
 ) -> Session:
-    """Change some of CHANGEABLE; raises NotFound, ServiceError bad_value."""
+    """Update some of CHANGEABLE; raises NotFound, ServiceError bad_value."""
     before = get(c, session_id)
     changed = {name: value for name, value in _checked(values).items() if getattr(before, name) != value}
     if changed:
@@ -153,7 +154,7 @@ def get(c: Connection, session_id: str) -> Session:
 
 
 def of_patient(c: Connection, patient_id: str) -> list[Session]:
-    """All sessions of a patient, the newest day first."""
+    """All sessions of a patient, latest date first."""
     return make_all(Session, c.execute(_OF_PATIENT, {"of_patient": patient_id}))
 
 
@@ -167,12 +168,12 @@ def search(
     until: dt.date | None = None,
     ids: Collection[str] = (),
 ) -> list[Session]:
-    """Sessions of all patients that a person may open whose code or note has `search`, by patient and day.
+    """Sessions of all accessible patients whose code or note contains `search`, by patient and date.
 
     Parameters
     ----------
-    who : None = the system, which sees everybody.
-    since, until : days, both included, None = open. ids : only these of them; empty = all.
+    who : None = the system, which sees all.
+    since, until : dates, inclusive, None = open. ids : restrict to these; empty = all.
     """
     query = only_seen(_QUERY, who).order_by(
         patient.c.code, session.c.performed_on, session.c.created_at, session.c.id
@@ -193,7 +194,7 @@ def search(
 
 
 def newest_of(c: Connection, patient_ids: Collection[str]) -> dict[str, Session]:
-    """The newest session of each of these patients by patient id; who has none is left out."""
+    """Latest session of each of these patients by patient id; patients without one are omitted."""
     place = func.row_number().over(partition_by=session.c.patient_id, order_by=_NEWEST)
     ranked = (
         select(session.c.id, place.label("place")).where(session.c.patient_id.in_(patient_ids)).subquery()
@@ -204,7 +205,7 @@ def newest_of(c: Connection, patient_ids: Collection[str]) -> dict[str, Session]
 
 
 def list_walks(c: Connection, patient_ids: Collection[str]) -> dict[str, list[WalkedSession]]:
-    """Analysed walks without feedback by patient, the newest first; the speed of a belt is not looked up."""
+    """Analysed walks without feedback by patient, newest first; treadmill speed is not read."""
     done = exists().where(analysis.c.recording_id == recording.c.id, _MINE).correlate(session)
     columns = [session.c[name] for name in ("id", "patient_id", "performed_on", "protocol", *CHOICES)]
     query = (
@@ -259,18 +260,27 @@ _OF_PATIENT = _QUERY.where(session.c.patient_id == bindparam("of_patient")).orde
 def _checked(values: Mapping[str, object]) -> dict[str, Any]:
     unknown = values.keys() - CHANGEABLE
     if unknown:
-        raise ServiceError("bad_value", f"A session has no {', '.join(sorted(unknown))}.")
+        raise ServiceError("bad_value", Message("A session has no {join}.", join=", ".join(sorted(unknown))))
     checked = dict(values)
     if "title" in checked and not 1 <= len(str(checked["title"])) <= 200:
         raise ServiceError("bad_value", "A session's title has 1 to 200 characters.")
     if checked.get("protocol", PROTOCOLS[0]) not in PROTOCOLS:
-        raise ServiceError("bad_value", f"The protocol is one of {', '.join(PROTOCOLS)}.")
+        raise ServiceError(
+            "bad_value", Message("The protocol is one of {PROTOCOLS}.", PROTOCOLS=", ".join(PROTOCOLS))
+        )
     for name, words in CHOICES.items():
         if checked.get(name) is not None and checked[name] not in words:
-            raise ServiceError("bad_value", f"{name} is one of {', '.join(words)}, or null where not stated.")
+            raise ServiceError(
+                "bad_value",
+                Message(
+                    "{name} is one of {words}, or null where not stated.", name=name, words=", ".join(words)
+                ),
+            )
     if not isinstance(checked.get("feedback", False), bool):
         raise ServiceError("bad_value", "feedback is true or false.")
     height = checked.get("height_m")
     if height is not None and not (isinstance(height, int | float) and 0.5 <= height <= 2.5):
-        raise ServiceError("bad_value", f"Body height is {height}, expected 0.5 to 2.5 m.")
+        raise ServiceError(
+            "bad_value", Message("Body height is {height}, expected 0.5 to 2.5 m.", height=height)
+        )
     return checked

@@ -1,4 +1,4 @@
-"""`sagittal backup`: one file with everything, while the service runs."""
+"""`sagittal backup`: back up everything into one file while the service runs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def backup(
     prune: bool = False,
     data_dir: DataDir = None,
 ) -> int:
-    """Make one backup; 1 when there is none, or when a stored file was already gone or damaged.
+    """Create one backup; 1 on failure, or if a stored file was already missing or damaged.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def backup(
     key
         encrypt it (`sagittal keygen`)
     prune
-        then keep 7 days, 4 weeks and 12 months of that folder
+        then retain 7 daily, 4 weekly and 12 monthly backups in that folder
     """
     from sagittal.server.safekeeping import backups
     from sagittal.server.safekeeping.tombstones import TombstoneError

@@ -1,4 +1,4 @@
-"""`sagittal demo`: a temporary clinic with simulated patients; nothing is kept."""
+"""`sagittal demo`: a temporary clinic with simulated patients; nothing is stored permanently."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DEMO_WORKERS = 2
 
 
 def demo(*, port: Whole | None = None) -> int:
-    """Serve a clinic of simulated patients on 127.0.0.1 until Ctrl-C; the folder is removed at the end.
+    """Serve a clinic of simulated patients on 127.0.0.1 until Ctrl-C, then delete its folder.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def demo(*, port: Whole | None = None) -> int:
 
 
 def _wait_for_live(database: Source, helper: subprocess.Popen[bytes]) -> bool:
-    """Wait until the walk of a helper streams; False when the helper ended before."""
+    """Wait until a simulated walk is streaming; False if its process ended first."""
     from sagittal.server.live_takes import live
 
     pause = threading.Event()
@@ -96,7 +96,7 @@ def _wait_for_live(database: Source, helper: subprocess.Popen[bytes]) -> bool:
 
 
 def _report(database: Source) -> None:
-    """Say on the console what is being waited for, until every session is analysed."""
+    """Print progress to the console until every session is analysed."""
     from sagittal.server.demo.clinic import VISITS
     from sagittal.server.storage.schema.tables import job
     from sagittal.server.uploads.recordings import ANALYSE

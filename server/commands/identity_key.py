@@ -19,16 +19,16 @@ def identity_key(
     without_key: bool = False,
     data_dir: DataDir = None,
 ) -> int:
-    """Make the key, change it, or list and remove what it does not open; 1 when that is not possible.
+    """Create the key, change it, or list and remove identities it cannot decrypt; 1 if not possible.
 
     Parameters
     ----------
     what
-        discard: list what it does not open
+        discard: list identities it cannot decrypt
     really
-        remove what `discard` lists, for good
+        permanently delete what `discard` lists
     without_key
-        though the key is not there: lost for good
+        even if the key is missing: they are lost permanently
     """
     from sagittal.core.errors import SagittalError
     from sagittal.server.clinic import identities

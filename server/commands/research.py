@@ -1,4 +1,4 @@
-"""`sagittal research`: de-identified results of patients for research, and who is behind a pseudonym."""
+"""`sagittal research`: export de-identified results for research, or identify a pseudonym."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ def research(
     who: Annotated[str | None, Parameter(metavar="PSEUDONYM")] = None,
     data_dir: DataDir = None,
 ) -> int:
-    """Write the zip, or name the patient behind a pseudonym; 1 when that is not possible.
+    """Write the zip, or name the patient with a pseudonym; 1 if not possible.
 
     Parameters
     ----------
     out
         the file to write
     key
-        leads pseudonyms back; made anew where there is none
+        key of the pseudonyms; created if it does not exist
     patients
-        these only (default: all)
+        only these patients (default: all)
     signals
-        also what the sensors measured
+        include sensor signals
     without_consent
-        also who has not agreed to research
+        include patients without consent to research
     who
-        say whose pseudonym of this key it is; nothing is written
+        print the patient with this pseudonym; nothing is written
     """
     from sagittal.core.errors import SagittalError
     from sagittal.server.downloads import deidentified
@@ -78,7 +78,7 @@ def research(
 
 
 def _name_person(db: Database, secret: ResearchKey, who: str) -> int:
-    """Say whose pseudonym it is; 1 when it is nobody's."""
+    """Print the patient with a pseudonym; 1 if unknown."""
     from sagittal.server.downloads import deidentified
 
     with db.read() as c:
@@ -88,7 +88,7 @@ def _name_person(db: Database, secret: ResearchKey, who: str) -> int:
 
 
 def _choose(db: Database, codes: tuple[str, ...], without_consent: bool) -> tuple[list[Patient], int]:
-    """Patients to export, and how many were asked for."""
+    """Patients to export, and the number requested."""
     from sagittal.core.errors import SagittalError
     from sagittal.server.downloads import deidentified
 
@@ -108,7 +108,7 @@ def _write_zip(
     chosen: Sequence[Patient],
     signals: bool,
 ) -> None:
-    """Write the file; it takes its place when it is whole."""
+    """Write the file under a temporary name and rename it when complete."""
     from sagittal.server.downloads import deidentified
     from sagittal.server.storage import fs
     from sagittal.server.storage.files.blob_opening import open_blobs

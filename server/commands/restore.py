@@ -1,4 +1,4 @@
-"""`sagittal restore`: put a backup into an empty data folder, or try whether it could be."""
+"""`sagittal restore`: restore a backup into an empty data folder, or test whether it can be restored."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ def restore(
     test: bool = False,
     data_dir: DataDir = None,
 ) -> int:
-    """Restore a backup, everything verified first; 1 when nothing was put in place.
+    """Restore a backup after complete verification; 1 if nothing was restored.
 
     Parameters
     ----------
     key
         the private key of an encrypted backup
     erased
-        another list of who must not come back
+        additional list of erased patients that must not be restored
     test
-        only try it, in a folder that is removed again
+        only test it, in a temporary folder
     """
     from sagittal.server.safekeeping import restoring
     from sagittal.server.safekeeping.restore_room import RestoreError
@@ -68,7 +68,7 @@ def restore(
 
 
 def _tell_names_key(settings: Settings) -> str:
-    """What to do with the key of patients' names that came with the backup where its place is another."""
+    """Print where to put the identity key from the backup if it belongs outside the data folder."""
     from sagittal.server.safekeeping.backups import IDENTITY_KEY
 
     came, place = settings.data_dir / IDENTITY_KEY, settings.identity_key_file

@@ -1,4 +1,4 @@
-"""`sagittal user`: add a user or give one a new password, for whoever has the machine's console."""
+"""`sagittal user`: add a user or reset a password, from the server's console."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def user(
     role: Literal["admin", "clinician", "assistant", "viewer"] = "clinician",
     data_dir: DataDir = None,
 ) -> int:
-    """Ask for a password and store its hash.
+    """Prompt for a password and store its hash.
 
     An existing user keeps the role, gets the new password, and loses second factor and tokens.
     """

@@ -1,12 +1,12 @@
-"""The archive of a visit: one zip with the recording, what its analysis was told, settings and results.
+"""Archive of a visit: one zip with the recording, the manifest and settings of its analysis, and results.
 
-    sagittal-episode.json     version, when, SHA-256 of every file, what a person changed afterwards
-    recording/…               the original files; those inside zips and gz are taken out of them
+    sagittal-episode.json     version, time, SHA-256 of every file, later edits by users
+    recording/…               the original files, unpacked from zip and gz
     sagittal-manifest.json    the manifest of the analysis
-    config.json               its settings where they differ from the defaults
-    results/…                 result files as they were stored
-    report/…                  parameters and curves as the report shows them, after a person's changes; the
-                              signed report in force, with its PDF where one was made
+    config.json               settings that differ from the defaults
+    results/…                 result files as stored
+    report/…                  parameters and curves of the report, including edits; the signed report
+                              in force, with its PDF if available
 
 Uploaded to another Sagittal, or given to `sagittal analyse`, the recording is read with that manifest and
 those settings, so the same version gives the same numbers.
@@ -48,12 +48,12 @@ def write_archive(
 
     Parameters
     ----------
-    recording : what was analysed. report : files of the report by name. signed : the version in force.
+    recording : the analysed recording. report : files of the report by name. signed : the version in force.
 
     Raises
     ------
     IntegrityError, ArchiveError
-        A stored file is damaged, or a zip that was uploaded.
+        A stored file or an uploaded zip is damaged.
     """
     from sagittal.core.formats.archive import EPISODE_CONFIG, EPISODE_MANIFEST, EPISODE_MARK  # slow import
 
@@ -91,7 +91,7 @@ def write_archive(
 
 
 def _settings(blobs: BlobStore, recording: StoredRecording, found: AnalysisRecord) -> Mapping[str, Any]:
-    """What the analysis was computed with, also where it came in an archive among the recording's files."""
+    """Settings of the analysis, including those of an archive among the recording's files."""
     from sagittal.server.results.analysing import choose_config  # slow imports
     from sagittal.server.storage.files.blob_source import open_source
 
@@ -100,7 +100,7 @@ def _settings(blobs: BlobStore, recording: StoredRecording, found: AnalysisRecor
 
 
 def _originals(blobs: BlobStore, recording: StoredRecording) -> Iterator[tuple[str, bytes]]:
-    """The recording's files one after another, taken out of the zips and gz they came in."""
+    """Iterate over the recording's files, unpacked from zip and gz."""
     from sagittal.core.formats.archive import EPISODE_RECORDING, expand  # slow import
     from sagittal.core.formats.source import SourceFile
 

@@ -1,6 +1,6 @@
-"""Exports of an analysis for other programs: offered, asked for, written in the child, published.
+"""Exports of an analysis for other programs: offer, request, write in the child process, publish.
 
-The file of an export is a file of its analysis, named by the job; so it lives and goes with it.
+An export is stored as a file of its analysis, named by the job, and is deleted with it.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sqlalchemy import Connection, insert, select
 
 from sagittal.core.events.edits import read_edit
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.clinic.patients import Patient
@@ -43,12 +44,13 @@ MEDIA_TYPES: Final = {signed_reports.PDF: "application/pdf", signed_reports.DOCU
 
 @dataclass(frozen=True)
 class ExportOffer:
-    """A format that the shown analysis can be written in, as it counts now.
+    """A format in which the displayed analysis can be exported, in its current state.
 
     Parameters
     ----------
-    kind : its name. label, what : in words. job : that writes it, None = not asked for since the last change.
-    analysis_id, file : where it can be downloaded, file None until it is written.
+    kind : name. label, what : title and description. job : the export job, None = not requested since the
+        last change.
+    analysis_id, file : location for the download, file None until it is written.
     """
 
     kind: str
@@ -62,10 +64,10 @@ class ExportOffer:
 def list_offers(
     c: Connection, patient: Patient, session: Session, found: analyses.AnalysisRecord
 ) -> list[ExportOffer]:
-    """Every format that an analysis of a session can be written in, and how far it is.
+    """All formats in which an analysis of a session can be exported, and their progress.
 
-    What was written before the last edit, or before person or visit were corrected, is offered anew; what
-    hands on the signed report also after it was signed, reopened or printed.
+    An export is offered again after an edit or a correction of patient or visit; formats that contain the
+    signed report also after it was signed, reopened or printed.
     """
     possible = kinds.list_possible(found.files)
     params = _collect_params(c, patient, session, found, possible)
@@ -86,19 +88,24 @@ def _offer(found: analyses.AnalysisRecord, kind: ExportKind, made: JobView | Non
 def submit(
     c: Connection, queue: JobQueue, actor: audit.Actor | None, session_id: str, *, kind: str
 ) -> JobView:
-    """Ask for an export of the analysis that the session shows, with the edits that count; done once.
+    """Request an export of the session's displayed analysis with the current edits; idempotent.
 
     Raises
     ------
     NotFound
-        the session, its analysis. InputError unknown_export. Conflict export_not_possible.
+        the session or its analysis. InputError unknown_export. Conflict export_not_possible.
     """
     chosen = kinds.find_kind(kind)
     found = analyses.get_shown(c, session_id)
     if chosen not in kinds.list_possible(found.files):
         lacking = ", ".join(name for name in chosen.needs if name not in found.files)
         raise Conflict(
-            "export_not_possible", f"This analysis has no {lacking}, which “{chosen.label}” is made from."
+            "export_not_possible",
+            Message(
+                "This analysis has no {lacking}, which “{label}” is made from.",
+                lacking=lacking,
+                label=chosen.label,
+            ),
         )
     session, patient = sessions.get(c, session_id), patients.get(c, found.patient_id)
     params = _collect_params(c, patient, session, found, [chosen])
@@ -106,16 +113,16 @@ def submit(
 
 
 def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
-    """Write an export; pure, and too short to say how far it is.
+    """Write an export; pure, and too short for progress reports.
 
     Parameters
     ----------
-    files : result files of the analysis, and documents of the signed report where the format hands it on.
+    files : result files of the analysis, and documents of the signed report if the format includes it.
 
     Raises
     ------
     SagittalError
-        it cannot be written; the code and the sentence say why.
+        it cannot be written; code and message give the reason.
     """
     readers = {file.name: file.read for file in files if not file.name.startswith(SIGNED)}
     edits = [read_edit(e) for e in params["edits"]]
@@ -126,7 +133,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
 
 
 def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Mapping[str, Blob]) -> None:
-    """Write the file of a result, in the transaction that marks its job done."""
+    """Store the file of a result, in the transaction that marks its job done."""
     for kind, blob in stored.items():
         name = name_file(kinds.find_kind(kind), claim.job_id)
         row = {"name": name, "size": blob.size, "sha256": blob.sha256}
@@ -134,7 +141,7 @@ def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Map
 
 
 def _read_signed(files: Sequence[SourceFile], told: Mapping[str, Any]) -> SignedForm:
-    """The signed report of a job, as `_collect_params` has given it."""
+    """The signed report of a job, as specified by `_collect_params`."""
     readers = {file.name: file.read for file in files}
     documents = tuple(
         (media_type, readers[SIGNED + name]())
@@ -152,7 +159,7 @@ def _collect_params(
     found: analyses.AnalysisRecord,
     wanted: Sequence[ExportKind],
 ) -> dict[str, dict[str, Any]]:
-    """What each format is written from, fixed at submission, by its name."""
+    """Job parameters of each format by name, fixed at submission."""
     edits = edit_log.edits_of(c, found.id)
     shared: dict[str, Any] = {
         "space": found.patient_id,
@@ -199,5 +206,5 @@ def _describe_visit(patient: Patient, analysed: AnalysedSession) -> VisitFacts:
 
 
 def make_pseudonym(identity: str) -> str:
-    """A stable name that leads back to nobody without the database: 12 hex digits."""
+    """Stable pseudonym that cannot be resolved without the database: 12 hex digits."""
     return hashlib.sha256(identity.encode()).hexdigest()[:12]

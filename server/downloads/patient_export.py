@@ -1,11 +1,11 @@
-"""Everything that is stored of one patient as one zip, for the person or for another clinic.
+"""All stored data of one patient as one zip, for the patient or another clinic.
 
-    for piece in export_patient(db, blobs, patient_id, key_file): ...        # in pieces, whatever the size
+    for piece in export_patient(db, blobs, patient_id, key_file): ...        # streamed
 
-`patient.json` has every row that belongs to the patient, by table, with the names of who wrote it; who the
-patient is stands there in clear for who may read that, else not at all.
-`audit.json` who opened or changed what of it, `files/<table>/<id>/<name>` the files, recordings as uploaded.
-What belongs to a patient is found by the references of the tables, so a new table is in it by itself.
+`patient.json` has every row that belongs to the patient, by table, with the authors' names; the identity is
+included in clear text if the user may read it, otherwise omitted. `audit.json` lists access and changes,
+`files/<table>/<id>/<name>` are the files, recordings as uploaded. Rows of a patient are found through foreign
+keys, so new tables are included automatically.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class ExportedFile:
 
 
 def list_rows(c: Connection, patient_id: str) -> dict[str, list[dict[str, Any]]]:
-    """Every row that belongs to a patient, by table; raises NotFound."""
+    """All rows that belong to a patient, by table; raises NotFound."""
     patients.get(c, patient_id)
     found: dict[str, dict[tuple[object, ...], dict[str, Any]]] = {}
     ids: dict[str, set[str]] = {patient.name: {patient_id}}
@@ -64,7 +64,7 @@ def list_rows(c: Connection, patient_id: str) -> dict[str, list[dict[str, Any]]]
 
 
 def list_files(rows: dict[str, list[dict[str, Any]]]) -> list[ExportedFile]:
-    """The files that rows refer to; their names were checked when they came (receiving.check_name)."""
+    """Files referenced by rows; their names were validated on upload (receiving.check_name)."""
     found = {}
     for table, its_rows in rows.items():
         for row in its_rows:
@@ -79,11 +79,11 @@ def list_files(rows: dict[str, list[dict[str, Any]]]) -> list[ExportedFile]:
 def export_patient(
     db: Database, blobs: BlobStore, patient_id: str, identity_key: Path | None = None
 ) -> Iterator[bytes]:
-    """The zip in pieces; what is gone or damaged is named in `missing.json` instead.
+    """Yield the zip in parts; missing or damaged files are listed in `missing.json` instead.
 
     Parameters
     ----------
-    identity_key : file with the key of patients' names; None = who asks may not read them.
+    identity_key : file with the key of identities; None = the user may not read identities.
     """
     missing = []
     with db.read() as c:
@@ -141,7 +141,7 @@ def _keep(
     found: dict[str, dict[tuple[object, ...], dict[str, Any]]],
     ids: dict[str, set[str]],
 ) -> bool:
-    """Add the rows of a table to those found; whether there are new ones."""
+    """Add rows of a table to the result; return whether any are new."""
     known = found.setdefault(table.name, {})
     before = len(known)
     for row in c.execute(select(table).where(mine)):

@@ -1,8 +1,8 @@
-"""The visits of a study as two tables: which ones are chosen, and their analyses as they count.
+"""Studies: the selected visits and their current analyses as two tables.
 
-Nothing is analysed anew and nothing is kept: the tables are made of the stored analyses with the persons'
-edits, in a process of their own (study_child.py). Persons and visits stand in them by pseudonyms, those of
-the other exports; no date, no note.
+Nothing is recomputed or stored: the tables are built from stored analyses and users' edits, in a separate
+process (study_child.py). Patients and visits are identified by the pseudonyms of the other exports; dates and
+notes are omitted.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from sqlalchemy import Connection
 
 from sagittal.core.errors import SagittalError
 from sagittal.core.frames import Protocol
+from sagittal.core.message import Message
 from sagittal.server.auth.identity import Identity
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.clinic.patients import Patient
@@ -42,12 +43,12 @@ MOST_VISITS: Final = 300
 
 @dataclass(frozen=True)
 class StudyChoice:
-    """Which visits are wanted.
+    """Selection of visits.
 
     Parameters
     ----------
-    search : part of a patient's code or note. protocol : None = any. since, until : days, both included.
-    visits : only these of them; None = all.
+    search : part of a patient's code or note. protocol : None = any. since, until : dates, inclusive. visits
+        : restrict to these; None = all.
     """
 
     search: str = ""
@@ -58,7 +59,7 @@ class StudyChoice:
 
 
 def list_visits(c: Connection, who: Identity, choice: StudyChoice) -> list[Session]:
-    """The visits of a choice that a person may open, by patient and day."""
+    """Selected visits that a user may open, by patient and date."""
     if choice.visits is not None and not choice.visits:
         return []
     return sessions.search(
@@ -73,21 +74,25 @@ def list_visits(c: Connection, who: Identity, choice: StudyChoice) -> list[Sessi
 
 
 def check_size(chosen: Sequence[Session]) -> None:
-    """Refuse a study of no visit or of too many; raises Conflict no_visits, too_many_visits."""
+    """Reject a study with no visits or too many; raises Conflict no_visits, too_many_visits."""
     if not chosen:
         raise Conflict("no_visits", "No visit fits this choice. Choose another period or protocol.")
     if len(chosen) > MOST_VISITS:
         raise Conflict(
             "too_many_visits",
-            f"{len(chosen)} visits fit this choice, at most {MOST_VISITS} go into one study. "
-            "Choose a shorter period and put the tables together.",
+            Message(
+                "{chosen} visits fit this choice, at most {MOST_VISITS} go into one study. Choose a "
+                "shorter period and put the tables together.",
+                chosen=len(chosen),
+                MOST_VISITS=MOST_VISITS,
+            ),
         )
 
 
 def make_study(
     db: Database, reviewed: ReviewedAnalyses, who: Identity, choice: StudyChoice
 ) -> tuple[StudyTables, list[str]]:
-    """Write the tables of a choice, and say which visits are in them.
+    """Write the tables of a selection and list the visits they contain.
 
     Raises
     ------
@@ -136,7 +141,7 @@ def _open_take(
     files: Mapping[str, str],
     done: AnalysedSession,
 ) -> StudyTake:
-    """The result of a visit as it counts; what cannot be read is told, and the others go on."""
+    """Current result of a visit; an unreadable one is reported, without affecting the others."""
     found, edits = done.found, done.edits
     error, strides, analysis = None, None, {}
     try:
@@ -156,7 +161,7 @@ def _open_take(
 
 
 def _hide_names(files: Mapping[str, str]) -> dict[str, str]:
-    """Hashes by number: a file may be called after a person."""
+    """Replace file names in hashes by numbers, as files may be named after patients."""
     return {f"file-{number}": sha256 for number, sha256 in enumerate(files.values(), 1)}
 
 

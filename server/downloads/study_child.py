@@ -1,8 +1,7 @@
-"""The process that makes the tables of one study and ends: reading hundreds of results stops nobody.
+"""Process that builds the tables of one study, so that reading hundreds of results does not block the server.
 
-Started by server/downloads/study_maker.py as
-`python -m sagittal.server.downloads.study_child <socket> <parent pid>`. It reads the database and
-writes nothing.
+Started by server/downloads/study_maker.py as `python -m sagittal.server.downloads.study_child <socket>
+<parent pid>`. It reads the database and writes nothing.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from sagittal.server.storage.files.blob_opening import open_blobs
 
 
 class StudyReply(msgspec.Struct, frozen=True):
-    """The tables of a study in a zip and the visits in them, or why there is none."""
+    """Tables of a study in a zip and its visits, or the reason of failure."""
 
     content: bytes = b""
     visits: tuple[str, ...] = ()
@@ -34,7 +33,7 @@ class StudyReply(msgspec.Struct, frozen=True):
 
 
 def main() -> None:
-    """Make the tables of the one choice that comes over the line."""
+    """Build the tables of the one request received over the channel."""
     line, settings = enter_child()
     try:
         reply = _make(settings, *msgspec.msgpack.decode(line.receive(), type=tuple[Identity, StudyChoice]))

@@ -1,4 +1,4 @@
-"""Studies as a download: each made by a process of its own, one at a time."""
+"""Study downloads: each is built by its own process, one at a time."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _turn = ErrandTurn()
 
 
 class StudyFailed(ServiceError):  # noqa: N818 - says what failed
-    """No tables could be made."""
+    """The tables could not be created."""
 
     status = 503
 
@@ -32,12 +32,12 @@ class StudyFailed(ServiceError):  # noqa: N818 - says what failed
 def fetch_study(
     db: Database, settings: Settings, who: Identity, choice: StudyChoice
 ) -> tuple[bytes, tuple[str, ...]]:
-    """The tables of a choice as a zip, and which visits are in them.
+    """Tables of a selection as a zip, and the visits they contain.
 
     Raises
     ------
     Conflict
-        no_visits, too_many_visits. StudyFailed: others wait, it took too long, or ended without a word.
+        no_visits, too_many_visits. StudyFailed: the queue is full, it timed out, or the process died.
     """
     with db.read() as c:
         check_size(list_visits(c, who, choice))

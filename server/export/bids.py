@@ -1,7 +1,7 @@
-"""A BIDS-motion data set of one visit: what the sensors measured, contacts, strides.
+"""BIDS-motion data set of one visit: sensor signals, contacts, strides.
 
-Layout and columns: Brain Imaging Data Structure 1.9, "Motion" (doi:10.1038/s41597-024-03559-8). Nothing in it
-leads to a person: pseudonyms, no dates, ages of 89 and more as 89+.
+Layout and columns: Brain Imaging Data Structure 1.9, "Motion" (doi:10.1038/s41597-024-03559-8). Free of
+identifying data: pseudonyms, no dates, ages of 89 and above as 89+.
 """
 
 from __future__ import annotations
@@ -172,7 +172,7 @@ def _list_events(content: ExportContent) -> bytes:
 
 
 def _label(text: str) -> str:
-    """Text as a label: letters and digits only."""
+    """Convert text to a label of letters and digits only."""
     return re.sub(r"[^A-Za-z0-9]", "", text) or "unknown"
 
 
@@ -182,7 +182,7 @@ def _tsv(header: Sequence[str], rows: Sequence[Sequence[object]]) -> bytes:
 
 
 def _cell(value: object) -> str:
-    """A cell: undefined is n/a, and a text has neither tabs nor line ends."""
+    """Format a cell: undefined is n/a, tabs and line breaks are removed."""
     if value is None or value == "":
         return "n/a"
     return _number(value) if isinstance(value, float) else re.sub(r"\s+", " ", str(value))

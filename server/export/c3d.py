@@ -1,6 +1,6 @@
-"""C3D: joint centres as markers, joint angles, contacts as events, by ezc3d (extra `c3d`).
+"""C3D export by ezc3d (extra `c3d`): joint centres as markers, joint angles, contacts as events.
 
-A C3D file counts frames in 16 bits and the entries of a list in 8; a long take is written in parts.
+C3D counts frames in 16 bits and list entries in 8, so long trials are split into several files.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ EVENT_NAMES: Final = {"ic": ("Foot Strike", 1), "tc": ("Foot Off", 2)}
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """What a C3D file holds over time: label → (n, 3), NaN where not known."""
+    """Time series of a C3D file: label → (n, 3), NaN where unknown."""
 
     t_s: Floats
     rate_hz: float
@@ -51,7 +51,7 @@ class Trajectories:
 
 
 def write_c3d(content: ExportContent) -> bytes:
-    """Write a zip of walk.c3d, or of walk-1.c3d … of a take that is too long for one file.
+    """Write a zip of walk.c3d, or of walk-1.c3d … for a trial too long for one file.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def _joints(angles: JointAngles) -> dict[str, Floats]:
 
 
 def _pelvis(angles: JointAngles) -> dict[str, Floats]:
-    """Tilt, side up, side forward: the latter is the heading in the world, as no walkway has a direction."""
+    """Tilt, upward obliquity and rotation; rotation is the heading in the world, without a walkway axis."""
     given, heading = angles.angles, angles.headings.get("pelvis")
     if "pelvis_tilt" not in given or heading is None:
         return {}
@@ -119,7 +119,7 @@ def _pelvis(angles: JointAngles) -> dict[str, Floats]:
 
 
 def find_parts(n: int, t_s: Floats, events: Sequence[GaitEvent]) -> list[tuple[int, int]]:
-    """Ranges of frames [first, last), as few as hold the limits, all but equally long."""
+    """Ranges of frames [first, last) of nearly equal length, as few as the limits allow."""
     times = np.array([e.time_s for e in events])
     count = max(1, ceil(n / FRAMES))
     while True:
@@ -131,7 +131,7 @@ def find_parts(n: int, t_s: Floats, events: Sequence[GaitEvent]) -> list[tuple[i
 
 
 def _lie_within(times: Floats, t_s: Floats, first: int, last: int) -> np.ndarray:
-    """Which times lie in a range of frames; the last one ends with the take."""
+    """Mask of the times within a range of frames; the last range extends to the end of the trial."""
     end = t_s[last] if last < len(t_s) else np.inf
     return np.asarray((times >= t_s[first]) & (times < end))
 
@@ -166,7 +166,7 @@ def _write_part(file: Any, content: ExportContent, found: Trajectories, first: i
 
 
 def _add_events(file: Any, content: ExportContent, events: Sequence[GaitEvent], start_s: float) -> None:
-    """The group that programs read contacts from: minutes and seconds from the file's first frame."""
+    """Add the standard event group: minutes and seconds from the file's first frame."""
     n = len(events)
     file.add_parameter("EVENT", "USED", [n])
     if not n:
@@ -184,7 +184,7 @@ def _add_events(file: Any, content: ExportContent, events: Sequence[GaitEvent], 
 
 
 def _add_cycles(file: Any, cycles: Sequence[CycleRow], start_s: float) -> None:
-    """A group of our own: where the file begins in the take, and which strides count."""
+    """Add a custom group: start of the file within the trial, and included strides."""
     file.add_parameter("SAGITTAL", "START_S", [start_s])
     if cycles:
         file.add_parameter("SAGITTAL", "STRIDE_SIDES", [c.side.capitalize() for c in cycles])

@@ -1,7 +1,7 @@
-"""Joint angles as OpenSim coordinates (.mot) and orientations as OpenSense takes them (.sto).
+"""Export to OpenSim: joint angles as coordinates (.mot), orientations for OpenSense (.sto).
 
-Coordinates and signs are those of the model of Rajagopal et al. 2016 (doi:10.1109/TBME.2016.2586891); files
-are text as OpenSim 4 writes it. OpenSim's ground has x forward, y up, z to the right.
+Coordinates and signs follow the model of Rajagopal et al. 2016 (doi:10.1109/TBME.2016.2586891); files use the
+text format of OpenSim 4. OpenSim's ground frame has x forward, y up, z to the right.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ IMU_NAMES: Final[Mapping[Segment, str]] = {
 
 
 def write_opensim(content: ExportContent) -> bytes:
-    """Write angles.mot, orientations.sto where there are poses, and which strides count."""
+    """Write angles.mot, orientations.sto if there are poses, and the list of included strides."""
     angles = content.bundle.angles
     if angles is None:
         raise FormatError("export_not_possible", "This analysis has no joint angles; OpenSim takes nothing.")
@@ -59,7 +59,7 @@ def write_opensim(content: ExportContent) -> bytes:
 
 
 def write_motion(angles: JointAngles) -> bytes:
-    """Write coordinates in degrees over time; a moment at which one of them is not known is left out."""
+    """Write coordinates in degrees over time; rows with an unknown coordinate are omitted."""
     columns = {n: np.degrees(x) for n, x in find_coordinates(angles).items() if np.isfinite(x).any()}
     if not columns:
         raise FormatError("export_not_possible", "No joint angle of this analysis is an OpenSim coordinate.")
@@ -73,10 +73,10 @@ def write_motion(angles: JointAngles) -> bytes:
 
 
 def find_coordinates(angles: JointAngles) -> dict[str, Floats]:
-    """Coordinate → (n,) rad, NaN where not known.
+    """Coordinate → (n,) rad, NaN where unknown.
 
-    The pelvis turns in OpenSim about z, x, y of ground (tilt, list, rotation), not about y, x, z as in ours.
-    Its rotation is that of its own heading, from 0 where the take begins.
+    OpenSim's pelvis rotates about z, x, y of ground (tilt, list, rotation), ours about y, x, z. Pelvis
+    rotation is its heading relative to the start of the trial.
     """
     given = angles.angles
     found: dict[str, Floats] = {}
@@ -102,14 +102,15 @@ def _find_first(heading: Floats) -> float:
 
 
 def write_orientations(poses: Poses, worn: Collection[str]) -> bytes:
-    """Write one quaternion "w,x,y,z" per segment with a sensor and moment; moments with a loss are left out.
+    """Write one quaternion "w,x,y,z" per instrumented segment and time; rows with missing data are omitted.
 
-    Each is the sensor put straight onto its segment: x forward, y up, z to the right while standing, in a
-    world with z up. OpenSense's usual `sensor_to_opensim_rotations` of −π/2 0 0 makes standing the identity.
+    Each describes the sensor axes aligned with its segment: x forward, y up, z to the right in quiet
+    standing, in a world with z up. OpenSense's usual `sensor_to_opensim_rotations` of −π/2 0 0 maps standing
+    to identity.
 
     Parameters
     ----------
-    worn : segments that carry a sensor.
+    worn : instrumented segments.
     """
     kept = [s for s in IMU_NAMES if s in poses.q and s in worn]
     ok = poses.valid & np.all([np.isfinite(poses.q[s]).all(axis=1) for s in kept], axis=0)

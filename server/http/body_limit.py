@@ -1,12 +1,15 @@
-"""Bounds the body of every request that is no file upload, before anything reads it into memory."""
+"""Limits the body of every request other than file uploads before it is read into memory."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import MutableMapping
+from typing import Any
 
 from starlette.datastructures import Headers
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
+from sagittal.core.message import Message
 from sagittal.server.http.problems import Problem, send_problem
 
 MAX_BODY_BYTES = 1_000_000
@@ -17,18 +20,23 @@ _UPLOAD = re.compile(
 
 
 class BodyLimit:
-    """ASGI middleware; uploads have limits of their own (settings.max_file_bytes)."""
+    """ASGI middleware; uploads have their own limits (settings.max_file_bytes)."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request, or refuse its body with 413."""
+        """Serve one request, or reject its body with 413."""
         if scope["type"] != "http" or _UPLOAD.match(f"{scope['method']} {scope['path']}"):
             await self.app(scope, receive, send)
             return
         problem = Problem(
-            413, "too_large", f"A request other than a file has at most {MAX_BODY_BYTES} bytes. Send less."
+            413,
+            "too_large",
+            Message(
+                "A request other than a file has at most {MAX_BODY_BYTES} bytes. Send less.",
+                MAX_BODY_BYTES=MAX_BODY_BYTES,
+            ),
         )
         declared = Headers(scope=scope).get("content-length", "0")
         if not declared.isdecimal() or int(declared) > MAX_BODY_BYTES:
@@ -36,7 +44,7 @@ class BodyLimit:
             return
         total = 0
 
-        async def counted() -> Message:
+        async def counted() -> MutableMapping[str, Any]:
             nonlocal total
             message = await receive()
             total += len(message.get("body", b""))

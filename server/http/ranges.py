@@ -1,4 +1,4 @@
-"""Answering a request for a part of something long, such as a player's for a video (RFC 9110 §14)."""
+"""Range requests for long content, such as those of video players (RFC 9110 §14)."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ def answer_range(
     read: Callable[[int, int], bytes],
     media_type: str,
 ) -> Response:
-    """Answer with the one range that is asked for, or with all; several at once get all.
+    """Respond with the requested range, or the whole content if none or several are requested.
 
     Parameters
     ----------
-    headers : of the request, their names in small letters. size : bytes of the whole.
-    version : what changes with its content; a range of another version gets all.
-    read : gives the bytes from a place to before another.
+    headers : of the request, names in lower case. size : total bytes.
+    version : entity tag; a range of another version returns the whole content.
+    read : returns the bytes from start to stop.
     """
     tag = f'"{version}"'
     ours = {"Accept-Ranges": "bytes", "ETag": tag}

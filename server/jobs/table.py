@@ -1,7 +1,7 @@
-"""The embedded queue: the job table itself, claimed by the workers of `sagittal serve`.
+"""Embedded queue: the job table, claimed by the workers of `sagittal serve`.
 
-Three silent deaths on one job end it (a poisonous recording must not loop). A lease in the far future is
-taken for a dead one: the clock was set back; the fence keeps a mistake in that harmless.
+A job whose worker crashes three times fails, so that a malformed recording cannot loop. A lease far in the
+future is treated as expired, since the clock was set back; fencing makes a wrong decision harmless.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class TableQueue:
 
     Parameters
     ----------
-    lease_s : a claim that has not been renewed for so long is dead.
-    clock : aware UTC now, replaced in tests.
+    lease_s : time without renewal after which a claim expires.
+    clock : returns the current UTC time, replaced in tests.
     """
 
     def __init__(self, db: Database, lease_s: float, clock: Callable[[], dt.datetime] = now) -> None:
@@ -113,7 +113,7 @@ class TableQueue:
         return job_view(row) if row else None
 
     def claim(self, worker: str, kinds: Collection[str]) -> Claim | None:
-        """See JobQueue; an idle worker only reads, so it does not stand in the way of writers."""
+        """See JobQueue; an idle worker only reads, so it does not block writers."""
         time = self._clock()
         claimable = and_(job.c.state == "queued", job.c.kind.in_(kinds))
         if not self._db.ask(select(job.c.seq).where(or_(claimable, self._dead(time))).limit(1)):
@@ -223,11 +223,11 @@ class TableQueue:
 
     @contextmanager
     def listen(self) -> Iterator[Wait]:
-        """See JobQueue; the table is looked at again and again."""
+        """See JobQueue; polls the table."""
         yield lambda stop: stop.wait(POLL_S)
 
     def _announce(self, c: Connection, job_id: str) -> None:
-        """Tell idle workers of a job that waits, with the commit; here they look for themselves."""
+        """Notify idle workers of a queued job on commit; a no-op here, since they poll."""
 
     def _fenced(self, claim: Claim, **values: object) -> bool:
         with self._db.write() as c:
@@ -242,7 +242,7 @@ class TableQueue:
         return and_(job.c.state == "running", expired)
 
     def _bury(self, c: Connection, which: ColumnElement[bool]) -> int:
-        """Count a death of running jobs: cancel if that was wanted, give up at the third, else requeue."""
+        """Count a crash of running jobs: cancel if requested, fail at the third, otherwise requeue."""
         buried = 0
         for row in c.execute(select(job.c.seq, job.c.deaths, job.c.cancel_requested).where(which)).all():
             values: dict[str, object] = {"deaths": row.deaths + 1}

@@ -1,7 +1,7 @@
-"""One take in an estimator process: reads its log from the start, estimates, gives feedback, tells.
+"""One live trial in an estimator process: read its log, estimate, give feedback and report.
 
-All of it but the pictures' timing is a function of the log and the commands, batch by batch in their order: a
-process that takes over from a dead one says the same strides and cues again, with the same numbers.
+Apart from the timing of pictures, results depend only on the log and the commands, batch by batch in
+order: a process that replaces a crashed one reproduces the same strides and cues with the same numbers.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ from sagittal.server.live.messages import (
     LogProcessed,
     Picture,
     Report,
+    encode_json,
 )
 from sagittal.server.report.words.guided_words import tell_person
 
@@ -60,11 +61,11 @@ PICTURE_TRAILS: Final = 400
 
 
 class Follower:
-    """A take.
+    """One live trial.
 
     Parameters
     ----------
-    say : sends one report. clock : monotonic seconds, the same clock as the web process's.
+    say : sends one report. clock : monotonic seconds, same clock as in the web process.
     """
 
     def __init__(
@@ -101,30 +102,30 @@ class Follower:
 
     @property
     def has_work(self) -> bool:
-        """Whether the log is longer than what was read."""
+        """Whether the log has unread data."""
         return self._read < self._size
 
     @property
     def due_at(self) -> float | None:
-        """When the next picture is to be sent; None = nothing new to show."""
+        """Time of the next picture; None = nothing new to show."""
         return None if self._last is None else self._sent_at + EVERY_S
 
     def grow(self, size: int, at: float) -> None:
-        """The log has `size` bytes since `at`."""
+        """Register a log size of `size` bytes at time `at`."""
         self._size = size
         self._arrived.append((size, at))
 
     def command(self, command: Command) -> None:
-        """Carry out a command before the batch it names."""
+        """Schedule a command before the batch it refers to."""
         self._commands.append(command)
         self._obey()
 
     def charge(self, percent: Mapping[str, float]) -> None:
-        """Show the battery of some sensors."""
+        """Update the battery levels of some sensors."""
         self._battery = {**self._battery, **percent}
 
     def step(self) -> None:
-        """Read and estimate the next part of the log; raises InputError live_log_gone."""
+        """Read and process the next part of the log; raises InputError live_log_gone."""
         if self._file is None:
             self._file = _open_log(self._begin.path)
         self._file.seek(self._read)
@@ -141,7 +142,7 @@ class Follower:
         self._read = start + used
 
     def show(self) -> None:
-        """Send a picture of the newest frame, if it is time."""
+        """Send a picture of the latest frame if due."""
         due, now = self.due_at, self._clock()
         if due is None or now < due or self._last is None:
             return
@@ -163,13 +164,13 @@ class Follower:
         self._sent_at = now
 
     def _describe(self, view: CalibrationView | None) -> msgspec.Raw:
-        """Where calibration stands, put into words once while nothing of it is new."""
+        """Calibration state as JSON, cached while unchanged."""
         if self._described is None or self._described[0] is not view:
             self._described = view, wire.describe_calibration(view)
         return self._described[1]
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the log file."""
         if self._file is not None:
             self._file.close()
 
@@ -199,7 +200,7 @@ class Follower:
             self._say(LogProcessed(self.take))
 
     def _obey(self) -> None:
-        """Carry out the commands whose batch is the next one."""
+        """Carry out the commands that precede the next batch."""
         while self._online is not None and self._commands and self._commands[0].before <= self._next_seq:
             command = self._commands.popleft()
             if command.name == "redo_calibration":
@@ -243,7 +244,7 @@ class Follower:
         if state.guard.state != self._guard:
             self._guard = state.guard.state
             self._item("guard", None if self._last is None else self._last.t_s, wire.feedback(state))
-        body = wire.encode(wire.feedback(state))
+        body = encode_json(wire.feedback(state))
         if body != self._standing:
             self._standing = body
             self._say(FeedbackStatus(self.take, body))
@@ -251,11 +252,11 @@ class Follower:
     def _item(self, kind: Kind, t_s: float | None, content: dict[str, Any]) -> None:
         if self._late:
             content["late"] = True
-        self._say(FeedItem(self.take, kind, self._said[kind], t_s, wire.encode(content), self._late))
+        self._say(FeedItem(self.take, kind, self._said[kind], t_s, encode_json(content), self._late))
         self._said[kind] += 1
 
     def _note_arrival(self, batch: SampleBatch, end: int) -> None:
-        """Find out whether this batch is fresh; what was in the log before we came is not."""
+        """Determine whether this batch is up to date; data logged before the process started are not."""
         if end <= self._begin.size:
             self._late = True
             return
@@ -268,7 +269,7 @@ class Follower:
 
 
 class _Delays:
-    """How long ago the last sample was due: since the fastest way here that was seen, per device clock."""
+    """Delay of the latest sample, relative to the fastest transmission observed, per device clock."""
 
     def __init__(self) -> None:
         self._fastest: dict[int, tuple[float, float]] = {}
@@ -289,7 +290,7 @@ class _Delays:
 
 
 class _Phase:
-    """Where in its cycle each foot is, by its last contact and the length of its last stride."""
+    """Phase of each foot in its cycle, from its last contact and stride duration."""
 
     def __init__(self) -> None:
         self._contact: dict[Side, float] = {}
@@ -334,7 +335,7 @@ def _protocol(name: str) -> Protocol:
 
 
 def describe_failure(error: Exception) -> Notice:
-    """What is said of a take whose estimate threw; what core itself refuses it says why."""
+    """Notice for a failed estimate; errors raised by core include their reason."""
     if isinstance(error, SagittalError):
         return Notice(error.code, error.message, severity="error")
     return Notice(

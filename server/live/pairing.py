@@ -1,4 +1,4 @@
-"""The short code of a take → a token for its stream, as the tablet's page does it."""
+"""Exchange of a trial's short pairing code for a stream token, like the tablet page."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
 from sagittal.core.formats.json_tree import read_json
+from sagittal.core.message import Message
 from sagittal.server.live.sender import LiveError
 
 
 @dataclass(frozen=True)
 class PairingResult:
-    """What a code opens: `socket` is a whole ws:// or wss:// address."""
+    """Result of pairing: `socket` is a complete ws:// or wss:// URL."""
 
     token: str
     take: str
@@ -25,7 +26,7 @@ class PairingResult:
 
 
 def pair(address: str, code: str) -> PairingResult:
-    """Pair with the server at an http:// or https:// address.
+    """Pair with the server at an http:// or https:// URL.
 
     Raises
     ------
@@ -69,4 +70,6 @@ def _refusal(refused: urllib.error.HTTPError) -> LiveError:
         problem: Any = read_json(refused.read())
         return LiveError(str(problem["code"]), str(problem["detail"]))
     except (ValueError, KeyError, TypeError):
-        return LiveError("unreachable", f"The server answered HTTP {refused.code}; is it Sagittal?")
+        return LiveError(
+            "unreachable", Message("The server answered HTTP {code}; is it Sagittal?", code=refused.code)
+        )

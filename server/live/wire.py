@@ -1,12 +1,11 @@
-"""What browsers get: live frames, strides, cues and notices as JSON, angles in degrees, undefined is null.
+"""JSON for browsers: live frames, strides, cues and notices, angles in degrees, undefined is null.
 
-Runs in the estimator process; the web process passes the bytes on.
+Runs in the estimator process; the web process forwards the bytes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import partial
 from math import isfinite, pi
 from typing import Any, Final
 
@@ -18,11 +17,11 @@ from sagittal.core.errors import Notice
 from sagittal.core.feedback import Cue, FeedbackState
 from sagittal.core.frames import SIDES, SUFFIX, Floats, Side
 from sagittal.core.functional_tests.result import GuidedTestView, TimedSegment
+from sagittal.core.message import Message
 from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame, SensorHealth
 from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.core.parameters.result import Parameter
-from sagittal.core.user_text import encode_user_text
-from sagittal.server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
+from sagittal.server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose, encode_json
 from sagittal.server.report.view.calibration_checks import say_verdict
 from sagittal.server.report.view.functional import segment_label
 from sagittal.server.report.words.guided_words import tell_person
@@ -51,18 +50,16 @@ CURVE_POINTS: Final = 51
 _SEVERITY: Final = {"info": "info", "warning": "warn", "error": "bad"}
 _DEGREES: Final = 180.0 / pi
 
-encode = partial(msgspec.json.encode, enc_hook=encode_user_text)
-
 
 def frame(
     shown: LiveFrame, trail: Iterable[AngleTrail], slow: Mapping[str, Any], phase: Mapping[Side, float | None]
 ) -> bytes:
-    """A frame with the angles since the last one that was sent, without the closing brace.
+    """A frame with the angles since the last one sent, without the closing brace.
 
     Parameters
     ----------
-    trail : of this frame and those before it that were not sent. slow : its `slow_part`, or an earlier one.
-    phase : per side the share of the running cycle, 0 to 100, None where unknown.
+    trail : angles of this frame and earlier unsent ones. slow : its `slow_part`, or an earlier one.
+    phase : percentage of the current cycle per side, 0 to 100, None if unknown.
     """
     body = {
         "type": "frame",
@@ -75,7 +72,7 @@ def frame(
         "contact": {SUFFIX[side]: bool(shown.contact.get(side, False)) for side in SIDES},
         **slow,
     }
-    return encode(body)[:-1]
+    return encode_json(body)[:-1]
 
 
 def slow_part(
@@ -84,27 +81,27 @@ def slow_part(
     guided: GuidedTestView | None = None,
     calibration: msgspec.Raw | None = None,
 ) -> dict[str, Any]:
-    """What of a frame is for reading and need not be made anew for every one: calibration, sensors, test.
+    """Parts of a frame that change slowly and are reused: calibration, sensors, test.
 
     Parameters
     ----------
-    calibration : its `describe_calibration`, where that has been made.
+    calibration : result of `describe_calibration`, if available.
     """
     health = [_health(row, battery.get(row.id)) for row in shown.health]
     return {
-        "test": msgspec.Raw(encode(None if guided is None else tell_test(guided))),
+        "test": msgspec.Raw(encode_json(None if guided is None else tell_test(guided))),
         "calibration": calibration or describe_calibration(shown.calibration),
-        "health": msgspec.Raw(encode(health)),
+        "health": msgspec.Raw(encode_json(health)),
     }
 
 
 def describe_calibration(view: CalibrationView | None) -> msgspec.Raw:
-    """Where calibration stands."""
-    return msgspec.Raw(encode(_calibration(view)))
+    """State of the calibration."""
+    return msgspec.Raw(encode_json(_calibration(view)))
 
 
 def tell_test(view: GuidedTestView) -> dict[str, Any]:
-    """Where a functional test stands; its figures are those of the catalogue, in its units."""
+    """State of a functional test, with results in units of the catalogue."""
     result = view.result
     return {
         "phase": view.phase,
@@ -140,7 +137,7 @@ def _segment(part: TimedSegment) -> dict[str, Any]:
 
 
 def pose(shown: LiveFrame) -> FigurePose | None:
-    """The figure of a frame, None while there is none."""
+    """Pose of the avatar in a frame, None if unavailable."""
     segments = [name for name in shown.q if name in shown.p]
     if not segments:
         return None
@@ -154,7 +151,7 @@ def pose(shown: LiveFrame) -> FigurePose | None:
 
 
 def stride(told: LiveStride) -> dict[str, Any]:
-    """A stride; it comes again with the same `n` when its end is refined or its distances are known."""
+    """A stride; sent again with the same `n` when its end is refined or its distances become available."""
     duration = told.end_s - told.start_s
     off = None if told.foot_off_s is None else 100.0 * (told.foot_off_s - told.start_s) / duration
     return {
@@ -175,22 +172,22 @@ def stride(told: LiveStride) -> dict[str, Any]:
 
 
 def cue(given: Cue) -> dict[str, Any]:
-    """Message of a cue for the screens."""
+    """Message of a cue for screens."""
     return {"type": "cue", **given.to_json()}
 
 
 def feedback(state: FeedbackState) -> dict[str, Any]:
-    """Where the feedback stands."""
+    """State of the feedback."""
     return {"type": "feedback", **state.to_json()}
 
 
 def announce_calibration(shown: LiveFrame) -> dict[str, Any]:
-    """That calibration has come to an end, and how."""
+    """Message that calibration has ended, with its outcome."""
     return {"type": "calibration", "method": shown.method, "calibration": _calibration(shown.calibration)}
 
 
 def notice(given: Notice) -> dict[str, Any]:
-    """A notice in the words of the pages."""
+    """A notice in the wording of the pages."""
     return {"type": "notice", **_notice(given)}
 
 
@@ -207,7 +204,7 @@ def _notice(given: Notice) -> dict[str, Any]:
 
 
 def judge_calibration(score: CalibrationScore) -> dict[str, Any]:
-    """The verdict in words: of every failed check where, why and what to do."""
+    """Outcome of a calibration in words: location, reason and remedy of each failed check."""
     said = [c.to_json() for c in score.checks]
     redo = [
         {
@@ -262,11 +259,13 @@ def _health(row: SensorHealth, battery_pct: float | None) -> dict[str, Any]:
 
 
 def _judged(row: SensorHealth, battery_pct: float | None) -> tuple[str, str]:
-    """Worst first: state and words of a sensor; no words while all is well."""
+    """State and messages of a sensor, worst first; no messages if it is fine."""
     if row.segment is None:
         return "none", "not used"
     if row.silent_s > STALE_S:
-        return "bad", f"silent for {row.silent_s:.0f} s" if row.silent_s >= 1.0 else "silent"
+        return "bad", Message(
+            "silent for {silent_s:.0f} s", silent_s=row.silent_s
+        ) if row.silent_s >= 1.0 else "silent"
     if row.stuck:
         return "bad", "does not measure"
     if row.lost_share > LOST_BAD:

@@ -1,7 +1,7 @@
-"""The logs of all web servers: what they hold, which the database knows, and adopting a stranger.
+"""Logs of all web servers: their content, whether the database knows them, and adoption of unknown ones.
 
-A log may outlive its row: the database was put back from a backup. It is kept until somebody adopts it or
-removes it by hand.
+A log may lack a row after the database was restored from a backup. It is retained until it is adopted or
+removed manually.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from sqlalchemy import Connection, insert, select
 
 from sagittal.core.errors import InputError
 from sagittal.core.formats.live_log import parse_hello, read_batch_header
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import Conflict, NotFound
@@ -36,9 +37,10 @@ class LiveLog:
 
     Parameters
     ----------
-    known : whether the database has its take. written_at : when the last batch came. batches : whole ones.
-    span_s : time between the first and the last of them, None with fewer than two. sensors : how many.
-    damage : what cannot be read behind them, None = nothing.
+    known : whether its trial is in the database. written_at : time of the last batch. batches : complete
+        ones.
+    span_s : time between the first and the last of them, None with fewer than two. sensors : their number.
+    damage : unreadable data after the batches, None = none.
     """
 
     take_id: str
@@ -54,13 +56,13 @@ class LiveLog:
 
     @property
     def words(self) -> str:
-        """What it holds, for people."""
+        """Description of its content."""
         long = "" if self.span_s is None else f", {self.span_s:.0f} s"
         return f"{self.written_at:%Y-%m-%d %H:%M}Z, {self.sensors} sensors, {self.batches} batches{long}"
 
 
 def list_logs(c: Connection, settings: Settings) -> Iterator[LiveLog]:
-    """Every log in `live/`, by name; one that vanishes meanwhile (its take has ended) is passed over."""
+    """All logs in `live/`, by name; one that disappears meanwhile (its trial ended) is skipped."""
     for path in _list_files(settings, "*.log"):
         found = c.execute(select(live_take.c.id).where(live_take.c.id == path.stem)).first()
         try:
@@ -70,7 +72,7 @@ def list_logs(c: Connection, settings: Settings) -> Iterator[LiveLog]:
 
 
 def list_originals(settings: Settings) -> list[Path]:
-    """The copies kept of damaged logs."""
+    """Retained copies of damaged logs."""
     return _list_files(settings, "*.damaged")
 
 
@@ -79,7 +81,7 @@ def _list_files(settings: Settings, pattern: str) -> list[Path]:
 
 
 def read_log(path: Path, *, known: bool) -> LiveLog:
-    """Look through one log; raises OSError."""
+    """Scan one log; raises OSError."""
     found = path.stat()
     source, sensors, batches, size, sent = None, 0, 0, 0, []
     for size, one in segments.read_records(path):  # noqa: B007 - the last one is used
@@ -115,7 +117,7 @@ def adopt(
     take_id: str,
     session_id: str,
 ) -> str:
-    """Make a log that the database does not know a recording of a session, analysed; returns its id.
+    """Turn a log unknown to the database into an analysed recording of a session; return its id.
 
     Raises
     ------
@@ -128,11 +130,16 @@ def adopt(
         raise NotFound("live log", take_id)
     log = read_log(path, known=False)
     if not log.batches:
-        raise Conflict("take_empty", f"{path.name} holds no sample that can be read; it was left as it is.")
+        raise Conflict(
+            "take_empty",
+            Message("{name} holds no sample that can be read; it was left as it is.", name=path.name),
+        )
     with db.write() as c:
         sessions.get(c, session_id)
         if c.execute(select(live_take.c.id).where(live_take.c.id == take_id)).first():
-            raise Conflict("take_known", f"The take {take_id} belongs to a session already.")
+            raise Conflict(
+                "take_known", Message("The take {take_id} belongs to a session already.", take_id=take_id)
+            )
         c.execute(
             insert(live_take).values(
                 id=take_id,

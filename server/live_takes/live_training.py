@@ -1,6 +1,6 @@
-"""What a live take is estimated and coached with: fixed at its first sample and kept as an event.
+"""Parameters of estimation and feedback of a live trial, fixed at its first sample and stored as an event.
 
-A replay after a crash needs the same target and the same baseline, whatever is prescribed meanwhile.
+A replay after a crash requires the same target and baseline, even if the prescription has changed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ KIND = "prescription"
 
 @dataclass(frozen=True)
 class LiveTraining:
-    """What the estimator needs to know beside the samples.
+    """Parameters of the estimator in addition to the samples.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class LiveTraining:
 
 
 def training_of(db: Database, reviewed: ReviewedAnalyses, take: live.LiveTakeRecord) -> LiveTraining:
-    """What this take began with, or begins with now."""
+    """Stored parameters of a trial, or those for starting it now."""
     query = select(live_event.c.content).where(live_event.c.take_id == take.id, live_event.c.kind == KIND)
     with db.read() as c:
         said = analyses.complete_manifest(c, take.session_id, None)
@@ -63,7 +63,7 @@ def training_of(db: Database, reviewed: ReviewedAnalyses, take: live.LiveTakeRec
 
 
 def note_feedback(c: Connection, take_ids: Collection[str]) -> None:
-    """Note on the sessions of these takes that somebody walked with feedback."""
+    """Mark the sessions of these trials as walked with feedback."""
     query = (
         select(session.c.id)
         .join(live_take, live_take.c.session_id == session.c.id)
@@ -74,9 +74,9 @@ def note_feedback(c: Connection, take_ids: Collection[str]) -> None:
 
 
 def settle_feedback(c: Connection, actor: audit.Actor | None, take: live.LiveTakeRecord) -> None:
-    """Where an earlier take of the session gave feedback, note whether this one did, which now counts.
+    """Update the feedback mark if an earlier trial of the session had feedback, from the current trial.
 
-    Without such a take what a person said stays; cues that come later are noted by themselves.
+    Otherwise the value set by a user remains; later cues set the mark themselves.
     """
     given = prescriptions.cues(c, [t.id for t in live.takes_of(c, take.session_id)])
     told = {of: any(cue.with_feedback for cue in cues) for of, cues in given.items()}

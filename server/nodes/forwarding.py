@@ -1,7 +1,7 @@
-"""Passes a request or a websocket on to the web server to which it belongs, and its answer back.
+"""Forwards a request or websocket to the web server that owns it, and returns the response.
 
-What is passed on is what came: the receiving server looks at the cookie or token itself, as always. A request
-that was passed on once is answered where it arrives, whatever that server thinks of it.
+Requests are forwarded unchanged: the receiving server checks the cookie or token itself. A request that has
+been forwarded once is answered by the receiving server in any case.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from starlette.websockets import WebSocket
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidStatus, WebSocketException
 
+from sagittal.core.message import Message
 from sagittal.server.http.carrying import carry_messages
 from sagittal.server.http.problems import Problem, send_problem
 from sagittal.server.nodes import passage
@@ -42,17 +43,17 @@ _HOPS: Final = frozenset(
 
 
 class UnreachableError(Exception):
-    """The server did not take the connection: nothing has been sent."""
+    """The server did not accept the connection; nothing has been sent."""
 
 
 class Forwarding:
-    """ASGI middleware: the innermost, so that all rules about a request have been kept here already."""
+    """Innermost ASGI middleware, so that all checks on a request have been applied."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one connection here, or where it belongs."""
+        """Serve one connection here, or forward it to its owner."""
         pin = None
         if scope["type"] in {"http", "websocket"} and passage.ASKED_BY not in scope:
             pin = find_pin(scope)
@@ -99,7 +100,10 @@ async def _pass_request(nodes: Nodes, node: WebNode, scope: Scope, receive: Rece
             problem = Problem(
                 503,
                 "node_lost",
-                f"The web server '{node.name}' did not answer. See whether it was done before trying again.",
+                Message(
+                    "The web server '{name}' did not answer. See whether it was done before trying again.",
+                    name=node.name,
+                ),
                 headers={"Retry-After": "5"},
             )
             await send_problem(problem, scope, receive, send)
@@ -126,12 +130,12 @@ async def _pass_line(nodes: Nodes, node: WebNode, ws: WebSocket) -> None:
 
 
 async def carry_tablet(nodes: Nodes, node: WebNode, ws: WebSocket, first: str | bytes) -> None:
-    """Carry the line of a tablet, which is open already and has said its first words, to the take's server.
+    """Relay an open tablet connection, including its first message, to the server of the trial.
 
     Raises
     ------
     UnreachableError
-        nothing has been sent; the tablet may come again.
+        nothing has been sent; the tablet may reconnect.
     """
     line = nodes.write_line(node, ws.scope)
     try:
@@ -144,7 +148,7 @@ async def carry_tablet(nodes: Nodes, node: WebNode, ws: WebSocket, first: str | 
 
 @contextlib.asynccontextmanager
 async def open_line(node: WebNode, ws: WebSocket, line: bytes) -> AsyncIterator[ClientConnection]:
-    """A websocket to another server, asked for as its client did; raises UnreachableError, InvalidStatus."""
+    """Open a websocket to another server on behalf of the client; raises UnreachableError, InvalidStatus."""
     at = urlsplit(node.address)
     own = {b"host", b"user-agent"}
     headers = [
@@ -182,7 +186,7 @@ async def open_line(node: WebNode, ws: WebSocket, line: bytes) -> AsyncIterator[
 async def _ask(
     reader: asyncio.StreamReader, writer: asyncio.StreamWriter, asked: h11.Request, body: bytes
 ) -> Response:
-    """Send a request and return its whole answer."""
+    """Send a request and return the complete response."""
     line = h11.Connection(h11.CLIENT)
     for part in (asked, h11.Data(data=body), h11.EndOfMessage()):
         writer.write(line.send(part) or b"")
@@ -211,7 +215,7 @@ async def _ask(
 
 
 async def _read_body(receive: Receive) -> bytes | None:
-    """All of a body, whose length has a limit (server/http/body_limit.py); None = the client has gone."""
+    """Read the whole body of limited length (server/http/body_limit.py); None if the client disconnected."""
     body, more = bytearray(), True
     while more:
         message = await receive()

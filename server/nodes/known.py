@@ -1,4 +1,4 @@
-"""Whose word about a client is taken besides a proxy's: that of the other web servers of this clinic."""
+"""Trust in the other web servers of the clinic to forward client addresses."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from sagittal.server.nodes.registry import Nodes
 
 
 class KnownNodes:
-    """ASGI middleware: what another web server passes on is its client's; the forged is refused."""
+    """ASGI middleware that applies the client address forwarded by another web server and rejects
+    forgeries.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve or refuse one connection."""
+        """Serve or reject one connection."""
         if scope["type"] in {"http", "websocket"}:
             lines = [value for name, value in scope["headers"] if name == HEADER]
             if lines:
@@ -35,7 +37,9 @@ class KnownNodes:
 
 
 def _read(nodes: Nodes, lines: list[bytes], scope: Scope) -> tuple[str, str, str] | None:
-    """Who asks, and the client's address and scheme; None of a line that no server of ours wrote for this."""
+    """Forwarding server, client address and scheme; None if the header was not signed by one of our
+    servers.
+    """
     line, _, mac = lines[0].decode("latin-1").rpartition(";")
     parts = line.split(";")
     right = sign(nodes.key, line, scope).encode()

@@ -1,7 +1,7 @@
-"""How one web server tells another for whom it asks, so that nobody else can: a line with an HMAC.
+"""Authentication between web servers: a header with an HMAC identifies the client of a forwarded request.
 
-The key is a file of the data folder that all of them share. The line has who asks, who is asked, when, and
-the client's address and scheme; the HMAC holds it to this one request.
+The key is a file in the shared data folder. The header contains sender, receiver, time, client address and
+scheme; the HMAC binds it to this request.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Headers = Iterable[tuple[bytes, bytes]]
 
 
 def read_key(path: Path) -> bytes:
-    """The key, made by the first server that needs it."""
+    """Read the key; the first server that needs it creates it."""
     fs.make_folder(path.parent)
     with fs.hold_lock(path.with_name("key.lock")):
         with suppress(FileNotFoundError):
@@ -40,14 +40,14 @@ def read_key(path: Path) -> bytes:
 
 
 def write_line(key: bytes, asks: str, asked: str, scope: Mapping[str, Any]) -> bytes:
-    """The header's value for a request that is passed on as it came."""
+    """Header value for a request that is forwarded unchanged."""
     client = scope["client"][0] if scope.get("client") else ""
     line = f"{asks};{asked};{int(time.time())};{client};{scope['scheme']}"
     return f"{line};{sign(key, line, scope)}".encode("latin-1")
 
 
 def sign(key: bytes, line: str, scope: Mapping[str, Any]) -> str:
-    """The HMAC of a line and of what it speaks of, as hexadecimal digits."""
+    """HMAC of a header and the request it belongs to, as hexadecimal digits."""
     bound: Headers = sorted(one for one in scope["headers"] if one[0] in _BOUND)
     asked = (
         line.encode("latin-1"),

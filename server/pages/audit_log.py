@@ -1,4 +1,4 @@
-"""Who opened or changed what."""
+"""Page of the audit log."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def show_audit_log(
     who: Annotated[Identity, require(Action.READ_AUDIT)],
     before: Annotated[int | None, Query(ge=1, le=2**53)] = None,
 ) -> Response:
-    """Who opened or changed what, the newest first."""
+    """Access and changes by users, newest first."""
     with db.read() as c:
         rows = audit.list_entries(c, before=before, limit=AUDIT_ROWS)
         said = describe_rows(c, rows)

@@ -1,4 +1,4 @@
-"""Rows of the audit trail as sentences: who did what with whom."""
+"""Rows of the audit trail as sentences."""
 
 from __future__ import annotations
 
@@ -172,13 +172,13 @@ BY_STRANGERS: Final = ("sign_in.failed", "report_link.opened", "report_link.refu
 
 @dataclass(frozen=True)
 class AuditSentence:
-    """A row of the trail in words.
+    """A row of the audit trail in words.
 
     Parameters
     ----------
-    who, deed : "anna", "opened the visit". whom : code of the patient, None where it is about nobody or the
-        patient is deleted. of : the visit's day. href : where it is now, None where it is no more. why : the
-        reason that was given, None = none, or the patient is deleted.
+    who, deed : "anna", "opened the visit". whom : code of the patient, None without one or if deleted.
+    of : date of the visit. href : link to the resource, None if deleted. why : stated reason, None = none, or
+        the patient is deleted.
     row : the row itself.
     """
 
@@ -192,7 +192,7 @@ class AuditSentence:
 
 
 def describe_rows(c: Connection, rows: Sequence[Row[Any]]) -> list[AuditSentence]:
-    """Say rows in words, with the patients and visits they are about as far as these still exist."""
+    """Describe rows in words, with patients and visits as far as they still exist."""
     ids = {row.resource_id for row in rows if row.resource in {"patient", "session"}}
     people = c.execute(select(patient.c.id, patient.c.code).where(patient.c.id.in_(ids)))
     codes = {row.id: row.code for row in people}
@@ -218,7 +218,7 @@ def describe_rows(c: Connection, rows: Sequence[Row[Any]]) -> list[AuditSentence
 
 
 def describe_deed(action: str, detail: Mapping[str, Any] | None = None) -> str:
-    """What an action is in words, with the factor of a sign-in; of one without words its own name."""
+    """Description of an action, with the factor of a sign-in; an unknown action's own name."""
     if action == "sign_in" and detail and detail.get("factor") in SIGNED_IN_BY:
         return SIGNED_IN_BY[detail["factor"]]
     return DEEDS.get(action, action.replace("_", " ").replace(".", ": "))

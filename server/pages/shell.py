@@ -1,4 +1,4 @@
-"""What every page has around it: navigation, running jobs, who may do what; and the audit row of opening."""
+"""Page frame: navigation, running jobs and permissions; and audit of access."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ FRAGMENT = "x-sagittal-fragment"
 
 
 def record_opening(request: Request, who: Identity, resource: str, resource_id: str) -> None:
-    """Write down that somebody looked at it."""
+    """Record access to a resource in the audit log."""
     state_of(request).trail.record_opened(who, f"{resource}.opened", resource, resource_id)
 
 
 def record_listing(request: Request, who: Identity, resource: str) -> None:
-    """Write down that somebody looks at the list of all."""
+    """Record access to a list in the audit log."""
     state_of(request).trail.record_watched(who, f"{resource}.listed", resource, None)
 
 
@@ -51,7 +51,7 @@ def render_page(
 
     Parameters
     ----------
-    here : its entry in the navigation. running : `jobs.count_active`, where it is read already.
+    here : its entry in the navigation. running : `jobs.count_active`, if already known.
     """
     if running is None:
         running = jobs.count_active(db, who)
@@ -59,7 +59,7 @@ def render_page(
 
 
 def render_sheets(request: Request, who: Identity, template: str, **context: object) -> Response:
-    """Render sheets of paper: a page without navigation."""
+    """Render printed pages without navigation."""
     shell = {
         "signed_in": who.name,
         "version": CODE_VERSION,

@@ -1,4 +1,4 @@
-"""How the installation is: its parts, its backups, the end of the audit log."""
+"""State of the installation: components, backups, end of the audit log."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ PART_WORDS: Final = {
 def show_system(
     request: Request, db: Db, settings: Config, who: Annotated[Identity, require(Action.READ_SYSTEM)]
 ) -> Response:
-    """How the parts are, how backups and restore tests went, how far the audit log has come."""
+    """State of components, backups and restore tests, and latest row of the audit log."""
     checks = state_of(request).readiness.checks()
     with db.read() as c:
         head = read_newest(c)
@@ -59,21 +59,21 @@ def show_system(
 
 
 def _describe_nodes(nodes: Nodes, at: dt.datetime) -> list[tuple[WebNode, bool]]:
-    """Every web server and whether it is there; none where one serves alone."""
+    """All web servers and their availability; empty for a single server."""
     if not nodes.is_one_of_several:
         return []
     return [(node, nodes.is_living(node, at)) for node in nodes.list_all()]
 
 
 def _list_overdue(c: Connection, years: int) -> list[Patient]:
-    """Patients without a visit for so many years; 0 = nobody is asked for."""
+    """Patients without a visit for this many years; 0 = none."""
     if not years:
         return []
     return patients.list_older(c, move_years(now().date(), -years))
 
 
 def describe_backups(state: BackupState, at: dt.datetime) -> list[dict[str, Any]]:
-    """Rows of the table: last backup and last restore test, each with its state."""
+    """Table rows for the last backup and restore test, with their state."""
     return [
         _describe("Last backup", state.backup, at, backup_schedule.LATE),
         _describe("Last restore test", state.test, at, backup_schedule.TEST_EVERY + backup_schedule.LATE),

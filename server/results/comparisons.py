@@ -1,4 +1,4 @@
-"""Which two sessions of a patient are compared: any two with a result, or one and the one before it."""
+"""Selection of two sessions of a patient for comparison: any two with results, or one and its predecessor."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
+from sagittal.core.message import Message
 from sagittal.core.norms import Norms, look_up_norms
 from sagittal.core.subject.condition import compare_conditions, is_comparable
 from sagittal.server.clinic import patients, programmes, sessions
@@ -32,37 +33,49 @@ class SessionPair:
 
     @property
     def comparable(self) -> bool:
-        """Whether a difference can be called a change of the person."""
+        """Whether a difference can be attributed to the patient."""
         return is_comparable(self.before.condition, self.after.condition)
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """Why a difference may come from how was walked or measured, in sentences."""
-        said = []
+        """Differences in walking condition or measurement that may explain a change, as sentences."""
+        said: list[str] = []
         old, new = self.before, self.after
         if unlike := compare_conditions(old.condition, new.condition):
             said.append(
-                f"The conditions differ: {'; '.join(unlike)}. What differs may come from that, so no "
-                "difference is called a change."
+                Message(
+                    "The conditions differ: {unlike}. What differs may come from that, so no difference "
+                    "is called a change.",
+                    unlike="; ".join(unlike),
+                )
             )
         elif old.session.feedback:
             said.append("Both were walked with feedback, so no difference is called a change.")
         elif unstated := new.condition.unstated:
-            said.append(f"Not stated in either session: {', '.join(unstated)}. They are taken to be alike.")
+            said.append(
+                Message(
+                    "Not stated in either session: {unstated}. They are taken to be alike.",
+                    unstated=", ".join(unstated),
+                )
+            )
         if _sensors(old) != _sensors(new):
             said.append("Other segments carried sensors in the two sessions.")
         if old.found.config_sha256 != new.found.config_sha256:
             said.append("The two analyses have different settings; run the earlier one again to compare.")
         elif old.found.code_version != new.found.code_version:
             said.append(
-                f"The analyses are of different versions ({old.found.code_version}, "
-                f"{new.found.code_version}); run the earlier one again to compare."
+                Message(
+                    "The analyses are of different versions ({code_version}, {code_version2}); run the "
+                    "earlier one again to compare.",
+                    code_version=old.found.code_version,
+                    code_version2=new.found.code_version,
+                )
             )
         return tuple(said)
 
 
 def pair(c: Connection, session_id: str, other_id: str) -> SessionPair:
-    """Two sessions to compare, in whatever order they are named.
+    """Two sessions to compare, given in any order.
 
     Raises
     ------
@@ -80,11 +93,12 @@ def pair(c: Connection, session_id: str, other_id: str) -> SessionPair:
 def list_comparable(
     c: Connection, session: Session, done: Sequence[AnalysedSession]
 ) -> list[tuple[AnalysedSession, VisitKind]]:
-    """The analysed sessions of earlier days that a session is compared with, oldest first, then itself.
+    """Earlier analysed sessions comparable with a session, oldest first, followed by the session.
 
-    All were walked under its condition. Of an assessment they are the assessments, so that a training does
-    not stand for the course. Takes of one day walked alike are one visit, not a change of each other. A
-    session with feedback stands alone, and none before has feedback. Empty where it has no result itself.
+    All have the same walking condition. An assessment is compared with assessments only, so that a training
+    does not influence the trend. Trials of one day under the same condition form one visit and are not
+    compared with each other. Sessions with feedback are neither compared nor used for comparison. Empty if
+    the session has no result.
 
     Parameters
     ----------
@@ -104,7 +118,7 @@ def list_comparable(
 
 
 def find_previous(c: Connection, session: Session, done: Sequence[AnalysedSession]) -> AnalysedSession | None:
-    """The last session before this one in `list_comparable`: what its table is compared with; None = none."""
+    """The session that a session's table is compared with, from `list_comparable`; None = none."""
     return pick_previous(list_comparable(c, session, done))
 
 
@@ -118,7 +132,7 @@ def _moment(session: Session) -> tuple[dt.date, dt.datetime]:
 
 
 def compare_sessions(reviewed: ReviewedAnalyses, found: SessionPair) -> tuple[ComparedRow, ...]:
-    """The table of a comparison; raises IntegrityError."""
+    """Table of a comparison; raises IntegrityError."""
     old = reviewed.read_numbers(found.before.found, found.before.edits)
     new = reviewed.read_numbers(found.after.found, found.after.edits)
     known = pair_norms(found.patient, (found.before.session, old), (found.after.session, new))
@@ -128,12 +142,12 @@ def compare_sessions(reviewed: ReviewedAnalyses, found: SessionPair) -> tuple[Co
 def pair_norms(
     patient: Patient, before: tuple[Session, Numbers], after: tuple[Session, Numbers]
 ) -> tuple[Norms, Norms]:
-    """The references of a person at two sessions, each at its own speed."""
+    """Norms for a patient at two sessions, each at its own gait speed."""
     return find_norms(patient, *before), find_norms(patient, *after)
 
 
 def find_norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
-    """The reference of a person on the day of a session, at its speed."""
+    """Norms for a patient at a session's date and gait speed."""
     speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
     age = patient.find_age(session.performed_on)
     height = patient.find_height(session)

@@ -1,4 +1,4 @@
-"""What came of the feedback in a session's live take: its cues put to the strides of the analysis."""
+"""Outcome of feedback in a session's live trial: cues matched to the strides of the analysis."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ REASONS: Final = {
 
 @dataclass(frozen=True, eq=False)
 class TrainedSession:
-    """A session with feedback: its analysis, what was trained in it, and the cues of the analysed take."""
+    """A session with feedback: its analysis, training, and cues of the analysed trial."""
 
     at: AnalysedSession
     training: TrainedTake
@@ -44,11 +44,11 @@ class TrainedSession:
 
 @dataclass(frozen=True, eq=False)
 class FeedbackRecords:
-    """What the database knows of the feedback in a session.
+    """Database records of feedback in a session.
 
     Parameters
     ----------
-    this : None with a `reason`. before : the visit before with the same training, walked alike.
+    this : None with a `reason`. before : the previous visit with the same training and condition.
     """
 
     patient: Patient
@@ -60,7 +60,7 @@ class FeedbackRecords:
 def gather(
     c: Connection, patient: Patient, session_id: str, done: Sequence[AnalysedSession]
 ) -> FeedbackRecords:
-    """Read all that `view` needs of a session of this patient.
+    """Read everything `view` requires for a session of this patient.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def gather(
 
 
 def view(reviewed: ReviewedAnalyses, gathered: FeedbackRecords) -> FeedbackView | None:
-    """Put cues and strides together; None where there is nothing, `reason` says why; IntegrityError."""
+    """Combine cues and strides; None if there are none, with a `reason`; raises IntegrityError."""
     this, before = gathered.this, gathered.before
     if this is None:
         return None
@@ -114,7 +114,7 @@ def view(reviewed: ReviewedAnalyses, gathered: FeedbackRecords) -> FeedbackView 
 def _strides(
     reviewed: ReviewedAnalyses, trained: TrainedSession
 ) -> tuple[Bundle, tuple[AnalysedStride, ...]]:
-    """The strides of an analysis with its edits, each with the value of what was trained."""
+    """Strides of an analysis with edits, each with its value of the trained parameter."""
     bundle = reviewed.read_bundle(trained.at.found, trained.at.edits)
     columns = reviewed.read_columns(trained.at.found, trained.at.edits)
     nothing: Column = (None,) * len(bundle.strides.strides)
@@ -123,7 +123,7 @@ def _strides(
 
 
 def _analysed_take(at: AnalysedSession | None, takes: Sequence[TrainedTake]) -> TrainedTake | str:
-    """The take that the analysis of a session is of, or the reason why there is none."""
+    """The live trial on which a session's analysis is based, or the reason why there is none."""
     if at is None:
         return "not_analysed"
     take = next((t for t in takes if t.recording_id == at.found.recording_id), None)

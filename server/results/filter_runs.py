@@ -1,4 +1,4 @@
-"""A take through several orientation filters: ask for it, run it in the child, publish and read results."""
+"""Comparison of orientation filters on a trial: request, run in the child, publish and read results."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ ANALYSED: Final = 0.4
 
 @dataclass(frozen=True)
 class FilterRunRecord:
-    """A finished comparison: which filters, on which analysis, against what, and which files came out."""
+    """A finished comparison: filters, analysis, reference and result files."""
 
     id: str
     analysis_id: str
@@ -56,16 +56,16 @@ class FilterRunRecord:
 
 
 def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
-    """Analyse a take as its analysis did, and run the filters on it; pure but for `attempt` and the clock.
+    """Repeat the analysis of a trial, and run the filters on it; pure except for `attempt` and the clock.
 
     Parameters
     ----------
-    files : of the recording, and the reference as the last where `params` names one.
+    files : of the recording, followed by the reference if `params` names one.
 
     Raises
     ------
     SagittalError
-        the reference cannot be read, or no filter ran; the code and the sentence say why.
+        the reference cannot be read, or no filter ran; code and message give the reason.
     """
     from sagittal.core.events.edits import read_edit
     from sagittal.core.events.result import Strides
@@ -104,7 +104,7 @@ def submit(
     magnetometer: bool,
     reference: str | None = None,
 ) -> JobView:
-    """Ask for a comparison on the analysis that the session shows, with its mapping, settings and edits.
+    """Request a comparison for the displayed analysis, with its mapping, settings and edits.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def submit(
     Raises
     ------
     NotFound
-        the session, its analysis, the reference. ParameterError: of `require_filters`.
+        the session, its analysis, or the reference. ParameterError: see `require_filters`.
     """
     require_filters(filters)
     found = analyses.get_shown(c, session_id)
@@ -133,7 +133,7 @@ def submit(
 
 
 def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Mapping[str, Blob]) -> None:
-    """Write the rows of a result, in the transaction that marks its job done."""
+    """Store the rows of a result, in the transaction that marks its job done."""
     params, run_id = claim.params, new_id()
     reference = params["reference"] or {}
     row = {
@@ -161,13 +161,13 @@ def get(c: Connection, run_id: str) -> FilterRunRecord:
 
 
 def of_session(c: Connection, session_id: str) -> list[FilterRunRecord]:
-    """All comparisons of a session, the newest first."""
+    """All comparisons of a session, newest first."""
     newest = (filter_run.c.created_at.desc(), filter_run.c.id)
     return _runs(c, _QUERY.where(session.c.id == session_id).order_by(*newest))
 
 
 def file_bytes(blobs: BlobStore, found: FilterRunRecord, name: str) -> bytes:
-    """A result file, verified; raises NotFound, IntegrityError."""
+    """Read and verify a result file; raises NotFound, IntegrityError."""
     if name not in found.files:
         raise NotFound("file", name)
     return blobs.read(found.patient_id, found.files[name].sha256)

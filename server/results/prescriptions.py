@@ -1,7 +1,8 @@
-"""Prescriptions of biofeedback: written, replaced, ended, and made ready for a live take.
+"""Biofeedback prescriptions: create, replace, end, and prepare for a live trial.
 
-A record never changes: to change it ends it and writes another, so that every take and its cues point to what
-was in force. One is in force at a time; one parameter is trained (docs/science/feedback.md).
+Records are immutable: a change ends one and creates another, so that every trial and its cues refer to the
+prescription in force at the time. One prescription, for one parameter, is in force at a time
+(docs/science/feedback.md).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from sagittal.core.change import ChangeLimit, find_detectable_change
 from sagittal.core.change.limits import Limb
 from sagittal.core.feedback import Baseline, Cue, Prescription
 from sagittal.core.frames import Side
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.server import audit
 from sagittal.server.clinic import patients, sessions
@@ -36,7 +38,7 @@ class PatientPrescription:
 
     Parameters
     ----------
-    content : what is trained, its target in numbers as of that day. by : who wrote it, None = the program.
+    content : trained parameter with its numeric target as of that day. by : author, None = the program.
     ended_at : None while in force.
     """
 
@@ -55,13 +57,13 @@ def write(
     patient_id: str,
     content: Mapping[str, object],
 ) -> PatientPrescription:
-    """Prescribe feedback; what was in force ends.
+    """Prescribe feedback and end the prescription in force.
 
     Raises
     ------
-    NotFound: the patient. ParameterError, ServiceError bad_prescription: a field is not as expected.
-    ServiceError no_target: its source gives no numbers for this person; the sentence says why. both_sides: a
-    side is named of what both share.
+    NotFound: the patient. ParameterError, ServiceError bad_prescription: a field is invalid. ServiceError
+    no_target: the source has no target for this patient; the message gives the reason. both_sides: a side is
+    given for a bilateral parameter.
     """
     patient = patients.get(c, patient_id)
     asked = Prescription.from_json(content)
@@ -69,8 +71,12 @@ def write(
     if entry.shared and asked.side is not None:
         raise ServiceError(
             "both_sides",
-            f"{entry.label} is the same for both sides of a walk, so the {asked.side} side is not trained "
-            "alone. Expected both sides, or another parameter.",
+            Message(
+                "{label} is the same for both sides of a walk, so the {side} side is not trained alone. "
+                "Expected both sides, or another parameter.",
+                label=entry.label,
+                side=asked.side,
+            ),
         )
     made = _with_target(c, reviewed, patient, asked)
     before = in_force(c, patient_id)
@@ -108,24 +114,24 @@ def get(c: Connection, prescription_id: str) -> PatientPrescription:
 
 
 def of_patient(c: Connection, patient_id: str) -> list[PatientPrescription]:
-    """All prescriptions of a patient, the newest first."""
+    """All prescriptions of a patient, newest first."""
     query = _QUERY.where(prescription.c.patient_id == patient_id)
     rows = c.execute(query.order_by(prescription.c.created_at.desc(), prescription.c.id))
     return [_written(row) for row in rows]
 
 
 def in_force(c: Connection, patient_id: str) -> PatientPrescription | None:
-    """The prescription that holds now, None without one."""
+    """The prescription in force, None without one."""
     return next((w for w in of_patient(c, patient_id) if w.ended_at is None), None)
 
 
 def for_take(
     c: Connection, reviewed: ReviewedAnalyses, session_id: str
 ) -> tuple[Prescription, Baseline] | None:
-    """What a live take of this session trains, its target in numbers; None where nothing is prescribed.
+    """Prescription for a live trial of this session, with its numeric target; None if there is none.
 
-    A norm follows the person's speed: it is looked up for the last walk before this session. Where that gives
-    none, and for every other source, the numbers of the day of writing hold.
+    Norms depend on gait speed: they are looked up for the last walk before this session. If that yields none,
+    and for all other sources, the numbers from the time of prescription are used.
     """
     this = sessions.get(c, session_id)
     written = in_force(c, this.patient_id)
@@ -142,7 +148,7 @@ def for_take(
 
 
 def cues(c: Connection, take_ids: Sequence[str]) -> dict[str, list[Cue]]:
-    """The cues of each of these takes in the order they were given."""
+    """Cues of each of these trials in order of time."""
     query = (
         select(live_event.c.take_id, live_event.c.content)
         .where(live_event.c.kind == "cue", live_event.c.take_id.in_(take_ids))
@@ -156,11 +162,12 @@ def cues(c: Connection, take_ids: Sequence[str]) -> dict[str, list[Cue]]:
 
 @dataclass(frozen=True)
 class TrainedTake:
-    """A live take with feedback.
+    """A live trial with feedback.
 
     Parameters
     ----------
-    recording_id : what the take became, None while it runs. content, baseline : as the take began with them.
+    recording_id : the resulting recording, None while running. content, baseline : as at the start of the
+        trial.
     """
 
     take_id: str
@@ -173,7 +180,7 @@ class TrainedTake:
 
 
 def trainings(c: Connection, patient_id: str) -> list[TrainedTake]:
-    """All live takes of a patient that gave cues, the oldest first."""
+    """All live trials of a patient with cues, oldest first."""
     rows = c.execute(_trainings(), {"of_patient": patient_id})
     return [
         TrainedTake(
@@ -219,7 +226,7 @@ def _trainings() -> Select[Any]:
 
 
 def same_training(a: Prescription, b: Prescription) -> bool:
-    """Whether what was trained is the same: a new schedule ends a record, not the training."""
+    """Whether the same parameter and side are trained; a change of schedule does not matter."""
     return (a.parameter, a.side) == (b.parameter, b.side)
 
 
@@ -239,18 +246,33 @@ def _with_target(
 
 
 def _refuse_impossible(asked: Prescription) -> None:
-    """Raise ServiceError bad_prescription for an entered target that nobody walks with: 60 typed for 0.60."""
+    """Raise ServiceError bad_prescription for an implausible target, such as 60 typed for 0.60."""
     entry, mean, sd = CATALOGUE[asked.parameter], asked.target.mean, asked.target.sd
     low, high = entry.target_range
     unit = f" {entry.printed_unit}" if entry.printed_unit else ""
     if mean is not None and not low <= mean <= high:
         raise ServiceError(
             "bad_prescription",
-            f"target.mean is {mean:g}{unit}. Expected {low:g} to {high:g}{unit} for {entry.label.lower()}.",
+            Message(
+                "target.mean is {mean:g}{unit}. Expected {low:g} to {high:g}{unit2} for {lower}.",
+                mean=mean,
+                unit=unit,
+                low=low,
+                high=high,
+                unit2=unit,
+                lower=entry.label.lower(),
+            ),
         )
     if sd is not None and sd > high - low:
         raise ServiceError(
-            "bad_prescription", f"target.sd is {sd:g}{unit}. Expected at most {high - low:g}{unit}."
+            "bad_prescription",
+            Message(
+                "target.sd is {sd:g}{unit}. Expected at most {low:g}{unit2}.",
+                sd=sd,
+                unit=unit,
+                low=high - low,
+                unit2=unit,
+            ),
         )
 
 
@@ -278,7 +300,7 @@ def _baseline(
 def _mdc(
     patient: Patient, content: Prescription, walk: AnalysedWalk | None, side: Side
 ) -> ChangeLimit | None:
-    """Limit of change of the untrained side, from what it usually does, else from the target."""
+    """MDC of the untrained side, at its usual value or otherwise at the target."""
     there = None if walk is None else targets.find_usual_value(walk, content.parameter, side)
     value = content.target.mean if there is None else there.mean
     limb: Limb | None = None
@@ -288,7 +310,7 @@ def _mdc(
 
 
 def _last_level(c: Connection, own: Sequence[TrainedTake]) -> int | None:
-    """Level of the last cue of the training proper; a block a visit opens with may have none yet."""
+    """Level of the last cue of the training itself; probe blocks at the start may have none yet."""
     for training in reversed(own):
         given = cues(c, [training.take_id])[training.take_id]
         levels = [q.level for q in given if q.why_not not in {"baseline", "retention"}]

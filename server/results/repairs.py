@@ -1,4 +1,4 @@
-"""Repairs of a set-up: what an analysis proposes, and set-ups of earlier ones, to be asked for again."""
+"""Corrections of the sensor setup: proposals of an analysis, and setups of earlier ones to restore."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ SETUP_KEYS: Final = ("sensors", "corrections", "mounting")
 
 @dataclass(frozen=True)
 class ProposedRepair:
-    """What is wrong, in sentences, and the manifest that would put it right.
+    """Detected setup errors, in sentences, and a corrected manifest.
 
     Parameters
     ----------
-    changes : what each sensor would be taken for, in sentences.
+    changes : change for each sensor, in sentences.
     """
 
     evidence: tuple[str, ...]
@@ -34,7 +34,9 @@ class ProposedRepair:
 
 
 def read_proposal(c: Connection, blobs: BlobStore, found: AnalysisRecord) -> ProposedRepair | None:
-    """What an analysis proposes; None where it proposes nothing, or its files are no longer the session's."""
+    """Correction proposed by an analysis; None if there is none or its files are not the session's any
+    more.
+    """
     if REPAIRED not in found.files:
         return None
     this = recordings.current(c, found.session_id)
@@ -47,11 +49,11 @@ def read_proposal(c: Connection, blobs: BlobStore, found: AnalysisRecord) -> Pro
 
 
 def _list_changes(repaired: Mapping[str, Any], before: Mapping[str, Any] | None) -> tuple[str, ...]:
-    """Sensors that would be taken as worn elsewhere or read otherwise.
+    """Sensors with a changed segment or reading.
 
     Parameters
     ----------
-    repaired : the manifest that is proposed. before : that of the analysis that proposes it.
+    repaired : the proposed manifest. before : manifest of the analysis that proposes it.
     """
     said = manifest_of(before or {})
     wanted = manifest_of({key: repaired.get(key) for key in SETUP_KEYS})
@@ -74,9 +76,9 @@ def _list_changes(repaired: Mapping[str, Any], before: Mapping[str, Any] | None)
 
 
 def read_without_limits(c: Connection, found: AnalysisRecord) -> dict[str, Any] | None:
-    """The manifest of an analysis without what a person said of a test's start and end.
+    """Manifest of an analysis without user-defined test limits.
 
-    None where its files are no longer the session's.
+    None if its files are not the session's any more.
     """
     this = recordings.current(c, found.session_id)
     if this is None or this.id != found.recording_id:
@@ -85,7 +87,7 @@ def read_without_limits(c: Connection, found: AnalysisRecord) -> dict[str, Any] 
 
 
 def take_setup(manifest: Mapping[str, Any] | None, other: Mapping[str, Any] | None) -> dict[str, Any]:
-    """A manifest with the set-up of another one; height, protocol and columns stay.
+    """Replace the setup of a manifest by that of another; height, protocol and columns are retained.
 
     >>> take_setup({"protocol": "walk", "corrections": {}}, {"sensors": {"A": "pelvis"}, "protocol": "tug"})
     {'protocol': 'walk', 'sensors': {'A': 'pelvis'}}

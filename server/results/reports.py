@@ -1,4 +1,4 @@
-"""The report of an analysis: its stored files and edits put into words, for pages, API and tables."""
+"""Report of an analysis: stored files and edits, worded for pages, API and tables."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ def read(
     before: AnalysedSession | None = None,
     control_visits: Sequence[ControlVisit] = (),
 ) -> tuple[Bundle, ReportModel]:
-    """Describe an analysis with its edits for this person on that day; raises IntegrityError.
+    """Describe an analysis with edits for a patient and date; raises IntegrityError.
 
     Parameters
     ----------
-    before : the visit that the table is compared with, None = none.
+    before : visit with which the table is compared, None = none.
     control_visits : of the clinic's own controls.
     """
     bundle = reviewed.read_bundle(found, edits)
@@ -76,7 +76,7 @@ def behind_number(
     name: str,
     control_visits: Sequence[ControlVisit] = (),
 ) -> ParameterStrides:
-    """One parameter with the strides behind it; raises NotFound, IntegrityError."""
+    """One parameter with its strides; raises NotFound, IntegrityError."""
     bundle, model = read(reviewed, found, edits, patient, session, control_visits=control_visits)
     row = next((r for _, rows in model.groups for r in rows if r.name == name), None)
     if row is None:

@@ -1,7 +1,7 @@
-"""What people change in a finished analysis: edits kept in order, undone by a row too, measured at once.
+"""Edits of a finished analysis by users: logged in order, undoable, and applied immediately.
 
-Two people may review one session: who edits says which state was seen (`version`), and any but the newest is
-refused.
+Two users may review the same session: each edit states the version it is based on (`version`), and any but
+the latest is rejected.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ def make(
     *,
     seen: int | None = None,
 ) -> tuple[analyses.AnalysisRecord, EditHistory]:
-    """Change the analysis that a session shows.
+    """Edit the displayed analysis of a session.
 
     Parameters
     ----------
-    seen : version on which the person decided; None = whatever there is.
+    seen : version on which the edit is based; None = any.
 
     Raises
     ------
-    NotFound: no analysis. Conflict: edited_meanwhile, no_tracks.
-    ParameterError of sagittal.core.events.edits.
+    NotFound: no analysis. Conflict: edited_meanwhile, no_tracks. ParameterError of
+    sagittal.core.events.edits.
     """
     found, before = _state(db, session_id, seen)
     return found, _make(db, reviewed, actor, session_id, found, before, edit, ACTIONS[edit.kind])
@@ -60,7 +60,7 @@ def make(
 def undo(
     db: Database, actor: audit.Actor | None, session_id: str, *, seen: int | None = None
 ) -> tuple[analyses.AnalysisRecord, EditHistory]:
-    """Take the last live edit back; raises NotFound, Conflict nothing_to_undo, edited_meanwhile."""
+    """Undo the last edit in effect; raises NotFound, Conflict nothing_to_undo, edited_meanwhile."""
     found, before = _state(db, session_id, seen)
     if not before.made:
         raise Conflict("nothing_to_undo", "Nothing has been changed in this analysis.")
@@ -78,7 +78,7 @@ def redo(
     *,
     seen: int | None = None,
 ) -> tuple[analyses.AnalysisRecord, EditHistory]:
-    """Make the last undone edit again; raises NotFound, Conflict nothing_to_redo, edited_meanwhile."""
+    """Redo the last undone edit; raises NotFound, Conflict nothing_to_redo, edited_meanwhile."""
     found, before = _state(db, session_id, seen)
     if not before.undone:
         raise Conflict("nothing_to_redo", "There is no undone change in this analysis.")

@@ -1,6 +1,6 @@
-"""Sensitivity analyses of squats: asked for, run in the child, and read again.
+"""Sensitivity analyses of squats: request, run in the child, and read results.
 
-The results are files of the analysis that was looked at, named by the job; so they live and go with it.
+Results are stored as files of the underlying analysis, named by the job, and deleted with it.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sqlalchemy import Connection, insert, select
 
 from sagittal.core.errors import EstimationError, InputError
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import Conflict, NotFound
@@ -43,8 +44,8 @@ class StoredSensitivity:
 
     Parameters
     ----------
-    reference : name of the reference that errors are of; None = changes of the take's own angles.
-    from_standing : angles were zeroed on standing, as the session shows them; else anatomical.
+    reference : name of the reference for errors; None = changes relative to the trial's own angles.
+    from_standing : angles are relative to standing, as on the session's pages; otherwise anatomical.
     files : names among the files of the analysis.
     """
 
@@ -58,7 +59,7 @@ class StoredSensitivity:
 
 
 def read_reference(content: bytes, name: str, *, from_standing: bool) -> ReferenceAngles:
-    """Angles of an angles.parquet, from standing or anatomical.
+    """Angles of an angles.parquet, relative to standing or anatomical.
 
     Raises
     ------
@@ -70,7 +71,8 @@ def read_reference(content: bytes, name: str, *, from_standing: bool) -> Referen
         angles = read_angles(content)
     except (KeyError, ValueError, OSError) as error:
         raise InputError(
-            "reference_unreadable", f"“{name}” is not the angles.parquet of an analysis or a simulation."
+            "reference_unreadable",
+            Message("“{name}” is not the angles.parquet of an analysis or a simulation.", name=name),
         ) from error
     offset: Mapping[str, float] = {} if from_standing else angles.zero_offset
     known = {n: values + offset.get(n, 0.0) for n, values in angles.angles.items()}
@@ -78,16 +80,16 @@ def read_reference(content: bytes, name: str, *, from_standing: bool) -> Referen
 
 
 def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
-    """Analyse a take as its analysis did, and put every parameter off; pure but for `attempt`.
+    """Repeat the analysis of a trial, and perturb every parameter; pure except for `attempt`.
 
     Parameters
     ----------
-    files : of the recording, and the reference as the last where `params` names one.
+    files : of the recording, followed by the reference if `params` names one.
 
     Raises
     ------
     SagittalError
-        the take has no squats that were followed, the reference cannot be read or does not fit.
+        the trial has no tracked squats, or the reference cannot be read or does not match.
     """
     from sagittal.core.body.chain.geometry import LegGeometry
     from sagittal.core.squat.sensitivity import analyse_legs
@@ -99,7 +101,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
     take = analysing.analyse_again(files, params, attempt, ANALYSED)
     if take.calibrated is None or take.legs is None:
         why = "" if take.problem is None else f" {take.problem.message}"
-        raise EstimationError("no_squats", f"The legs of this take were not followed.{why}")
+        raise EstimationError("no_squats", Message("The legs of this take were not followed.{why}", why=why))
     height = take.recording.subject.height_m
     found = analyse_legs(
         take.calibrated,
@@ -122,7 +124,7 @@ def submit(
     reference: str | None = None,
     from_standing: bool = True,
 ) -> JobView:
-    """Ask for it on the analysis that the session shows, with its mapping and settings; done once.
+    """Request an analysis for the displayed one, with its mapping and settings; idempotent.
 
     Parameters
     ----------
@@ -131,7 +133,7 @@ def submit(
     Raises
     ------
     NotFound
-        the session, its analysis, the reference. Conflict: not_squats.
+        the session, its analysis, or the reference. Conflict: not_squats.
     """
     if sessions.get(c, session_id).protocol != "squat":
         raise Conflict("not_squats", "This is analysed for squats; the visit has another protocol.")
@@ -144,14 +146,14 @@ def submit(
 
 
 def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Mapping[str, Blob]) -> None:
-    """Write the files of a result, in the transaction that marks its job done."""
+    """Store the files of a result, in the transaction that marks its job done."""
     for name, blob in stored.items():
         row = {"name": _name(claim.job_id, name), "size": blob.size, "sha256": blob.sha256}
         c.execute(insert(analysis_file).values(analysis_id=claim.params["analysis_id"], **row))
 
 
 def get(c: Connection, job_id: str) -> StoredSensitivity:
-    """One that is finished; raises NotFound."""
+    """One finished analysis; raises NotFound."""
     row = c.execute(_QUERY.where(job.c.id == job_id)).first()
     if row is None:
         raise NotFound("sensitivity analysis", job_id)
@@ -159,14 +161,14 @@ def get(c: Connection, job_id: str) -> StoredSensitivity:
 
 
 def of_session(c: Connection, session_id: str) -> list[StoredSensitivity]:
-    """All that are finished, the newest first; raises NotFound for the session."""
+    """All finished analyses, newest first; raises NotFound for the session."""
     sessions.get(c, session_id)
     rows = c.execute(_QUERY.where(recording.c.session_id == session_id).order_by(job.c.finished_at.desc()))
     return [_stored(row) for row in rows]
 
 
 def find_file(c: Connection, found: StoredSensitivity) -> tuple[analyses.AnalysisRecord, str]:
-    """The analysis that keeps the result, and the name of its JSON."""
+    """The analysis that stores the result, and the name of its JSON."""
     return analyses.get(c, found.analysis_id), found.files[0]
 
 

@@ -1,4 +1,4 @@
-"""Jobs on the analysis that a session shows: on its recording as it was analysed, or on its result files."""
+"""Jobs on a session's displayed analysis: on its recording as analysed, or on its result files."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def submit_on_shown(
     against: recordings.RecordedFile | None,
     **own: Any,
 ) -> JobView:
-    """Ask for a job; the same one is done once.
+    """Request a job on the displayed analysis; idempotent.
 
     Parameters
     ----------
-    found : the analysis that is shown. action : in the audit log. against : a reference, last of the job's
-        files. own : parameters of this kind of job.
+    found : the displayed analysis. action : in the audit log. against : a reference, added as last file of
+        the job. own : parameters specific to this kind of job.
     """
     inputs = recordings.job_inputs(recordings.get(c, found.recording_id))
     if against is not None:
@@ -54,7 +54,7 @@ def submit_for(
     action: str,
     params: Mapping[str, Any],
 ) -> JobView:
-    """Ask for a job on an analysis; the same one is done once."""
+    """Request a job on an analysis; idempotent."""
     view = queue.submit(
         c,
         key=make_key(found, kind, params),
@@ -68,5 +68,5 @@ def submit_for(
 
 
 def make_key(found: analyses.AnalysisRecord, kind: str, params: Mapping[str, Any]) -> str:
-    """What names a job on an analysis: equal keys give equal results."""
+    """Key of a job on an analysis: equal keys give equal results."""
     return f"{found.id}:{kind}:{analyses.digest_json(params)}:{CODE_VERSION}"

@@ -1,8 +1,8 @@
-"""Signals of a finished analysis for the eye: named lanes, each thinned to what a screen can show.
+"""Signals of a finished analysis for display: named lanes, downsampled to screen resolution.
 
-Derived: pitch and rate of the feet, how high they are, every joint angle. Raw: what each sensor measured, in
-its own axes. A window of a lane is answered as the least and the greatest value of equal parts of it, so that
-no peak is lost, however far one zooms out.
+Derived: pitch, angular rate and height of the feet, every joint angle. Raw: measurements of each sensor in
+its own axes. A window of a lane is returned as minimum and maximum of equal bins, so that peaks are preserved
+at any zoom.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class SignalLane:
 
     Parameters
     ----------
-    lines : what is drawn in it: "left", "right" or "x", "y", "z". up : which way is up, in words.
-    raw : of one sensor, as measured.
+    lines : its curves: "left", "right" or "x", "y", "z". up : meaning of positive values, in words.
+    raw : measurement of one sensor.
     """
 
     name: str
@@ -56,8 +56,8 @@ class SignalWindow:
 
     Parameters
     ----------
-    start_s, step_s : time of the first part and from part to part.
-    low, high : line → least and greatest value of every part, None where the sensor was lost.
+    start_s, step_s : time of the first bin and bin width.
+    low, high : line → minimum and maximum of every bin, None where the sensor was lost.
     """
 
     lane: SignalLane
@@ -68,7 +68,7 @@ class SignalWindow:
 
 
 def list_lanes(reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord) -> tuple[SignalLane, ...]:
-    """What can be drawn of an analysis, feet first, then joints from the top, then sensors."""
+    """Signals available for an analysis: feet first, then joints from proximal to distal, then sensors."""
     known = reviewed.open(found)
     return tuple(lane for lane, _ in _lanes(reviewed, found, known))
 
@@ -81,7 +81,7 @@ def read_window(
     end_s: float,
     points: int,
 ) -> SignalWindow:
-    """A window of a lane in at most `points` parts; raises NotFound for a lane that is not there."""
+    """A window of a lane in at most `points` bins; raises NotFound for an unknown lane."""
     known = reviewed.open(found)
     drawn = next(((lane, read) for lane, read in _lanes(reviewed, found, known) if lane.name == name), None)
     if drawn is None:
@@ -214,7 +214,7 @@ def _columns(reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord) -> tupl
 def _raw(
     reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, segment: Segment, kind: str
 ) -> tuple[Floats, Mapping[str, Floats]]:
-    """The three axes of a sensor; kept, for whoever looks at a signal looks again."""
+    """The three axes of a sensor, cached as signals are usually viewed repeatedly."""
 
     def read() -> tuple[Floats, Mapping[str, Floats]]:
         names = {c: f"{segment}_{kind}_{c}{_ENDING[kind]}" for c in AXES}
@@ -226,7 +226,7 @@ def _raw(
 
 
 def _extremes(values: Floats, size: int) -> tuple[list[float | None], list[float | None]]:
-    """Least and greatest value of successive parts of `size` samples, the last one shorter."""
+    """Minimum and maximum of successive bins of `size` samples; the last one may be shorter."""
     if size == 1:
         same = _plain(values)
         return same, same

@@ -1,4 +1,4 @@
-"""Targets of biofeedback in numbers: the norm at a person's speed, the other side, their own baseline."""
+"""Numeric targets of biofeedback: norm at the patient's speed, the other side, or the own baseline."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from sqlalchemy import Connection
 from sagittal.core.feedback import Target
 from sagittal.core.feedback.prescription import TargetSource
 from sagittal.core.frames import SIDES, Side
+from sagittal.core.message import Message
 from sagittal.core.norms import Norms, NormValue
 from sagittal.core.norms.values import is_angle
 from sagittal.core.parameters.catalogue import CATALOGUE
@@ -33,11 +34,11 @@ FEWEST: Final = 5
 
 @dataclass(frozen=True, eq=False)
 class AnalysedWalk:
-    """An analysed session of a person with what it is compared with.
+    """An analysed session with its norms.
 
     Parameters
     ----------
-    own_controls : the clinic's own norm, read when it is asked for: there may be many controls.
+    own_controls : the clinic's own norm, read on demand as there may be many controls.
     """
 
     session: Session
@@ -48,7 +49,7 @@ class AnalysedWalk:
 
 @dataclass(frozen=True)
 class Offer:
-    """What a source gives, or a sentence that says why it gives nothing."""
+    """Target from a source, or a sentence with the reason why there is none."""
 
     target: Target | None
     reason: str | None = None
@@ -63,14 +64,14 @@ def last_walk(
     *,
     with_controls: bool = True,
 ) -> AnalysedWalk | None:
-    """The analysed walk that says how a person walks, never one with feedback; None without one.
+    """The latest walk without feedback that represents the patient's gait; None without one.
 
-    Without `before` it is that of `histories.baseline`.
+    Without `before`, as selected by `histories.baseline`.
 
     Parameters
     ----------
-    before : the newest walked like this session, on its day or earlier, itself not. session_id : only this
-        one. with_controls : look for the clinic's own controls too.
+    before : the newest under the condition of this session, on its day or earlier, excluding itself.
+    session_id : only this one. with_controls : include the clinic's own controls.
     """
     found = [
         a
@@ -96,11 +97,11 @@ def last_walk(
 
 
 def offer(walk: AnalysedWalk | None, source: TargetSource, parameter: str, side: Side | None) -> Offer:
-    """What a source gives as target of a parameter, from a person's last walk.
+    """Target of a parameter from a source, based on a patient's last walk.
 
     Parameters
     ----------
-    side : that is to be trained, None = both.
+    side : trained side, None = both.
     """
     if source == "manual":
         return Offer(None, "Enter mean and SD.")
@@ -124,7 +125,7 @@ def opposite_side(side: Side) -> Side:
 
 
 def find_usual_value(walk: AnalysedWalk, parameter: str, side: Side | None) -> Parameter | None:
-    """What a person did in a walk: of a side, or of both together; None where it was not measured."""
+    """Value of a parameter in a walk, of one side or both together; None if it was not measured."""
     found = _mean(walk.numbers, parameter, side) or _mean(walk.numbers, parameter, None)
     if found is not None or side is not None:
         return found
@@ -133,13 +134,16 @@ def find_usual_value(walk: AnalysedWalk, parameter: str, side: Side | None) -> P
 
 
 def _better(walk: AnalysedWalk, parameter: str, side: Side) -> Offer:
-    """The other side, where the parameter's direction says that it is the better one."""
+    """The other side's value, if it is the better one according to the parameter's direction."""
     entry = CATALOGUE[parameter]
     if entry.better is None:
         return Offer(
             None,
-            f"{entry.label}: neither higher nor lower is better by itself. Choose another source, or enter a "
-            "target.",
+            Message(
+                "{label}: neither higher nor lower is better by itself. Choose another source, or "
+                "enter a target.",
+                label=entry.label,
+            ),
         )
     other = _own(walk, parameter, opposite_side(side))
     own = find_usual_value(walk, parameter, side)
@@ -150,8 +154,12 @@ def _better(walk: AnalysedWalk, parameter: str, side: Side) -> Offer:
         return other
     return Offer(
         None,
-        f"The {side} side is the better one on {day(walk.session.performed_on)}. Train the other side, or "
-        "choose another source.",
+        Message(
+            "The {side} side is the better one on {performed_on}. Train the other side, or choose "
+            "another source.",
+            side=side,
+            performed_on=day(walk.session.performed_on),
+        ),
     )
 
 
@@ -169,7 +177,7 @@ def _norm(walk: AnalysedWalk, parameter: str) -> Offer:
     else:
         there = next((v for v in values if v is not None), None)
         said = "There is no norm of this parameter." if there is None else there.note
-    return Offer(None, f"{said} Choose another source, or enter a target.")
+    return Offer(None, Message("{said} Choose another source, or enter a target.", said=said))
 
 
 def _serves(value: NormValue | None) -> bool:
@@ -178,16 +186,27 @@ def _serves(value: NormValue | None) -> bool:
 
 def _own(walk: AnalysedWalk, parameter: str, side: Side | None) -> Offer:
     found = find_usual_value(walk, parameter, side)
-    where = "both sides" if side is None else f"{side} side"
+    where = "both sides" if side is None else Message("{side} side", side=side)
     if found is None or found.mean is None or not found.sd or found.n < FEWEST:
         n = 0 if found is None else found.n
         return Offer(
             None,
-            f"The {where} has {n} {plural(n, 'stride', 'strides')} with this parameter on "
-            f"{day(walk.session.performed_on)}; expected at least {FEWEST} that differ. Choose another "
-            "source, or enter a target.",
+            Message(
+                f"The {{where}} has {{value}} {plural(n, 'stride', 'strides')} with this parameter on "
+                "{performed_on}; expected at least {FEWEST} that differ. Choose "
+                "another source, or enter a target.",
+                where=where,
+                value=n,
+                performed_on=day(walk.session.performed_on),
+                FEWEST=FEWEST,
+            ),
         )
-    words = f"{where}, {found.n} {plural(found.n, 'stride', 'strides')} on {day(walk.session.performed_on)}"
+    words = Message(
+        f"{{where}}, {{found}} {plural(found.n, 'stride', 'strides')} on {{performed_on}}",
+        where=where,
+        found=found.n,
+        performed_on=day(walk.session.performed_on),
+    )
     source: TargetSource = "own_baseline"
     return Offer(Target(source, found.mean, found.sd, words, walk.session.id))
 
@@ -205,7 +224,7 @@ def _mean(numbers: Numbers, name: str, side: Side | None) -> Parameter | None:
 
 
 def _together(sides: list[Parameter]) -> Parameter:
-    """Strides of all sides as one: mean, and sd about it."""
+    """Mean and sd over the strides of all sides."""
     n = sum(p.n for p in sides)
     mean = sum(p.n * (p.mean or 0.0) for p in sides) / n
     squares = sum((p.n - 1) * (p.sd or 0.0) ** 2 + p.n * ((p.mean or 0.0) - mean) ** 2 for p in sides)
@@ -214,7 +233,7 @@ def _together(sides: list[Parameter]) -> Parameter:
 
 
 def _earlier(a: AnalysedSession, b: Session) -> bool:
-    """Whether a visit came before this session and was walked like it; how fast its belt will run is open."""
+    """Whether a visit precedes this session under the same condition, except for treadmill speed."""
     own = a.session
     if own.id == b.id or (own.performed_on, own.created_at) >= (b.performed_on, b.created_at):
         return False

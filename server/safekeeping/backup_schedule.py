@@ -1,7 +1,7 @@
-"""Backups by the clock, and the weekly proof that the newest one can be restored.
+"""Scheduled backups, and a weekly restore test of the newest one.
 
-if is_due(settings, now()): run(settings)      # in a process of its own (worker/backing_up.py)
-read_state(settings)                           # how the last ones went: the page System, health, metrics
+if is_due(settings, now()): run(settings)      # in a separate process (worker/backing_up.py)
+read_state(settings)                           # last outcomes, for the System page, health and metrics
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ CLOSED: Final = "Patients' names in it need their key, which is not in it or is 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one backup or one restore test went.
+    """Outcome of one backup or restore test.
 
     Parameters
     ----------
-    at : when it ended. ok : None = it could not be tried. name : the backup's file.
-    said : what went wrong, or what was found, as a sentence. size : bytes of the backup, 0 = none.
+    at : end time. ok : None = it could not be attempted. name : the backup's file.
+    said : error or findings, as a sentence. size : bytes of the backup, 0 = none.
     """
 
     at: dt.datetime
@@ -66,11 +66,11 @@ class Outcome:
 
 @dataclass(frozen=True)
 class BackupState:
-    """How the last backup and the last restore test went; None = there was none.
+    """Outcome of the last backup and restore test; None = there was none.
 
     Parameters
     ----------
-    good : the last backup that was made without a complaint.
+    good : the last backup without errors.
     """
 
     backup: Outcome | None = None
@@ -79,7 +79,7 @@ class BackupState:
 
 
 def read_state(settings: Settings) -> BackupState:
-    """What the file says; empty when there is none or it cannot be read."""
+    """Read the state file; empty if missing or unreadable."""
     try:
         tree: Any = read_json(settings.backup_state.read_bytes())
         return BackupState(*(_parse(tree[name]) for name in ("backup", "good", "test")))
@@ -91,18 +91,18 @@ def read_state(settings: Settings) -> BackupState:
 
 
 def next_time(settings: Settings, at: dt.datetime) -> dt.datetime:
-    """When the clock next shows `backup_at`, in the zone of `at`."""
+    """Next occurrence of `backup_at`, in the time zone of `at`."""
     hour, minute = map(int, settings.backup_at.split(":"))
     day = at.replace(hour=hour, minute=minute, second=0, microsecond=0)
     return day if day > at else day + dt.timedelta(days=1)
 
 
 def is_due(settings: Settings, at: dt.datetime) -> bool:
-    """Whether a backup is to be made: none since the last `backup_at`, no failure within the hour.
+    """Whether a backup is due: none since the last `backup_at`, and no failure within the hour.
 
     Parameters
     ----------
-    at : the time in the machine's zone.
+    at : local time.
     """
     if not settings.backup_dir:
         return False
@@ -114,7 +114,9 @@ def is_due(settings: Settings, at: dt.datetime) -> bool:
 
 
 def run(settings: Settings) -> BackupState:
-    """Make a backup, remove old ones, test the newest when the last test is a week old; write how it went."""
+    """Make a backup, prune old ones, test the newest if the last test is a week old, and store the
+    outcome.
+    """
     folder = Path(settings.backup_dir)
     state = read_state(settings)
     key: ClinicKey | None = None

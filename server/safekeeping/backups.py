@@ -1,11 +1,11 @@
-"""A backup while the service runs: one file with the database, stored files, live logs and a manifest.
+"""Online backups: one file with the database, stored files, live logs and a manifest.
 
-    made = make_backup(db, settings, Path("/mnt/backup"), key)     # an existing folder: the name says when
-    prune(Path("/mnt/backup"))                                     # keep days, weeks and months
+    made = make_backup(db, settings, Path("/mnt/backup"), key)     # an existing folder: named by time
+    prune(Path("/mnt/backup"))                                     # retain daily, weekly and monthly ones
 
-Live logs go first, then a snapshot of the database, then the files it refers to. So a take that ends
-meanwhile is there as a log or as a recording; stored files never change, one that is swept meanwhile is in
-the trash. The file appears under its name when it is whole and on the disk, or not at all.
+Live logs are read first, then a snapshot of the database, then the files it refers to. A trial that ends
+meanwhile is thus included as a log or as a recording; stored files never change, and one that is swept
+meanwhile is in the trash. The file appears under its name only when complete and on disk.
 """
 
 from __future__ import annotations
@@ -59,12 +59,12 @@ _OLD_S: Final = 86_400.0
 
 
 class BackupError(Exception):
-    """No backup was made; the message says why and what to do."""
+    """The backup failed; the message gives reason and remedy."""
 
 
 @dataclass(frozen=True)
 class Backup:
-    """A backup in a folder: its file, when it was begun, its length in bytes."""
+    """A backup in a folder: path, start time, size in bytes."""
 
     path: Path
     at: dt.datetime
@@ -73,14 +73,14 @@ class Backup:
 
 @dataclass(frozen=True)
 class MadeBackup:
-    """A backup that was made.
+    """A completed backup.
 
     Parameters
     ----------
-    path, size : the file, bytes. files : how many stored files and live logs are in it.
+    path, size : the file, bytes. files : number of stored files and live logs in it.
     head : newest audit row.
-    missing : (space, sha256) of files that the database refers to and that are gone or damaged, so not in it.
-    left_out : the key of patients' names, where it is not in it: not encrypted, or the key cannot be read.
+    missing : (space, sha256) of referenced files that are missing or damaged and thus not included.
+    left_out : the identity key, if not included: the backup is not encrypted, or the key cannot be read.
     """
 
     path: Path
@@ -93,7 +93,7 @@ class MadeBackup:
 
 @dataclass
 class _Content:
-    """What has been put into an archive: name, size and sha256 of each file, and what should have been."""
+    """Content of an archive: name, size and sha256 of each file, and missing files."""
 
     files: list[tuple[str, int, str]] = field(default_factory=list)
     missing: list[tuple[str, str]] = field(default_factory=list)
@@ -102,12 +102,12 @@ class _Content:
 def make_backup(
     db: Database, settings: Settings, target: Path, key: ClinicKey | None, actor: audit.Actor | None = None
 ) -> MadeBackup:
-    """Make one backup; a target that does not end as a file of ours is a folder: the name says when.
+    """Make one backup; a target without the extension of a backup is a folder, and the file is named by time.
 
     Raises
     ------
     BackupError
-        another one is being made, or the target cannot be written.
+        another backup is in progress, or the target cannot be written.
     """
     at = now()
     is_file = target.name.endswith(ENDS)
@@ -143,7 +143,7 @@ def make_backup(
 
 
 def list_backups(folder: Path) -> list[Backup]:
-    """The backups in a folder, the newest first; other files are passed over."""
+    """Backups in a folder, newest first; other files are ignored."""
     found = []
     for path in folder.iterdir() if folder.is_dir() else ():
         named = _NAME.fullmatch(path.name)
@@ -155,7 +155,7 @@ def list_backups(folder: Path) -> list[Backup]:
 
 
 def choose_kept(times: Iterable[dt.datetime]) -> set[dt.datetime]:
-    """Which backups are kept: of the last days, weeks and months that have any, the newest of each."""
+    """Backups to retain: the newest of each of the last days, weeks and months that have any."""
     newest_first = sorted(times, reverse=True)
     kept: set[dt.datetime] = set()
     for most, period in (
@@ -171,7 +171,7 @@ def choose_kept(times: Iterable[dt.datetime]) -> set[dt.datetime]:
 
 
 def prune(folder: Path) -> list[Path]:
-    """Remove the backups of a folder that `choose_kept` does not name; return which."""
+    """Remove the backups of a folder not selected by `choose_kept`; return their names."""
     found = list_backups(folder)
     kept = choose_kept(one.at for one in found)
     gone = [one.path for one in found if one.at not in kept]
@@ -183,7 +183,7 @@ def prune(folder: Path) -> list[Path]:
 
 
 def count_patients_and_sessions(c: Connection) -> tuple[int, int]:
-    """How many patients and sessions there are."""
+    """Numbers of patients and sessions."""
     people = c.execute(select(func.count()).select_from(patient)).scalar_one()
     return people, c.execute(select(func.count()).select_from(session)).scalar_one()
 
@@ -232,7 +232,7 @@ def _write(
 
 @contextlib.contextmanager
 def _snapshot(db: Database, settings: Settings) -> Iterator[Path]:
-    """A consistent copy of the database for as long as the block lasts."""
+    """Context with a consistent copy of the database."""
     copy = settings.backups / f"{new_id()}.tmp"
     try:
         fs.keep_private(copy)
@@ -258,7 +258,7 @@ def _add_open(archive: ArchiveWriter, name: str, source: BinaryIO, content: _Con
 def _add_names_key(
     archive: ArchiveWriter, settings: Settings, content: _Content, *, encrypted: bool
 ) -> Path | None:
-    """Add the key of patients' names where it is safe; returns its file where it was left out."""
+    """Add the identity key if the backup is encrypted; return its path if it was omitted."""
     file = settings.identity_key_file
     try:
         with file.open("rb") as source:
@@ -300,7 +300,7 @@ def _add_blobs(
 
 
 def _open(blobs: BlobStore, space: str, sha256: str) -> BinaryIO | None:
-    """A file in its place, or in the trash since the snapshot; None = it is in neither."""
+    """Open a stored file, or its copy in the trash since the snapshot; None = neither exists."""
     found = blobs.open_unverified(space, sha256)
     if found is not None:
         return found
@@ -312,7 +312,7 @@ def _open(blobs: BlobStore, space: str, sha256: str) -> BinaryIO | None:
 
 
 def _clear(folder: Path, least_age_s: float) -> None:
-    """Remove what backups that were killed have left."""
+    """Remove the remains of killed backups."""
     for path in folder.iterdir():
         stem = path.name.removesuffix("-wal").removesuffix("-shm")
         with contextlib.suppress(FileNotFoundError):

@@ -1,4 +1,4 @@
-"""`sagittal check`: is everything that is stored still what was stored?"""
+"""Integrity checks of `sagittal check`."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from sagittal.server.storage.references import list_referenced
 
 @dataclass(frozen=True)
 class StorageDefect:
-    """One thing that is wrong.
+    """One defect.
 
     Parameters
     ----------
-    area : database, files, live, trash, audit, or keys: what cannot be read by its key.
-    message : what, and where.
+    area : database, files, live, trash, audit, or keys (values that cannot be decrypted).
+    message : description and location.
     """
 
     area: str
@@ -44,17 +44,17 @@ def check(
     known_missing: Collection[tuple[str, str]] = (),
     kept_head: Path | None = None,
 ) -> list[StorageDefect]:
-    """Check database, stored files by their hash, live logs, trash, audit chain and what is encrypted.
+    """Check database, hashes of stored files, live logs, trash, audit chain and encrypted values.
 
     Parameters
     ----------
-    known_missing : files (space, sha256) of which it is known already that they are not there.
-    kept_head : a file like `audit.mark` that was kept elsewhere: the log must still hold that row.
+    known_missing : files (space, sha256) known to be missing.
+    kept_head : a copy of `audit.mark` stored elsewhere: the log must still contain that row.
 
     Raises
     ------
     StoreAway
-        the stored files cannot be looked at now.
+        the stored files are unavailable.
     """
     try:
         found = [StorageDefect("database", text) for text in db.problems()]
@@ -90,7 +90,7 @@ def check(
 def _check_files(
     blobs: BlobStore, used: Sequence[tuple[str, str]], waiting: Collection[tuple[str, str]]
 ) -> Iterator[StorageDefect]:
-    """Open every file that is in use, by its hash; those that are `waiting` lie in the trash."""
+    """Open every referenced file and verify its hash; those in `waiting` are in the trash."""
     for space, sha256 in used:
         try:
             blobs.open(space, sha256).close()

@@ -1,12 +1,12 @@
-"""Taking away stored files that no row refers to: cut uploads, results of lost claims, replaced files.
+"""Deletion of unreferenced stored files: interrupted uploads, results of lost claims, replaced files.
 
-They go to the trash for 30 days, because a database that was put back from a backup refers to few of them;
-after one went back in time nothing is taken away at all (services/custody.py). Only what nobody was ever
-promised (half received) and what was erased on purpose goes at once.
+They remain in the trash for 30 days, because a database restored from a backup refers to fewer files; after a
+restore nothing is deleted until confirmed (services/custody.py). Only partially received files and erased
+data are removed immediately.
 
-A file may be young because somebody is about to refer to it, so only files older than a grace time go. They
-go while the write lock is held: a publisher either has committed (the reference is seen) or will find its
-file gone in its own transaction (BlobStore.require) and fail cleanly.
+A recent file may be about to be referenced, so only files older than a grace period are removed, under the
+write lock: a publisher has either committed (the reference is visible) or will find its file missing in its
+own transaction (BlobStore.require) and fail cleanly.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ log = logging.getLogger(__name__)
 
 
 def sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
-    """Move unreferenced files older than `settings.sweep_grace_s` to the trash and empty that of old ones.
+    """Move unreferenced files older than `settings.sweep_grace_s` to the trash and delete expired ones.
 
     Returns
     -------
-    How many stored files were taken away; 0 when this database is in doubt, or another sweep is under way.
+    Number of files moved; 0 if this database is in doubt, or another sweep is in progress.
     """
     try:
         with blobs.lock_sweep():
@@ -88,12 +88,12 @@ def _sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
 
 
 def _list_used(c: Connection) -> set[tuple[str, str]]:
-    """(space, name) of every file that a row refers to, of those that are still coming too."""
+    """(space, name) of every referenced file, including unfinished uploads."""
     return list_referenced(c) | {(INCOMING, name) for name in uploads.list_parts(c)}
 
 
 def put_back(db: Database, blobs: BlobStore) -> int:
-    """Move missing files that a row refers to from the trash to their place; return how many."""
+    """Restore missing referenced files from the trash; return their number."""
     trash = blobs.trash
     back = 0
     with db.write() as c:

@@ -1,6 +1,6 @@
-"""Care teams: who is in the team of which patient, and who opened somebody in an emergency.
+"""Care teams of patients, and emergency access from outside a team.
 
-Off until an administrator switches them on; what they decide is server/auth/sight.py.
+Disabled until an administrator enables them; for their effect see server/auth/sight.py.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from unicodedata import normalize
 
 from sqlalchemy import Connection, Row, Select, case, delete, exists, insert, select, union, update
 
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.server import audit
 from sagittal.server.auth.identity import Identity
@@ -43,7 +44,7 @@ _NOT_OF_A_TEAM: Final = (
 
 @dataclass(frozen=True)
 class TeamMember:
-    """Somebody who may be or is in a team."""
+    """An actual or possible member of a team."""
 
     user_id: str
     name: str
@@ -52,11 +53,11 @@ class TeamMember:
 
 @dataclass(frozen=True)
 class EmergencyAccess:
-    """Somebody outside the team opened the patient: by whom (name, account), why, from when to when.
+    """Emergency access from outside the team: user (name, account), reason and period.
 
     Parameters
     ----------
-    ended_at : somebody ended it then, before its time. is_open : it went on when it was read.
+    ended_at : time of an early end. is_open : in effect at the time of reading.
     """
 
     id: str
@@ -76,14 +77,14 @@ def are_on(c: Connection) -> bool:
 
 
 def switch_on(c: Connection, actor: audit.Actor, *, begin_with_past: bool) -> None:
-    """From now on a patient is seen by the team only; without effect where they are on.
+    """Restrict each patient to its care team; no effect if already enabled.
 
-    Links to reports end where their maker is not in the team.
+    Links to reports end if their creator is not in the team.
 
     Parameters
     ----------
-    begin_with_past : whoever has opened or changed something of a patient so far is in the team; a team that
-    was set before stays as it is.
+    begin_with_past : users who have accessed or changed a patient's data join the team; existing teams are
+        unchanged.
     """
     if are_on(c):
         return
@@ -97,15 +98,15 @@ def switch_on(c: Connection, actor: audit.Actor, *, begin_with_past: bool) -> No
 
 
 def switch_off(c: Connection, actor: audit.Actor) -> None:
-    """From now on everybody sees every patient; the teams are kept."""
+    """Give all users access to all patients; the teams are retained."""
     if c.execute(delete(clinic_option).where(clinic_option.c.name == CARE_TEAMS)).rowcount:
         audit.record(c, actor, "care_teams.off", "clinic", None)
 
 
 def list_people(c: Connection, patient_id: str) -> list[tuple[TeamMember, bool]]:
-    """Who is or can be in the team of a patient, by name, and whether in it.
+    """Possible and actual members of a patient's team, by name.
 
-    Open accounts can, but administrators, who see everybody.
+    Active accounts can be members, except administrators, who have access to all patients.
     """
     mine = (care_team_member.c.user_id == user.c.id) & (care_team_member.c.patient_id == patient_id)
     can = user.c.active & (user.c.role != Role.ADMIN)
@@ -122,7 +123,7 @@ def list_people(c: Connection, patient_id: str) -> list[tuple[TeamMember, bool]]
 
 
 def list_team(c: Connection, patient_id: str) -> list[TeamMember]:
-    """The team of a patient, by name."""
+    """Care team of a patient, by name."""
     return [one for one, is_in in list_people(c, patient_id) if is_in]
 
 
@@ -134,7 +135,7 @@ def set_team(
     Raises
     ------
     NotFound
-        the patient, or no open account has one of the ids.
+        the patient does not exist, or an id belongs to no active account.
     """
     patients.get(c, patient_id)
     wanted = set(user_ids)
@@ -155,7 +156,7 @@ def set_team(
 
 
 def add_maker(c: Connection, who: Identity, patient_id: str) -> None:
-    """Put whoever adds a patient into the team, or nobody but administrators would see the patient."""
+    """Add the user who creates a patient to its team; otherwise only administrators would have access."""
     if who.role is not Role.ADMIN and are_on(c):
         c.execute(insert(care_team_member).values(patient_id=patient_id, user_id=who.user_id, since=now()))
         audit.record(
@@ -164,13 +165,14 @@ def add_maker(c: Connection, who: Identity, patient_id: str) -> None:
 
 
 def open_in_emergency(c: Connection, who: Identity, code: str, reason: str) -> EmergencyAccess:
-    """Open a patient to somebody outside the team for a time.
+    """Give a user outside the team temporary access to a patient.
 
-    The code must be known: it is no way to look for people.
+    Requires the exact code, so that it cannot be used to search for patients.
 
     Raises
     ------
-    NotFound : no patient has exactly this code. ServiceError bad_value : no reason to speak of. Conflict
+    NotFound : no patient has exactly this code. ServiceError bad_value : the reason is too short or too long.
+        Conflict
     care_teams_off, seen_already.
     """
     if not are_on(c):
@@ -179,8 +181,13 @@ def open_in_emergency(c: Connection, who: Identity, code: str, reason: str) -> E
     if not REASON[0] <= len(why) <= REASON[1]:
         raise ServiceError(
             "bad_value",
-            f"The reason has {len(why)} {plural(len(why), 'character', 'characters')}. "
-            f"Expected {REASON[0]} to {REASON[1]}.",
+            Message(
+                f"The reason has {{why}} {plural(len(why), 'character', 'characters')}. Expected {{REASON}} "
+                "to {REASON2}.",
+                why=len(why),
+                REASON=REASON[0],
+                REASON2=REASON[1],
+            ),
         )
     wanted = normalize("NFKC", code).strip()
     found = c.execute(select(patient.c.id).where(patient.c.code == wanted)).scalar()
@@ -198,21 +205,22 @@ def open_in_emergency(c: Connection, who: Identity, code: str, reason: str) -> E
 
 
 def may_end(access: EmergencyAccess, who: Identity) -> bool:
-    """Whether somebody may end an access: whose it is, and administrators."""
+    """Whether a user may end an access: its owner or an administrator."""
     return who.is_admin or access.by_id == who.user_id
 
 
 def end_emergency(c: Connection, who: Identity, access_id: str) -> EmergencyAccess:
-    """End an access in an emergency now, and the links that hang on it; one that is over stays as it is.
+    """End an emergency access and the links that depend on it; no effect if it has ended.
 
     Raises
     ------
-    NotFound; NotAllowed `not_yours`, of somebody else's.
+    NotFound; NotAllowed `not_yours` for another user's access.
     """
     found = _get_access(c, access_id)
     if not may_end(found, who):
         raise NotAllowed(
-            "not_yours", f"{found.by} opened this patient. Ask that person or an administrator to end it."
+            "not_yours",
+            Message("{by} opened this patient. Ask that person or an administrator to end it.", by=found.by),
         )
     if found.is_open:
         mine = emergency_access.c.id == access_id
@@ -224,7 +232,7 @@ def end_emergency(c: Connection, who: Identity, access_id: str) -> EmergencyAcce
 
 
 def end_all_emergencies(c: Connection) -> None:
-    """End every access in an emergency: of a database put back, who ended one since is not known."""
+    """End all emergency accesses after a restore, since later changes to them are unknown."""
     # those that are over too: the clock of this computer may be ahead
     unended = update(emergency_access).where(emergency_access.c.ended_at.is_(None))
     over = case((is_emergency_open(), now()), else_=emergency_access.c.ends_at)
@@ -232,7 +240,7 @@ def end_all_emergencies(c: Connection) -> None:
 
 
 def list_accesses(c: Connection, patient_id: str) -> list[EmergencyAccess]:
-    """Who opened a patient in an emergency of late, the newest first."""
+    """Recent emergency accesses to a patient, newest first."""
     of_late = (emergency_access.c.patient_id == patient_id) & (emergency_access.c.opened_at > now() - SHOWN)
     query = _select_accesses().where(of_late).order_by(emergency_access.c.opened_at.desc())
     return [_make_access(row) for row in c.execute(query)]
@@ -265,9 +273,9 @@ def _make_access(row: Row[Any]) -> EmergencyAccess:
 
 
 def _list_past(c: Connection) -> list[tuple[str, str]]:
-    """Patient and person, of who has opened or changed something of a patient and still has an account.
+    """Pairs of patient and user with earlier access or changes, for existing accounts.
 
-    Left out: patients whose team was set before, and of a patient whoever came in an emergency.
+    Omits patients with an existing team, and users with emergency access to the patient.
     """
     is_work = audit_table.c.action.not_in(_NOT_OF_A_TEAM)
     of_patient = select(patient.c.id.label("patient_id"), audit_table.c.user_id).join(

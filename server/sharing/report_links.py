@@ -1,10 +1,10 @@
-"""Links by which somebody without an account reads one signed report: they expire and can be revoked.
+"""Links that give readers without an account access to one signed report; they expire and can be revoked.
 
-Whoever has the address may read, so the address holds a random token of 256 bits that is shown once. The
-database keeps its hash and finds it by that: how long this takes tells nothing of the token. What a link
-opens bears a number instead of the patient's code. Who reopens a report ends its links. They also end with
-their maker's account, and as soon as the maker may no longer read the report (`end_orphaned`); what ends by
-the clock alone, such as an access in an emergency, is asked again whenever a link is opened.
+Knowing the URL is sufficient, so it contains a random 256-bit token that is shown only once. The database
+stores and indexes its hash, so the duration of a look-up reveals nothing about the token. The linked report
+shows a number instead of the patient's code. Reopening a report ends its links. They also end when their
+creator's account is closed or loses access to the report (`end_orphaned`); restrictions that depend on time,
+such as emergency access, are checked whenever a link is opened.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Final
 
 from sqlalchemy import ColumnElement, Connection, insert, select, update
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import POLICY, Action
@@ -35,12 +36,12 @@ QUIET: Final = dt.timedelta(minutes=1)
 
 @dataclass(frozen=True)
 class ReportLink:
-    """A link as people may see it; its address is not known any more.
+    """A link as shown to users, without its URL.
 
     Parameters
     ----------
-    openings, opened_at : how often it was opened, and when last.
-    emergency_id : the access in an emergency in which it was made and with which it ends; None = in none.
+    openings, opened_at : number of openings, and time of the last.
+    emergency_id : emergency access in which it was created and with which it ends; None = none.
     """
 
     id: str
@@ -55,12 +56,12 @@ class ReportLink:
 
     @property
     def is_open(self) -> bool:
-        """Whether its address still leads to the report."""
+        """Whether the link is valid."""
         return self.revoked_at is None and self.expires_at > now()
 
 
 class LinkNotFound(ServiceError):  # noqa: N818 - as NotFound
-    """No report under this address: unknown, expired, revoked; which one is not said."""
+    """No report for this URL: unknown, expired or revoked, without distinction."""
 
     status = 404
 
@@ -74,18 +75,24 @@ class LinkNotFound(ServiceError):  # noqa: N818 - as NotFound
 def make(
     c: Connection, actor: Identity | None, report_id: str, days: int, name: str
 ) -> tuple[ReportLink, str]:
-    """Make a link; the token is told here and never again. Made in an emergency it ends with that.
+    """Create a link and return its token, which is not stored; it ends with an emergency access.
 
     Raises
     ------
     NotFound
-        the report. ServiceError: bad_value. Conflict: not_in_force, of a report that was reopened.
+        the report. ServiceError: bad_value. Conflict: not_in_force, if the report was reopened.
     """
     found = signed_reports.get(c, report_id)
     if not found.in_force:
-        raise Conflict("not_in_force", f"Version {found.number} was reopened. Share the one that is signed.")
+        raise Conflict(
+            "not_in_force",
+            Message("Version {number} was reopened. Share the one that is signed.", number=found.number),
+        )
     if not 1 <= days <= MOST_DAYS:
-        raise ServiceError("bad_value", f"A link lives {days} days, expected 1 to {MOST_DAYS}.")
+        raise ServiceError(
+            "bad_value",
+            Message("A link lives {days} days, expected 1 to {MOST_DAYS}.", days=days, MOST_DAYS=MOST_DAYS),
+        )
     token, link_id, time = new_token(), new_id(), now()
     expires_at = time + dt.timedelta(days=days)
     patient_id = sessions.get(c, found.session_id).patient_id
@@ -113,11 +120,11 @@ def make(
 
 
 def revoke(c: Connection, actor: audit.Actor | None, link_id: str, because: str | None = None) -> ReportLink:
-    """End a link now; one that has ended stays as it is. Raises NotFound.
+    """End a link; no effect if it has ended. Raises NotFound.
 
     Parameters
     ----------
-    because : reason for the audit log, None = somebody ended this link.
+    because : reason for the audit log, None = revoked by a user.
     """
     found = get(c, link_id)
     if found.revoked_at is None:
@@ -131,7 +138,7 @@ def revoke(c: Connection, actor: audit.Actor | None, link_id: str, because: str 
 
 
 def end_of_emergency(c: Connection, actor: audit.Actor | None, access_id: str) -> None:
-    """End the links that were made in an emergency."""
+    """End the links created during an emergency access."""
     query = select(report_link.c.id).where(
         report_link.c.emergency_id == access_id, report_link.c.revoked_at.is_(None)
     )
@@ -140,13 +147,13 @@ def end_of_emergency(c: Connection, actor: audit.Actor | None, access_id: str) -
 
 
 def list_orphaned(c: Connection) -> list[str]:
-    """Return ids of open links whose maker's account is closed or may no longer read the report."""
+    """Ids of open links whose creator's account is closed or may no longer read the report."""
     query = _WITH_MAKER.where(report_link.c.revoked_at.is_(None), report_link.c.expires_at > now())
     return list(c.execute(query.where(~_may_share())).scalars())
 
 
 def end_orphaned(c: Connection, actor: audit.Actor | None) -> None:
-    """End those links; to be called in every transaction that takes access to patients from an account."""
+    """End orphaned links; call in every transaction that restricts an account's access to patients."""
     for link_id in list_orphaned(c):
         revoke(c, actor, link_id, because="maker_left")
 
@@ -154,7 +161,7 @@ def end_orphaned(c: Connection, actor: audit.Actor | None) -> None:
 def reopen_report(
     c: Connection, actor: audit.Actor | None, report_id: str, reason: str, name: str
 ) -> signed_reports.SignedReport:
-    """Take a signed report out of force and end its links; raises as `signed_reports.reopen`."""
+    """Reopen a signed report and end its links; raises like `signed_reports.reopen`."""
     found = signed_reports.reopen(c, actor, report_id, reason, name)
     for link in of_session(c, found.session_id):
         if link.report_id == report_id and link.is_open:
@@ -163,7 +170,7 @@ def reopen_report(
 
 
 def find_by_token(c: Connection, token: str) -> ReportLink:
-    """The link of an address that leads to a report; raises LinkNotFound."""
+    """The valid link with this token; raises LinkNotFound."""
     row = c.execute(select(*_COLUMNS).where(report_link.c.token_sha256 == token_hash(token))).first()
     found = None if row is None else ReportLink(**row._asdict())
     if found is None or not found.is_open:
@@ -174,7 +181,7 @@ def find_by_token(c: Connection, token: str) -> ReportLink:
 
 
 def note_opening(db: Database, link: ReportLink, address: str) -> None:
-    """Count and write down that somebody opened a link; once a minute, so that nobody fills the audit log."""
+    """Count and record the opening of a link, at most once a minute to limit the audit log."""
     if link.opened_at is not None and now() - link.opened_at < QUIET:
         return
     with db.write() as c:
@@ -197,14 +204,14 @@ def get(c: Connection, link_id: str) -> ReportLink:
 
 
 def of_session(c: Connection, session_id: str) -> list[ReportLink]:
-    """The links to all versions of a session's report, the newest first."""
+    """Links to all versions of a session's report, newest first."""
     query = select(*_COLUMNS).join(signed_report).where(signed_report.c.session_id == session_id)
     rows = c.execute(query.order_by(report_link.c.made_at.desc()))
     return [ReportLink(**row._asdict()) for row in rows]
 
 
 def _may_share() -> ColumnElement[bool]:
-    """Whether the maker of a link may read the report now, as a condition of `_WITH_MAKER`."""
+    """SQL condition for `_WITH_MAKER`: the creator of the link may currently read the report."""
     return user.c.active & user.c.role.in_(_READERS) & sees_patient(session.c.patient_id)
 
 

@@ -1,12 +1,12 @@
-"""Single values encrypted with AES-256-GCM, each bound to its row and field, under a key kept in a file.
+"""Encryption of single values with AES-256-GCM, bound to row and field, using a key file.
 
-    make_keys(path)                                   # once, on purpose; reading never makes one
+    make_keys(path)                                   # once, explicitly; reading never creates one
     keys = read_keys(path)
     sealed = keys.seal("Erika Muster", row_id, "name")
-    keys.open(sealed, row_id, "name")                 # of another row or field: ValueUnreadable
+    keys.open(sealed, row_id, "name")                 # for another row or field: ValueUnreadable
 
-A file holds one key; while keys change it holds two, the new one first. A sealed value says by which key it
-was sealed, and hides its text's length but for steps of 64 bytes.
+A file contains one key, or two during a key change, the new one first. An encrypted value names its key and
+hides the length of the text up to multiples of 64 bytes.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from cryptography.exceptions import InvalidTag
 from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
 from sagittal.core.errors import SagittalError
+from sagittal.core.message import Message
 from sagittal.server.storage import fs
 
 _LINE: Final = re.compile(r"SAGITTAL-FIELD-KEY-1 ([0-9a-f]{64})")
@@ -31,39 +32,39 @@ _HEAD: Final = len(_VERSION) + _NAME_BYTES + _NONCE_BYTES
 
 
 class KeyUnusable(SagittalError):  # noqa: N818 - what is the matter with the key
-    """The key of encrypted values is not there, or is no key; the message says what to do."""
+    """The key of encrypted values is missing or invalid; the message contains a remedy."""
 
     status = 503
 
 
 class ValueUnreadable(SagittalError):  # noqa: N818 - what is the matter with the value
-    """A value was sealed by another key, was changed, or belongs to another row or field."""
+    """A value was encrypted with another key, was modified, or belongs to another row or field."""
 
     status = 503
 
 
 @dataclass(frozen=True)
 class FieldKeys:
-    """Keys by their names of 8 bytes; the first one seals, all of them open."""
+    """Keys by their names of 8 bytes; the first one encrypts, all of them decrypt."""
 
     keys: dict[bytes, bytes] = field(repr=False)
 
     @property
     def name(self) -> str:
-        """Name of the key that seals, 16 hex digits."""
+        """Name of the encrypting key, 16 hex digits."""
         return next(iter(self.keys)).hex()
 
     def has(self, name: str) -> bool:
-        """Whether a key is among them."""
+        """Whether a key is included."""
         return bytes.fromhex(name) in self.keys
 
     def only(self, name: str) -> FieldKeys:
-        """One of the keys, alone."""
+        """A single key of the set."""
         wanted = bytes.fromhex(name)
         return FieldKeys({wanted: self.keys[wanted]})
 
     def seal(self, text: str, row_id: str, name: str) -> bytes:
-        """Encrypt a text, which holds no NUL, for one field of one row."""
+        """Encrypt a text without NUL for one field of one row."""
         key_name, key = next(iter(self.keys.items()))
         plain = text.encode()
         plain += bytes(-len(plain) % _STEP)
@@ -71,48 +72,61 @@ class FieldKeys:
         return _VERSION + key_name + nonce + AESGCM(key).encrypt(nonce, plain, _bind(row_id, name))
 
     def open(self, sealed: bytes, row_id: str, name: str) -> str:
-        """Decrypt what was sealed for this field of this row; raises ValueUnreadable."""
+        """Decrypt a value of this field and row; raises ValueUnreadable."""
         key_name, nonce = sealed[1 : 1 + _NAME_BYTES], sealed[1 + _NAME_BYTES : _HEAD]
         if sealed[:1] != _VERSION or len(sealed) < _HEAD + _TAG_BYTES:
-            raise ValueUnreadable("identity_damaged", f"The {say_field(name)} is damaged. {_MEND}")
+            raise ValueUnreadable(
+                "identity_damaged", Message("The {name} is damaged. {MEND}", name=say_field(name), MEND=_MEND)
+            )
         key = self.keys.get(key_name)
         if key is None:
             raise ValueUnreadable(
                 "identity_key_wrong",
-                f"The {say_field(name)} was encrypted by key {key_name.hex()}, which is not the one in its "
-                "place. The operator puts the right key file back.",
+                Message(
+                    "The {name} was encrypted by key {hex}, which is not the one in its place. The "
+                    "operator puts the right key file back.",
+                    name=say_field(name),
+                    hex=key_name.hex(),
+                ),
             )
         try:
             return AESGCM(key).decrypt(nonce, sealed[_HEAD:], _bind(row_id, name)).rstrip(b"\0").decode()
         except InvalidTag as error:
             raise ValueUnreadable(
                 "identity_damaged",
-                f"The {say_field(name)} was changed, or belongs to another patient. {_MEND}",
+                Message(
+                    "The {name} was changed, or belongs to another patient. {MEND}",
+                    name=say_field(name),
+                    MEND=_MEND,
+                ),
             ) from error
 
 
 def make_keys(path: Path) -> str:
-    """Write a file with a new key for its owner only and return its name; KeyUnusable over a file."""
+    """Write a file with a new key, readable by its owner only; return its name; KeyUnusable if it exists."""
     if path.exists():
-        raise KeyUnusable("identity_key_exists", f"{path} exists; a key is never written over another one.")
+        raise KeyUnusable(
+            "identity_key_exists",
+            Message("{path} exists; a key is never written over another one.", path=path),
+        )
     key = os.urandom(32)
     _write(path, [key])
     return _name(key).hex()
 
 
 def add_key(path: Path) -> None:
-    """Put a new key before those of a file: it seals from now on. Raises KeyUnusable."""
+    """Add a new key to a file, which encrypts from now on. Raises KeyUnusable."""
     # a link leads to where the file is kept
     _write(path.resolve(), [os.urandom(32), *read_keys(path).keys.values()])
 
 
 def drop_other_keys(path: Path, name: str) -> None:
-    """Leave only one of the keys of a file; raises KeyUnusable."""
+    """Remove all keys of a file except one; raises KeyUnusable."""
     _write(path.resolve(), list(read_keys(path).only(name).keys.values()))
 
 
 def read_keys(path: Path) -> FieldKeys:
-    """Read the keys of a file; raises KeyUnusable where it is not there or is none of ours."""
+    """Read the keys of a file; raises KeyUnusable if it is missing or invalid."""
     try:
         lines = [line.strip() for line in path.read_text("ascii").splitlines()]
     except FileNotFoundError as error:
@@ -138,7 +152,7 @@ _MEND: Final = "The operator runs `sagittal check`, and takes it from a backup o
 
 
 def say_field(name: str) -> str:
-    """What a field is called in a sentence."""
+    """Name of a field for use in a sentence."""
     return {"born_on": "date of birth", "contact": "address and telephone"}.get(name, name.replace("_", " "))
 
 

@@ -1,4 +1,4 @@
-"""Bring a database to the schema of this version; never start on one we do not know.
+"""Migrate a database to the schema of this version; unknown schemas are rejected.
 
     upgrade(settings.database_source)       # at start of the server and by `sagittal migrate`
 await_current(settings.database_source, stop)   # in a worker: waits until a server has migrated
@@ -57,15 +57,15 @@ _OTHER_MIGRATES = "Another program is changing the database for its version. Sta
 
 
 class MigrationError(RuntimeError):
-    """The database is not one this version can work with, or not reached; the message says what to do."""
+    """The database is incompatible with this version or unreachable; the message contains a remedy."""
 
 
 class NotMigratedError(MigrationError):
-    """The database has no schema yet, or an older one: the start of a server, or `migrate`, changes that."""
+    """The database has no schema yet, or an older one; starting a server or `migrate` upgrades it."""
 
 
 def configuration(database: Source, scripts: Path | None = None) -> Config:
-    """Alembic's configuration for a database; the scripts lie in the wheel or in the source tree."""
+    """Alembic configuration for a database; the scripts are in the wheel or the source tree."""
     config = Config(stdout=io.StringIO())
     config.set_main_option("path_separator", "os")
     folder = scripts or (INSTALLED if INSTALLED.is_dir() else SOURCE)
@@ -75,7 +75,7 @@ def configuration(database: Source, scripts: Path | None = None) -> Config:
 
 
 def read_revision(database: Source) -> str | None:
-    """The database's revision; None when there is none yet or it is empty; raises MigrationError."""
+    """The database's revision; None if it does not exist or is empty; raises MigrationError."""
     if isinstance(database, Path) and not database.exists():
         return None
     try:
@@ -101,12 +101,12 @@ def read_revision(database: Source) -> str | None:
 
 
 def exists(database: Source) -> bool:
-    """Whether there is a database: a file, or tables on the server; raises MigrationError."""
+    """Whether the database exists: a file, or tables on the server; raises MigrationError."""
     return database.exists() if isinstance(database, Path) else read_revision(database) is not None
 
 
 def require_database(database: Source) -> None:
-    """Raise MigrationError where there is no database: a command in a wrong folder begins no clinic there."""
+    """Raise MigrationError if there is no database, so that commands do not create one in a wrong folder."""
     if exists(database):
         return
     if isinstance(database, Path):
@@ -119,16 +119,16 @@ def require_database(database: Source) -> None:
 def upgrade(
     database: Source, *, target: str = "head", scripts: Path | None = None, backups: Path | None = None
 ) -> Path | None:
-    """Migrate in one transaction and return the backup made before it (None: there was nothing to keep).
+    """Migrate in one transaction and return the backup made before (None: no data existed).
 
     Parameters
     ----------
-    backups : folder of the backup, None = beside a file; PostgreSQL needs it when there is something to keep.
+    backups : folder of the backup, None = next to a file; required on PostgreSQL if it contains data.
 
     Raises
     ------
     MigrationError
-        the database was made by a version that this one does not know; web servers or workers run on it.
+        the database belongs to an unknown version, or web servers or workers are using it.
     """
     config = configuration(database, scripts)
     if isinstance(database, Path):
@@ -169,7 +169,7 @@ def _await_being_alone(server: PostgresServer) -> None:
 def _change(
     config: Config, database: Source, target: str, backups: Path | None, scripts: Path | None
 ) -> Path | None:
-    """Migrate, after a backup of what is there, whose path is returned."""
+    """Migrate after a backup of existing data; return its path."""
     backup, at = None, _known(config, database)
     if at is not None and at != ScriptDirectory.from_config(config).as_revision_number(target):
         if backups is None:
@@ -180,12 +180,12 @@ def _change(
 
 
 def copy_database(source: Source, target: Source, scripts: Path | None = None) -> None:
-    """Write a consistent copy, while others read and write, where there is nothing yet.
+    """Write a consistent copy of a database in use to an empty target.
 
     Raises
     ------
     MigrationError
-        `target` holds rows already.
+        `target` is not empty.
     """
     if isinstance(source, Path) and isinstance(target, Path):
         SqliteFile(source).write_copy(target)
@@ -203,9 +203,9 @@ def copy_database(source: Source, target: Source, scripts: Path | None = None) -
 
 
 def require_current(database: Source, scripts: Path | None = None) -> None:
-    """Raise MigrationError unless there is a database and its schema is exactly this version's.
+    """Raise MigrationError unless a database exists and has exactly this version's schema.
 
-    NotMigratedError where a server of this version has only not been started yet.
+    Raises NotMigratedError if a server of this version has yet to be started.
     """
     require_database(database)
     config = configuration(database, scripts)
@@ -224,12 +224,12 @@ def require_current(database: Source, scripts: Path | None = None) -> None:
 
 
 def await_current(database: Source, stop: threading.Event, pause_s: float = WAIT_S) -> None:
-    """Wait until the schema is this version's or `stop` is set; one log line says that it waits.
+    """Wait until the schema is this version's or `stop` is set; logs one line while waiting.
 
     Raises
     ------
     MigrationError
-        waiting does not help: there is no such database, or a newer version has changed it.
+        waiting is futile: there is no such database, or it belongs to a newer version.
     """
     is_waiting = False
     while not stop.is_set():
@@ -277,7 +277,7 @@ def _known(config: Config, database: Source) -> str | None:
 
 
 def _keep_private(database: Path) -> None:
-    """Let nobody else read it, also in a folder open to everybody; SQLite goes by the umask."""
+    """Restrict the file to its owner, also in a shared folder; SQLite applies the umask."""
     logs = [database.with_name(database.name + end) for end in ("-wal", "-shm")]
     for path in (database, *(log for log in logs if log.exists())):
         with contextlib.suppress(PermissionError):  # of another owner, who decides

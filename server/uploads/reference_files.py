@@ -1,6 +1,6 @@
-"""References of a session: orientations of another system to compare with, beside the recording, never in it.
+"""References of a session: orientations of another system for comparison, kept separate from the recording.
 
-A file of the same name replaces the one before; a comparison that used that keeps it.
+A file of the same name replaces the previous one; comparisons that used that retain it.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from typing import Final
 
 from sqlalchemy import Connection, delete, func, insert, select
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import NotFound, TooLarge
@@ -37,30 +38,33 @@ def get(c: Connection, session_id: str, name: str) -> RecordedFile:
 
 
 def file_bytes(c: Connection, blobs: BlobStore, session_id: str, name: str) -> bytes:
-    """A reference as uploaded, verified; raises NotFound, IntegrityError."""
+    """Read and verify a reference as uploaded; raises NotFound, IntegrityError."""
     found = get(c, session_id, name)
     return blobs.read(sessions.get(c, session_id).patient_id, found.sha256)
 
 
 def remove(c: Connection, actor: audit.Actor | None, session_id: str, name: str) -> None:
-    """Take a reference away; comparisons that used it stay as they are. Raises NotFound."""
+    """Delete a reference; comparisons that used it are unchanged. Raises NotFound."""
     get(c, session_id, name)
     c.execute(delete(reference_file).filter_by(session_id=session_id, name=name))
     audit.record(c, actor, "reference.removed", "session", session_id)
 
 
 class receive_reference(receive):  # noqa: N801 - as `receive`
-    """A reference on its way in; as `receive`."""
+    """Reception of a reference; like `receive`."""
 
     def _check_set(self, c: Connection, size: int) -> None:
-        """The recording's set is not touched."""
+        """No check, as the recording's set is unaffected."""
 
     def _add(self, c: Connection, blob: Blob) -> RecordedFile:
         key = {"session_id": self._session_id, "name": self._name}
         c.execute(delete(reference_file).filter_by(**key))
         mine = reference_file.c.session_id == self._session_id
         if c.execute(select(func.count()).select_from(reference_file).where(mine)).scalar_one() >= MOST_FILES:
-            raise TooLarge("too_many_files", f"A session has at most {MOST_FILES} references; remove one.")
+            raise TooLarge(
+                "too_many_files",
+                Message("A session has at most {MOST_FILES} references; remove one.", MOST_FILES=MOST_FILES),
+            )
         c.execute(insert(reference_file).values(**key, size=blob.size, sha256=blob.sha256, added_at=now()))
         detail = {"session_id": self._session_id, "sha256": blob.sha256, "size": blob.size}
         audit.record(c, self._actor, "reference.added", "session", self._session_id, detail)

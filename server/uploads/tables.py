@@ -1,12 +1,12 @@
-"""Tables of an upload that nobody has described: what they probably are, and what a person says of them.
+"""Uploaded tables of unknown format: guessed and user-defined mappings.
 
-    list_tables(c, blobs, sid)                  # by shape: columns, first rows, a guess or what was said
-    check_table(c, blobs, sid, name, source)    # do gravity and rates of turn come out right, so read?
-    map_tables(c, actor, sid, names, source)    # the entry for each file, into the manifest
-    find_known(c, blobs, sid)                   # those of a shape that was described before and fits again
+    list_tables(c, blobs, sid)                  # by shape: columns, first rows, guessed or defined mapping
+    check_table(c, blobs, sid, name, source)    # are gravity and angular rates plausible with this mapping?
+    map_tables(c, actor, sid, names, source)    # add the entry of each file to the manifest
+    find_known(c, blobs, sid)                   # shapes with an earlier mapping that fits
 
-A shape is known by an earlier recording of the clinic whose manifest describes a file with the same columns:
-what was said there is the template. Only two megabytes of each file are read, and not verified; the
+A shape is known if the manifest of an earlier recording of the clinic describes a file with the same columns;
+its mapping serves as the template. Only two megabytes of each file are read, without verifying its hash; the
 analysis verifies it.
 """
 
@@ -41,8 +41,8 @@ class TableShape:
 
     Parameters
     ----------
-    files : their names. names : their columns. rows : the first rows of the first of them.
-    source : entry of the manifest's `sources` without `file`; what nobody knows is left out.
+    files : file names. names : column names. rows : the first rows of the first file.
+    source : entry of the manifest's `sources` without `file`; unknown parts are omitted.
     basis : "said" (in this recording), "known" (in an earlier one), "guessed".
     """
 
@@ -55,12 +55,12 @@ class TableShape:
 
 @dataclass(frozen=True)
 class TableReading:
-    """What a sensor gives when its table is read as was said.
+    """Values of a sensor when its table is read with a given mapping.
 
     Parameters
     ----------
     rate_hz : samples per second. at_rest_mps2 : acceleration in its quietest second, None = never still.
-    fastest_radps : rate of turn that it hardly exceeds. problems : what speaks against it, as sentences.
+    fastest_radps : high quantile of the angular rate. problems : implausible results, as sentences.
     """
 
     sensor: str
@@ -71,7 +71,7 @@ class TableReading:
 
 
 def list_tables(c: Connection, blobs: BlobStore, session_id: str) -> tuple[TableShape, ...]:
-    """Tables of the current recording by their shape; raises NotFound, Conflict no_files."""
+    """Tables of the current recording by shape; raises NotFound, Conflict no_files."""
     this = recordings.require_current(c, session_id)
     shapes: list[TableShape] = []
     for name, look, entry in _tables(this, blobs):
@@ -91,7 +91,7 @@ def list_tables(c: Connection, blobs: BlobStore, session_id: str) -> tuple[Table
 def check_table(
     c: Connection, blobs: BlobStore, session_id: str, name: str, source: Mapping[str, Any]
 ) -> tuple[TableReading, ...]:
-    """Read the beginning of a file as `source` says; raises NotFound, FormatError, ManifestError."""
+    """Read the beginning of a file with `source`; raises NotFound, FormatError, ManifestError."""
     this = recordings.require_current(c, session_id)
     file = next((f for f in _files(this, blobs) if f.name == name), None)
     if file is None:
@@ -106,7 +106,7 @@ def map_tables(
     names: Sequence[str],
     source: Mapping[str, Any],
 ) -> StoredRecording:
-    """Describe tables of one shape in the manifest; raises NotFound, ManifestError, Conflict no_files."""
+    """Add tables of one shape to the manifest; raises NotFound, ManifestError, Conflict no_files."""
     from sagittal.core.formats.table_guess import make_entry  # slow import
 
     this = recordings.require_current(c, session_id)
@@ -120,7 +120,7 @@ def map_tables(
 
 
 def find_known(c: Connection, blobs: BlobStore, session_id: str) -> tuple[TableShape, ...]:
-    """Tables of a known shape where gravity and rates of turn come out right; raises as `list_tables`."""
+    """Tables of a known shape with plausible gravity and angular rates; raises like `list_tables`."""
     return tuple(
         shape
         for shape in list_tables(c, blobs, session_id)
@@ -170,7 +170,7 @@ def _files(this: StoredRecording, blobs: BlobStore) -> Iterator[SourceFile]:
 def _tables(
     this: StoredRecording, blobs: BlobStore
 ) -> Iterator[tuple[str, TableLook, Mapping[str, Any] | None]]:
-    """Name of every table, its look, and the entry of the manifest that describes it."""
+    """Name of every table, its structure, and its entry in the manifest."""
     from sagittal.core.formats import bids  # slow imports
     from sagittal.core.formats.manifest import manifest_of
     from sagittal.core.formats.table_guess import look_into_table
@@ -190,7 +190,7 @@ def _tables(
 
 
 def _uploaded(this: StoredRecording, blobs: BlobStore) -> Iterator[dict[str, Any]]:
-    """Manifests among the files that can be read."""
+    """Readable manifests among the files."""
     from sagittal.core.formats.json_tree import read_json  # slow imports
     from sagittal.core.formats.manifest import MAX_BYTES, is_manifest, manifest_of
 
@@ -204,7 +204,7 @@ def _uploaded(this: StoredRecording, blobs: BlobStore) -> Iterator[dict[str, Any
 
 
 def _recall(c: Connection, blobs: BlobStore, this: StoredRecording, look: TableLook) -> dict[str, Any] | None:
-    """What was last said in this clinic of a table with these columns, at the rate that this one names."""
+    """Latest mapping in this clinic of a table with these columns, at the rate given by this one."""
     rows = c.execute(
         select(recording.c.id, recording.c.manifest)
         .where(recording.c.manifest.is_not(None), recording.c.id != this.id)
@@ -229,7 +229,9 @@ def _recall(c: Connection, blobs: BlobStore, this: StoredRecording, look: TableL
 
 
 def _as_template(entry: Mapping[str, Any], look: TableLook) -> dict[str, Any]:
-    """What an entry says of any table of this shape; a sensor that no column names is called as its file."""
+    """Entry as a template for tables of this shape; a sensor not named by a column is named after its
+    file.
+    """
     from sagittal.core.formats.table_guess import THE_FILE  # slow import
 
     said = {k: v for k, v in entry.items() if k != "file"}

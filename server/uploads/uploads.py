@@ -1,8 +1,8 @@
-"""Files that come in parts: a broken upload goes on where it stopped, also after the server was killed.
+"""Resumable uploads of files in parts, which survive a restart of the server.
 
-What has come waits as `<id>.part` among the files that are being received and only grows; a part is answered
-when it is on the disk. Once the file is whole and its SHA-256 is the sender's, it gets its name in the store
-by a rename and its row in the session, as a file that came at once.
+Received data are stored as `<id>.part` in the folder of files being received; a part is acknowledged when it
+is on disk. Once the file is complete and its SHA-256 matches, it is renamed to its name in the store and gets
+its row in the session, like a file uploaded at once.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, delete, insert, select, update
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.errors import Conflict, NotFound, ServiceError, TooLarge
 from sagittal.server.settings import Settings
@@ -31,11 +32,11 @@ ABANDONED: Final = dt.timedelta(days=1)
 
 @dataclass(frozen=True)
 class FileUpload:
-    """A file on its way in.
+    """A file being uploaded.
 
     Parameters
     ----------
-    name, size : of the whole file. offset : bytes that are on the server's disk; the next part begins there.
+    name, size : of the complete file. offset : bytes on the server's disk, where the next part begins.
     """
 
     id: str
@@ -53,7 +54,7 @@ def begin(
     name: str,
     size: int,
 ) -> FileUpload:
-    """Announce a file of so many bytes, or find the unfinished upload of one with this name and size.
+    """Announce a file of a given size, or find its unfinished upload by name and size.
 
     Raises
     ------
@@ -61,7 +62,9 @@ def begin(
     """
     name = receiving.check_name(name)
     if size < 1:
-        raise ServiceError("bad_value", f"The file has {size} bytes; an upload in parts has at least 1.")
+        raise ServiceError(
+            "bad_value", Message("The file has {size} bytes; an upload in parts has at least 1.", size=size)
+        )
     if size > settings.max_file_bytes:
         raise receiving.make_too_large(name, settings.max_file_bytes)
     with db.write() as c:
@@ -73,7 +76,10 @@ def begin(
                 return one
             others += one.size
         if len(coming) >= settings.max_files:
-            raise TooLarge("too_many_files", f"At most {settings.max_files} files come at a time.")
+            raise TooLarge(
+                "too_many_files",
+                Message("At most {max_files} files come at a time.", max_files=settings.max_files),
+            )
         receiving.check_set(c, settings, session_id, name, size + others)
         receiving.require_room(blobs, settings, size)
         fresh = new_id()
@@ -84,7 +90,7 @@ def begin(
 
 
 def list_coming(c: Connection, blobs: BlobStore, session_id: str) -> list[FileUpload]:
-    """The unfinished uploads of a session, the oldest first."""
+    """Unfinished uploads of a session, oldest first."""
     query = _QUERY.where(file_upload.c.session_id == session_id, file_upload.c.finished_sha256.is_(None))
     return [_describe(blobs, row) for row in c.execute(query)]
 
@@ -103,23 +109,32 @@ def add_part(
     offset: int,
     data: bytes,
 ) -> FileUpload:
-    """Add bytes behind those that are there; when this returns they survive a power cut.
+    """Append bytes durably.
 
     Raises
     ------
-    NotFound; Conflict upload_gap: they belong elsewhere; TooLarge beyond what was announced; DiskFull.
+    NotFound; Conflict upload_gap: wrong offset; TooLarge if it exceeds the announced size; DiskFull.
     """
     with blobs.hold_part(upload_id):
         with db.read() as c:
             this = get(c, blobs, session_id, upload_id)
         if offset != this.offset:
             raise Conflict(
-                "upload_gap", f"Bytes from {offset} came, expected those from {this.offset}. Send these."
+                "upload_gap",
+                Message(
+                    "Bytes from {offset} came, expected those from {offset2}. Send these.",
+                    offset=offset,
+                    offset2=this.offset,
+                ),
             )
         if offset + len(data) > this.size:
             raise TooLarge(
                 "file_too_large",
-                f"'{this.name}' was announced with {this.size} bytes, more came. Begin anew.",
+                Message(
+                    "'{name}' was announced with {size} bytes, more came. Begin anew.",
+                    name=this.name,
+                    size=this.size,
+                ),
             )
         if not data:
             return this
@@ -146,12 +161,13 @@ def finish(
     upload_id: str,
     sha256: str,
 ) -> RecordedFile:
-    """Make the file one of the session's; asked again it answers the same.
+    """Add the complete file to the session; idempotent.
 
     Raises
     ------
-    NotFound; TooLarge. Conflict upload_incomplete: bytes are missing; upload_damaged: they are not the
-    sender's, and the upload begins again at 0.
+    NotFound; TooLarge. Conflict upload_incomplete: bytes are missing; upload_damaged: the hash differs,
+    and the upload
+        restarts at 0.
     """
     with blobs.hold_part(upload_id):
         with db.read() as c:
@@ -165,13 +181,21 @@ def finish(
             )
         if this.offset < this.size:
             raise Conflict(
-                "upload_incomplete", f"{this.offset} of {this.size} bytes are here. Send the rest first."
+                "upload_incomplete",
+                Message(
+                    "{offset} of {size} bytes are here. Send the rest first.",
+                    offset=this.offset,
+                    size=this.size,
+                ),
             )
         if _hash(path) != sha256:
             fs.remove_file(path)
             raise Conflict(
                 "upload_damaged",
-                f"What came of '{this.name}' has another SHA-256 than what was sent. Send it again from 0.",
+                Message(
+                    "What came of '{name}' has another SHA-256 than what was sent. Send it again from 0.",
+                    name=this.name,
+                ),
             )
         with db.read() as c:
             space = recordings.patient_of(c, session_id)
@@ -211,7 +235,7 @@ def _publish(
 def cancel(
     db: Database, blobs: BlobStore, actor: audit.Actor | None, session_id: str, upload_id: str
 ) -> None:
-    """Forget an upload with what came of it; raises NotFound. A finished file stays."""
+    """Delete an upload and its data; raises NotFound. A finished file remains."""
     with blobs.hold_part(upload_id):
         with db.write() as c:
             _find(c, session_id, upload_id)
@@ -221,12 +245,12 @@ def cancel(
 
 
 def list_parts(c: Connection) -> set[str]:
-    """Names of the files of all uploads that are still coming."""
+    """Names of the files of all unfinished uploads."""
     return {BlobStore.name_part(one) for one in c.execute(select(file_upload.c.id)).scalars()}
 
 
 def drop_abandoned(db: Database, blobs: BlobStore) -> None:
-    """Forget uploads to which nothing was added for a day, and those that were finished before."""
+    """Delete uploads idle for a day, and records of finished ones."""
     limit = now() - ABANDONED
     with db.read() as c:
         old = list(c.execute(_QUERY.where(file_upload.c.created_at < limit)))

@@ -1,9 +1,9 @@
-"""The parts of a figure from numbers alone: tables of cross-sections, lofted into one closed mesh per part.
+"""Procedural body parts: tables of cross-sections, lofted into one closed mesh per part.
 
-Every part belongs to one rigid segment and lies in its axes: x forward, y up, z to the right, in m. Origins:
-thigh at the hip centre, shank at the knee centre, foot at the ankle centre, toes where they bend, all else
-midway between the hip centres. Joints stay closed because both neighbours end in a dome about the joint
-centre: whatever the angle, the domes fill it.
+Every part belongs to one rigid segment and uses its axes: x forward, y up, z to the right, in m.
+Origins: thigh at the hip centre, shank at the knee centre, foot at the ankle centre, toes at their
+bend, others midway between the hip centres. Joints remain closed at any angle because both segments end
+in domes about the joint centre.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _ELBOWS: Final = np.deg2rad(16.0)
 
 @lru_cache(maxsize=32)
 def make_parts(body: BodyModel) -> Mapping[PartName, Mesh]:
-    """Return all meshes of a body; thighs and shanks serve both sides, a foot and its toes cannot."""
+    """Return all meshes of a body; thighs and shanks are shared by both sides, feet and toes are not."""
     return {
         "thighs": make_limb(profiles.THIGH, body.thigh, body, 13),
         "shanks": make_limb(profiles.SHANK, body.shank, body, 14),
@@ -81,24 +81,24 @@ def make_foot(body: BodyModel, side: int) -> Mesh:
 
 
 def make_toes(body: BodyModel, side: int) -> Mesh:
-    """Return the foot in front of the ball, in the axes of the foot about the ball."""
+    """Return the forefoot, in the axes of the foot about the ball."""
     v, f = _loft_foot(body, side, (1000 * _BALL, 1000 * _TIP), 9)
     return (v - locate_ball(body)).astype(np.float32), f
 
 
 def locate_ball(body: BodyModel) -> Floats:
-    """Return where the toes bend, (3,) m in the axes of the foot."""
+    """Return the position of the toe bend, (3,) m in the axes of the foot."""
     return np.array([_BALL * body.foot, (_KNUCKLE - 1.0) * body.ankle_height, 0.0])
 
 
 def find_toe_bend(body: BodyModel, pitch: Floats, height: Floats) -> Floats:
-    """Return the least upward bend of the toes, rad, that keeps their tip out of the floor.
+    """Return the smallest upward bend of the toes, rad, that keeps their tip above the floor.
 
-    It is not measured: the floor bends them. A foot in one piece sinks in by up to 6 cm at push-off.
+    It is not measured but caused by the floor. A rigid foot would sink in by up to 6 cm at push-off.
 
     Parameters
     ----------
-    pitch : of the foot, rad, toes up. height : of the ball over the floor, m.
+    pitch : of the foot, rad, toes up. height : of the ball above the floor, m.
     """
     along, under = (_TIP - _BALL - 0.05) * body.foot, _KNUCKLE * body.ankle_height
     # of a moment np.clip alone would take as long as all else
@@ -108,7 +108,7 @@ def find_toe_bend(body: BodyModel, pitch: Floats, height: Floats) -> Floats:
 
 
 def make_pelvis(body: BodyModel) -> Mesh:
-    """Return the pelvis, as wide as the hip centres ask for."""
+    """Return the pelvis, with a width that matches the hip centres."""
     r = _stature(body) / 1000
     rows = interpolate_rows(profiles.PELVIS, 13) * r
     rows[:, 4:] *= body.hip_width / (HIP_FRACTION * _stature(body))
@@ -116,7 +116,7 @@ def make_pelvis(body: BodyModel) -> Mesh:
 
 
 def make_trunk(body: BodyModel) -> Mesh:
-    """Return trunk, neck and head in one."""
+    """Return trunk, neck and head in one mesh."""
     r = _stature(body) / 1000
     torso = loft_sections(interpolate_rows(profiles.TRUNK, 22) * r, 24, (10 * r, 6 * r), power=(2.35, 2.35))
     rows = interpolate_rows(profiles.HEAD, 15, dense_ends=True) * r
@@ -124,7 +124,7 @@ def make_trunk(body: BodyModel) -> Mesh:
 
 
 def make_arms(body: BodyModel) -> Mesh:
-    """Return both arms hanging at rest: nothing measures them, so they do not move on the trunk."""
+    """Return both arms hanging at rest; they are not measured and do not move relative to the trunk."""
     r = _stature(body) / 1000
     table = profiles.ARM * r
     table[:, 0] *= -1.0
@@ -139,12 +139,12 @@ def make_arms(body: BodyModel) -> Mesh:
 
 
 def _stature(body: BodyModel) -> float:
-    """Body height, m, from the thigh, which a person may have had measured."""
+    """Body height, m, estimated from the thigh length, which may have been measured."""
     return body.thigh / THIGH_FRACTION
 
 
 def _hang(rows: Floats, length: float, body: BodyModel) -> Floats:
-    """Rows of a limb's table, in m, from its lower end up."""
+    """Rows of a limb's table, in m, from its lower end upwards."""
     return np.column_stack((-length * rows[:, 0], rows[:, 1:] * _stature(body) / 1000))[::-1]
 
 

@@ -1,7 +1,7 @@
-"""The first picture of a replay as a drawing, by the camera that the 3D view begins with.
+"""First frame of a replay as an SVG drawing, from the initial camera of the 3D view.
 
-It stands in the page until the 3D view has drawn, which without a graphics processor takes seconds. The same
-parts at the same places: the figure, its shadow, what its feet left on the floor, and the floor's lines.
+It is displayed in the page until the 3D view has rendered, which takes seconds without a graphics processor.
+It shows the same parts in the same places: avatar, shadow, footprints and trails, and floor lines.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _CSS: Final[dict[Tint, str]] = {"left": "fp-l", "right": "fp-r", "body": "fp-b",
 
 @dataclass(frozen=True, eq=False)
 class _SeenSurface:
-    """A closed surface in the picture: vertices (n, 2) and depth (n,) m, the faces that look at who looks."""
+    """A closed surface in the picture: vertices (n, 2), depth (n,) m, and front faces."""
 
     name: PartName
     css: str
@@ -66,11 +66,11 @@ class _SeenSurface:
 
 
 def draw_first_picture(motion: ReplayMotion, t_s: float) -> str | None:
-    """Draw the frame nearest to a time as `ReplayFigure` shows it first; None where it shows no figure then.
+    """Draw the frame nearest to a time like `ReplayFigure`; None if there is no avatar at that time.
 
     Returns
     -------
-    An SVG as high as its place and centred in it; whatever it is wide, it is cut off or shows more floor.
+    An SVG that fills the height of its container, centred; at other widths it is cropped or shows more floor.
     """
     frame = motion.index(t_s)
     if not motion.valid[frame]:
@@ -98,7 +98,7 @@ def draw_first_picture(motion: ReplayMotion, t_s: float) -> str | None:
 
 
 class _Camera:
-    """A camera of the room: points (n, 3) m → the picture."""
+    """Camera of the scene: points (n, 3) m → the picture."""
 
     def __init__(self, shot: CameraShot) -> None:
         self.eye = np.array(shot.eye)
@@ -109,7 +109,7 @@ class _Camera:
         self._axes = np.stack((right, np.cross(right, sight), sight)).T
 
     def see(self, points: Floats) -> tuple[Floats, Floats]:
-        """Where they are (n, 2), to the right and up from the middle of the picture, and how deep (n,), m."""
+        """Project points to positions (n, 2), right and up from the centre, and depth (n,), m."""
         across, up, ahead = ((points - self.eye) @ self._axes).T
         half = np.tan(FOV_RAD / 2) * ahead
         return HEIGHT / 2 * np.column_stack((across, up)) / half[:, None], ahead
@@ -135,7 +135,7 @@ def _see_surfaces(motion: ReplayMotion, frame: int, place: Floats, camera: _Came
 
 
 def _order(surfaces: list[_SeenSurface]) -> list[_SeenSurface]:
-    """From the farthest to the nearest, rings after their leg."""
+    """Sort from farthest to nearest, rings after their leg."""
     far = {id(s): float(s.depth.mean()) for s in surfaces}
     leg = next((far[id(s)] for s in surfaces if (s.name, s.css) == ("shanks", _CSS["right"])), 0.0)
     return sorted(surfaces, key=lambda s: (-leg, 1.0) if s.name == "rings" else (-far[id(s)], 0.0))
@@ -189,7 +189,7 @@ def _draw(mesh: Mesh, seen: Floats, shown: Bools) -> str:
 
 
 def _write_line(points: Floats) -> str:
-    """A line through points in whole units, without those that it comes near anyway; "" through none."""
+    """SVG path through rounded points, without negligible vertices; "" for none."""
     if not len(points):
         return ""
     whole = np.rint(points * (1, -1)).astype(int)
@@ -201,7 +201,9 @@ def _write_line(points: Floats) -> str:
 
 
 def _find_corners(points: Floats) -> list[int]:
-    """Indices of the points that a line needs (Douglas and Peucker 1973, doi:10.3138/FM57-6770-U75U-7727)."""
+    """Indices of the vertices of a simplified line (Douglas and Peucker 1973,
+    doi:10.3138/FM57-6770-U75U-7727).
+    """
     kept, spans = {0, len(points) - 1}, [(0, len(points) - 1)]
     while spans:
         first, last = spans.pop()

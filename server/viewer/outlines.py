@@ -1,4 +1,4 @@
-"""What is seen of a closed mesh: its surfaces one by one, and the edge of each in a picture."""
+"""Visible outlines of a closed mesh: its surfaces, and their edges in a projection."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sagittal.server.viewer.shapes import Mesh
 
 
 def split_surfaces(mesh: Mesh) -> Iterator[Mesh]:
-    """Return each closed surface of a mesh, as a mesh of its own."""
+    """Yield each closed surface of a mesh as a mesh."""
     vertices, faces = mesh
     surface, before = np.arange(len(vertices)), None
     while before is None or (surface != before).any():  # each vertex takes the least number of its faces
@@ -24,15 +24,15 @@ def split_surfaces(mesh: Mesh) -> Iterator[Mesh]:
 
 
 def find_front(seen: Floats, mesh: Mesh) -> Bools:
-    """Which faces (m,) look at who looks; `seen` (n, 2): the vertices in the picture, to the right and up."""
+    """Mask of front faces (m,); `seen` (n, 2): projected vertices, right and up."""
     a, b, c = (seen[mesh[1][:, k]] for k in range(3))
     return np.asarray((b - a)[:, 0] * (c - a)[:, 1] > (b - a)[:, 1] * (c - a)[:, 0])
 
 
 def trace_edges(faces: Mesh, shown: Bools) -> list[list[int]]:
-    """Return the closed lines of vertices around the faces that are shown, these to their left.
+    """Return closed polylines around the visible faces, which lie to their left.
 
-    Filled by the rule "nonzero", they cover what the faces cover, folds and all.
+    Filled with the "nonzero" rule, they cover the same area as the faces, including folds.
     """
     triangles = faces[1][shown].astype(np.int64)
     directed = np.concatenate((triangles[:, :2], triangles[:, 1:], triangles[:, ::2][:, ::-1]))

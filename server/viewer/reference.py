@@ -1,7 +1,7 @@
-"""A walk made of curves over the gait cycle, on the body of the person: the norm, or one's own better side.
+"""Reference walk defined by curves over the gait cycle, on the patient's body: the norm or the better side.
 
-Both legs follow the same curves, each at its own phase. Everything that does not depend on the moment is laid
-out once, so that a moment is a look-up, one rotation and the floor.
+Both legs follow the same curves, each at its own phase. Everything independent of time is precomputed, so a
+frame requires only a look-up, one rotation and the floor contact.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class ReferenceWalk:
     Parameters
     ----------
     curves : variable → (n,) rad over the cycle, signs as in the curves of sagittal.core.parameters; the
-        sagittal ones must be there, another that is missing is 0. A pelvis rotation is about the heading.
-    lead : the side whose cycle the pelvis follows.
+        sagittal ones are required, others default to 0. Pelvis rotation is relative to the heading.
+    lead : side whose cycle determines the pelvis.
     """
 
     def __init__(self, curves: Mapping[str, Floats], body: BodyModel, lead: Side = "left") -> None:
@@ -55,12 +55,12 @@ class ReferenceWalk:
         self._turns, self._points = ([list(of) for of in both] for both in (turn, points))
 
     def at(self, phases: Phases, place: tuple[float, float], heading: float) -> tuple[Floats, Floats] | None:
-        """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS`, the lower sole on the floor.
+        """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS`, lower sole on the floor.
 
         Parameters
         ----------
-        phases : side → 0 to 1; where one is not known, half a cycle from the other. None when neither is.
-        place : m, where the pelvis is. heading : rad, where the walk goes.
+        phases : side → 0 to 1; an unknown one is half a cycle from the other. None if both are unknown.
+        place : position of the pelvis, m. heading : walking direction, rad.
         """
         left, right = (_row(phases, side, self._last) for side in SIDES)
         if left is None or right is None:
@@ -70,7 +70,7 @@ class ReferenceWalk:
     def pose(
         self, left: int, right: int, place: tuple[float, float], heading: float
     ) -> tuple[Floats, Floats]:
-        """As `at`, by the rows of the curves that the legs are at."""
+        """Like `at`, with the curve rows of the legs."""
         pelvis = turn_about_z(heading, self._pelvis[left if self.lead == "left" else right])
         q, p = np.empty((len(SEGMENTS), 4)), np.zeros((len(SEGMENTS), 3))
         q[0] = pelvis
@@ -109,11 +109,12 @@ def _row(phases: Phases, side: Side, last: int) -> int | None:
 def add_standing_angles(
     curves: Mapping[str, Floats], zero: Mapping[str, float], side: Side
 ) -> dict[str, Floats]:
-    """Put the standing angles back into the mean curves of a side, so that both legs can follow them.
+    """Add the standing angles to the mean curves of a side, so that both legs can follow them.
 
     Parameters
     ----------
-    curves : variable → (n,) rad from standing. zero : angle → rad at standing, as `JointAngles.zero_offset`.
+    curves : variable → (n,) rad relative to standing. zero : angle → rad in standing, as
+        `JointAngles.zero_offset`.
     """
     own = 1.0 if side == "right" else -1.0
     found = {name: x for name, x in curves.items() if name == "pelvis_rotation"}
@@ -128,10 +129,10 @@ def add_standing_angles(
 
 
 def find_better_side(curves: Mapping[Side, Mapping[str, Floats]], norm: Mapping[str, Floats]) -> Side | None:
-    """Return the side whose sagittal curves are more like the norm's in shape, their means removed; rad.
+    """Return the side whose sagittal curves are closer in shape to the norm, with means removed; rad.
 
-    The mean of root mean squares as in `gps_sagittal`, levels left out since ours are from standing. None
-    without both sides and the norm; then there is nothing to choose by.
+    Uses the mean of root mean squares as in `gps_sagittal`, without offsets since our angles are relative to
+    standing. None without both sides and the norm, as there is no basis for a choice.
     """
     found: dict[Side, float] = {
         side: sum(_unlike(own[name], norm[name]) for name in SAGITTAL)

@@ -1,4 +1,4 @@
-"""Where the feet went and where they rested, laid out once so that a moment of the replay is only a count."""
+"""Paths and rest positions of the feet, precomputed so that a frame of the replay only needs a count."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ Single = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class FootTrail:
-    """The way of one foot over the whole take.
+    """Path of one foot over the whole trial.
 
     Parameters
     ----------
-    t_s : (k,) s, increasing, when the foot had gone a piece. pieces : (k, 2, 3) m, from and to, world.
+    t_s : (k,) s, increasing, end time of each piece. pieces : (k, 2, 3) m, start and end, world.
     """
 
     t_s: Floats
@@ -44,12 +44,12 @@ class FootTrail:
 
 @dataclass(frozen=True, eq=False)
 class FootPrints:
-    """The footprints of one foot.
+    """Footprints of one foot.
 
     Parameters
     ----------
-    t_s : (c,) s, increasing, when the foot rested. position : (c, 3) m, middle of the sole on the floor,
-    world. wxyz : (c, 4) turned about the vertical only, x to the toes.
+    t_s : (c,) s, increasing, times of rest. position : (c, 3) m, middle of the sole on the floor, world. wxyz
+        : (c, 4) rotated about the vertical only, x to the toes.
     """
 
     t_s: Floats
@@ -58,7 +58,7 @@ class FootPrints:
 
 
 def lay_trail(t_s: Floats, valid: Bools, path: Floats | Single) -> FootTrail:
-    """Lay a path (n, 3) out in pieces; where samples are not valid there is a gap."""
+    """Divide a path (n, 3) into line segments, with gaps where samples are invalid."""
     stride = np.linalg.norm(np.diff(path, axis=0), axis=1)
     gone = np.concatenate(([0.0], np.cumsum(np.where(valid[1:] & valid[:-1], stride, 0.0))))
     # the first and last sample of every valid run are kept, so that a piece never reaches over a gap
@@ -72,9 +72,10 @@ def lay_trail(t_s: Floats, valid: Bools, path: Floats | Single) -> FootTrail:
 
 
 def find_prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats | Single, q: Floats) -> FootPrints:
-    """Find one print for every time the foot rested on the floor, at its slowest moment.
+    """Find one footprint for every rest of the foot on the floor, at its lowest speed.
 
-    A contact is searched for several rests, since a step in it may have been missed, and has one at least.
+    Each contact contains at least one rest; several are possible, since a step within it may have been
+    missed.
 
     Parameters
     ----------
@@ -98,5 +99,5 @@ def find_prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats | Single
 
 
 def _slowest(where: Bools, speed: Floats) -> list[int]:
-    """Index of the least speed in every run of a mask."""
+    """Index of the lowest speed in every run of a mask."""
     return [int(start + np.argmin(speed[start:end])) for start, end in find_runs(where)]

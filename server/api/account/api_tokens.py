@@ -1,4 +1,4 @@
-"""One's own tokens for programs."""
+"""API tokens of the signed-in user."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ Self = Annotated[Identity, require(Action.USE_ACCOUNT)]
 
 @router.get("", response_model=list[ApiToken])
 def list_tokens(db: Db, who: Self) -> list[ApiToken]:
-    """One's own tokens, the newest first; what they are is not told again."""
+    """List API tokens of the signed-in user, newest first, without their secrets."""
     with db.read() as c:
         return [make_answer(ApiToken, row) for row in api_tokens.list_tokens(c, who.user_id)]
 
 
 @router.post("", status_code=201, response_model=NewApiToken, responses=refusals(409, 429))
 def make_token(body: ApiTokenNew, db: Db, proof: Proving) -> NewApiToken:
-    """Make a token; the answer is the only one that shows it. Asks for one's password."""
+    """Create an API token; requires the password. The token is shown only in this response."""
     proof.check_password(body.password)
     who = proof.who
     with db.write() as c:
@@ -43,7 +43,7 @@ def make_token(body: ApiTokenNew, db: Db, proof: Proving) -> NewApiToken:
 
 @router.delete("/{token_id}", status_code=204, responses=refusals(404))
 def revoke_token(token_id: Id, db: Db, who: Self) -> None:
-    """End a token at once."""
+    """Revoke a token immediately."""
     with db.write() as c:
         api_tokens.revoke(c, who.user_id, token_id)
         audit.record(c, who, "token.revoked", "api_token", token_id)

@@ -1,4 +1,4 @@
-"""The password once more, and a code: asked of who is signed in before keys and tokens change."""
+"""Re-authentication by password and code before security keys or tokens are changed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from sagittal.server.trail import AuditTrail
 
 @dataclass(frozen=True)
 class Proof:
-    """Who must prove it, and what the proof is checked and counted with."""
+    """Verifies the credentials of the signed-in user and counts failures."""
 
     who: Identity
     address: str
@@ -34,7 +34,7 @@ class Proof:
     failures: Throttle
 
     def check_password(self, password: str) -> None:
-        """Raise Problem 403 for a wrong one, 429 after too many."""
+        """Raise Problem 403 for a wrong password, 429 after too many."""
         # 403, not 401: the person is signed in and must not be sent to the sign-in page
         accounts.check_password(
             self.db, self.failures, self.trail, self.who.name, password, self.address, status=403
@@ -42,14 +42,14 @@ class Proof:
 
     @contextmanager
     def write(self, password: str, code: str) -> Iterator[Connection]:
-        """Check both, a code where one is asked for, and open a transaction for what they allow."""
+        """Verify the password, and a code if required, and open a transaction for the change."""
         self.check_password(password)
         with accounts.count_wrong_codes(self.failures, self.who.user_id), self.db.write() as c:
             self._require_code(c, code)
             yield c
 
     def _require_code(self, c: Connection, code: str) -> None:
-        """After the password: a code, which a browser left open does not have. Raises CodeWrong 403."""
+        """Verify the second factor after the password. Raises CodeWrong 403."""
         user_id = self.who.user_id
         if not second_factor.is_on(c, user_id):
             return  # nor has the account a key

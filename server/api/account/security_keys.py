@@ -1,4 +1,4 @@
-"""One's own security keys: set up, listed, removed, and whether they alone are taken."""
+"""Security keys of the signed-in user: register, list, remove, and require them for sign-in."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Self = Annotated[Identity, require(Action.USE_ACCOUNT)]
 
 @router.get("/security-keys", response_model=list[account_schemas.SecurityKey])
 def list_keys(db: Db, who: Self) -> list[account_schemas.SecurityKey]:
-    """One's own keys, the oldest first."""
+    """List security keys of the signed-in user, oldest first."""
     with db.read() as c:
         rows = security_keys.list_keys(c, who.user_id)
     return [schemas.make_answer(account_schemas.SecurityKey, row) for row in rows]
@@ -38,7 +38,7 @@ def list_keys(db: Db, who: Self) -> list[account_schemas.SecurityKey]:
 def begin(
     body: account_schemas.BothProofs, request: Request, settings: Config, proof: Proving
 ) -> account_schemas.KeyOptions:
-    """What the browser needs to set up a key; it is answered within five minutes."""
+    """Options for registering a security key; the browser must respond within five minutes."""
     site, who = site_of(request, behind_tls=settings.behind_tls), proof.who
     with proof.write(body.password, body.code) as c:
         return account_schemas.KeyOptions(security_keys.begin_registration(c, site, who.user_id, who.name))
@@ -53,7 +53,7 @@ def begin(
 def add(
     body: account_schemas.KeyNew, request: Request, db: Db, settings: Config, trail: OpenTrail, who: Self
 ) -> account_schemas.SecurityKey:
-    """Keep a key by what it answered."""
+    """Register a security key from its response."""
     site = site_of(request, behind_tls=settings.behind_tls)
     with db.write() as c:  # of its own: a refusal must not give the challenge back
         challenge = security_keys.take_challenge(c, who.user_id, "register", body.key)
@@ -71,7 +71,7 @@ def add(
 def remove(
     key_id: Id, body: account_schemas.BothProofs, request: Request, settings: Config, proof: Proving
 ) -> None:
-    """Forget a key; with the last one of this address the figures of the authenticator are taken again."""
+    """Remove a security key; with the last one of this address, authenticator codes are accepted again."""
     site, who = site_of(request, behind_tls=settings.behind_tls), proof.who
     with proof.write(body.password, body.code) as c:
         security_keys.remove(c, site, who.user_id, key_id)
@@ -82,7 +82,7 @@ def remove(
 def choose_keys_only(
     body: account_schemas.KeysOnly, request: Request, settings: Config, proof: Proving
 ) -> None:
-    """Take security keys and recovery codes only, or the figures of the authenticator as well."""
+    """Accept security keys and recovery codes only, or authenticator codes as well."""
     site, who = site_of(request, behind_tls=settings.behind_tls), proof.who
     with proof.write(body.password, body.code) as c:
         if body.on and not security_keys.list_usable(c, site, who.user_id):

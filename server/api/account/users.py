@@ -1,4 +1,4 @@
-"""Accounts, for administrators."""
+"""User accounts, for administrators."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ Admin = Annotated[Identity, require(Action.MANAGE_USERS)]
 
 @router.get("", response_model=list[account_schemas.User])
 def list_users(db: Db, who: Admin) -> list[account_schemas.User]:
-    """All accounts in order of their names."""
+    """List all accounts by name."""
     with db.read() as c:
         return [user_answer(row) for row in accounts.list_accounts(c)]
 
 
 @router.post("", status_code=201, response_model=account_schemas.User, responses=refusals(409))
 def add_user(body: account_schemas.UserNew, db: Db, who: Admin) -> account_schemas.User:
-    """Add an account with its first password."""
+    """Add an account with an initial password."""
     hashed = hash_password(body.password)
     with db.write() as c:
         row = accounts.create(c, body.name, body.display_name, body.role, hashed)
@@ -46,10 +46,10 @@ def add_user(body: account_schemas.UserNew, db: Db, who: Admin) -> account_schem
 def change_user(
     user_id: Id, body: account_schemas.UserChange, db: Db, logins: OpenLogins, failures: Failures, who: Admin
 ) -> account_schemas.User:
-    """Change role, shown name, password, or close the account.
+    """Change role, display name or password, or close the account.
 
-    Sign-ins end, by a new password tokens too. Links to reports end with the account of their maker, and when
-    the maker may no longer open the patient.
+    Ends the user's sign-ins; a new password also revokes API tokens. Report links end if their creator's
+    account is closed or may no longer open the patient.
     """
     values = body.model_dump(exclude_unset=True, mode="json")
     fields = sorted(values)
@@ -71,7 +71,7 @@ def change_user(
 
 @router.delete("/{user_id}/second-factor", status_code=204, responses=refusals(404))
 def reset_second_factor(user_id: Id, db: Db, logins: OpenLogins, who: Admin) -> None:
-    """Remove somebody's second factor, whose telephone is lost; that person's sign-ins end."""
+    """Remove a user's second factor, for example after losing the phone; the user's sign-ins end."""
     with db.write() as c:
         accounts.get(c, user_id)
         if not second_factor.remove(c, user_id):
@@ -81,5 +81,5 @@ def reset_second_factor(user_id: Id, db: Db, logins: OpenLogins, who: Admin) -> 
 
 
 def user_answer(row: Row[Any]) -> account_schemas.User:
-    """Return an account as it is answered: of its row everything but the password."""
+    """Convert a row to a response without the password."""
     return schemas.make_answer(account_schemas.User, row, role=Role(row.role))

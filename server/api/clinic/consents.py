@@ -1,4 +1,4 @@
-"""What a patient has agreed to."""
+"""Consents of patients."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Writer = Annotated[Identity, require(Action.WRITE_PATIENT)]
 def list_consents(
     patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_PATIENT)]
 ) -> list[consents.Consent]:
-    """What a patient agreed to, what holds first."""
+    """List consents of a patient, those in force first."""
     with db.read() as c:
         patients.get(c, patient_id)
         found = consents.of_patient(c, patient_id)
@@ -38,13 +38,13 @@ def list_consents(
     responses=refusals(409),
 )
 def give_consent(patient_id: Id, body: schemas.ConsentNew, db: Db, who: Writer) -> consents.Consent:
-    """Write down that a patient agreed."""
+    """Record a patient's consent."""
     with db.write() as c:
         return consents.give(c, who, patient_id, **body.values())
 
 
 @router.post("/consents/{consent_id}/withdraw", response_model=consents.Consent, responses=refusals(409))
 def withdraw_consent(consent_id: Id, db: Db, who: Writer) -> consents.Consent:
-    """Write down that a patient no longer agrees, from today; the row stays."""
+    """Record the withdrawal of a consent as of today; the consent remains on record."""
     with db.write() as c:
         return consents.withdraw(c, who, consent_id)

@@ -1,4 +1,4 @@
-"""Jobs: what the workers do, pushed while it happens."""
+"""Jobs of the workers, with live updates."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def list_jobs(
     active: Annotated[bool, Query(description="only queued and running ones")] = False,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> list[jobs.ListedJob]:
-    """Jobs, the newest first."""
+    """List jobs, newest first."""
     with db.read() as c:
         rows = jobs.list_jobs(c, who, active_only=active, limit=limit)
     trail.record_watched(who, "job.listed", "job", None)
@@ -48,7 +48,7 @@ def list_jobs(
 
 @router.get("/{job_id}", response_model=jobs.ListedJob)
 def read_job(job_id: Id, db: Db, trail: OpenTrail, who: Reader) -> jobs.ListedJob:
-    """One job: its progress, or why it failed."""
+    """Progress of a job, or the reason of its failure."""
     with db.read() as c:
         found = jobs.get(c, job_id)
     trail.record_watched(who, "job.opened", "job", job_id)
@@ -65,7 +65,7 @@ def read_job(job_id: Id, db: Db, trail: OpenTrail, who: Reader) -> jobs.ListedJo
 async def watch_job(
     job_id: Id, request: Request, db: Db, feed: context.Feed, who: Reader
 ) -> StreamingResponse:
-    """Push the job as server-sent events, each one a Job as JSON; the stream ends with the job."""
+    """Stream a job as server-sent events, each a Job as JSON; the stream ends with the job."""
 
     def check() -> None:
         with db.read() as c:
@@ -83,18 +83,18 @@ def cancel_job(
     queue: context.Queue,
     who: Annotated[Identity, require(Action.CANCEL_JOB)],
 ) -> JobView:
-    """Ask a job to stop, which it does within two seconds; a finished one stays as it is."""
+    """Request cancellation of a job, which takes effect within two seconds; no effect if finished."""
     with db.write() as c:
         return jobs.cancel(c, queue, who, job_id)
 
 
 async def _events(feed: JobFeed, job_id: str, find_end: Callable[[], str | None]) -> AsyncIterator[str]:
-    """Format the changes of a job as events, with a comment in between so that proxies keep the line open.
+    """Format updates of a job as events, with comments in between so that proxies keep the connection open.
 
     Parameters
     ----------
-    find_end : why the stream must end, None while it may go on; however often the job changes, it is called
-        every `CHECK_EVERY_S`.
+    find_end : returns why the stream must end, None to continue; called every `CHECK_EVERY_S` regardless of
+        updates.
     """
     watch = cast("AsyncGenerator[JobView, None]", feed.watch(job_id))
     async with contextlib.aclosing(watch) as views:

@@ -22,7 +22,7 @@ Writer = Annotated[Identity, require(Action.WRITE_PATIENT)]
 def list_notes(
     patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_PATIENT)]
 ) -> list[notes.PatientNote]:
-    """The notes about a patient, of the latest day first."""
+    """List notes about a patient, latest date first."""
     with db.read() as c:
         patients.get(c, patient_id)
         found = notes.of_patient(c, patient_id)
@@ -39,6 +39,6 @@ def add_note(patient_id: Id, body: schemas.NoteNew, db: Db, who: Writer) -> note
 
 @router.delete("/notes/{note_id}", status_code=204)
 def remove_note(note_id: Id, db: Db, who: Writer) -> None:
-    """Remove a note for good, one's own or as an administrator; the audit log keeps that there was one."""
+    """Delete a note, one's own or, as an administrator, any; the audit log records the deletion."""
     with db.write() as c:
         notes.remove(c, who, note_id, of_others=who.may(Action.MANAGE_USERS))

@@ -1,4 +1,4 @@
-"""Patients, under the clinic's own pseudonyms."""
+"""Patients, identified by the clinic's own pseudonyms."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def list_patients(
     limit: Annotated[int, Query(ge=1, le=1000)] = 200,
     offset: Annotated[int, Query(ge=0, le=10**9)] = 0,
 ) -> list[patients.Patient]:
-    """All patients, the latest visit first."""
+    """List all patients, latest visit first."""
     with db.read() as c:
         found = patients.list_patients(c, who, search=q, limit=limit, offset=offset)
     trail.record_watched(who, "patient.listed", "patient", None)
@@ -44,9 +44,9 @@ def list_patients(
 
 
 class _CodeDoor:
-    """Transactions that give a patient a code, which tell whoever guesses that somebody has it.
+    """Transactions that assign a code to a patient, which reveal whether a guessed code exists.
 
-    Codes of patients that one may not open are counted and recorded, as in an emergency.
+    Conflicts with codes of inaccessible patients are counted and recorded, as in emergency access.
     """
 
     def __init__(self, request: Request, db: Db, trail: OpenTrail, failures: Failures) -> None:
@@ -55,7 +55,7 @@ class _CodeDoor:
 
     @contextmanager
     def write(self, who: Identity) -> Iterator[Connection]:
-        """One writing transaction; raises Problem 429 after too many such codes."""
+        """Writing transaction; raises Problem 429 after too many conflicts with such codes."""
         account, hidden = f"codes of {who.user_id}", None
         # counted before it is tried: a burst of guesses cannot pass before the first is counted
         begun = self._failures.begin(account, self._address)
@@ -110,7 +110,7 @@ def change_patient(
     door: CodeDoor,
     who: Annotated[Identity, require(Action.WRITE_PATIENT)],
 ) -> patients.Patient:
-    """Change a patient; members left out stay as they are."""
+    """Change a patient; omitted fields are unchanged."""
     values = body.values()
     with door.write(who) if "code" in values else db.write() as c:
         return patients.change(c, who, patient_id, values)
@@ -126,7 +126,7 @@ def delete_patient(
     hub: LiveHub,
     who: Annotated[Identity, require(Action.DELETE_PATIENT)],
 ) -> None:
-    """Remove a patient with every session, recording and result, for ever; only the audit rows stay."""
+    """Permanently delete a patient with all sessions, recordings and results; only audit rows remain."""
     with db.read() as c:
         if confirm.strip() == patients.get(c, patient_id).code:
             visits = [visit.id for visit in sessions.of_patient(c, patient_id)]
@@ -151,7 +151,7 @@ def export(
     trail: OpenTrail,
     who: Annotated[Identity, require(Action.EXPORT_PATIENT)],
 ) -> StreamingResponse:
-    """Everything that is stored of a patient: rows as JSON, who opened what, and all files."""
+    """All stored data of a patient: rows as JSON, access log, and all files."""
     key_file = settings.identity_key_file if who.may(Action.READ_IDENTITY) else None
     pieces = patient_export.export_patient(db, blobs, patient_id, key_file)
     trail.record_opened(who, "patient.exported", "patient", patient_id)
@@ -163,7 +163,7 @@ def export(
 def list_sessions(
     patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> list[sessions.Session]:
-    """The patient's visits, the newest first."""
+    """List the patient's visits, newest first."""
     with db.read() as c:
         patients.get(c, patient_id)
         found = sessions.of_patient(c, patient_id)

@@ -1,4 +1,4 @@
-"""Programmes: the visits planned for a patient, and the sessions that took place of them."""
+"""Training programmes: visits planned for a patient, and the sessions held."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Planner = Annotated[Identity, require(Action.WRITE_SESSION)]
 def list_programmes(
     patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> list[programmes.Programme]:
-    """The patient's programmes, the newest first, with what was done, is missing and comes next."""
+    """List the patient's programmes, newest first, with completed, missed and upcoming visits."""
     with db.read() as c:
         patients.get(c, patient_id)
         found = programmes.of_patient(c, patient_id)
@@ -38,14 +38,14 @@ def list_programmes(
     responses=refusals(409),
 )
 def start_programme(patient_id: Id, body: schemas.ProgrammeNew, db: Db, who: Planner) -> programmes.Programme:
-    """Put the patient on a programme."""
+    """Start a programme for the patient."""
     with db.write() as c:
         return programmes.start(c, who, patient_id, **body.values())
 
 
 @router.delete("/programmes/{programme_id}", status_code=204)
 def end_programme(programme_id: Id, db: Db, who: Planner) -> None:
-    """Remove a programme with its plan; the sessions stay."""
+    """Remove a programme and its plan; its sessions remain."""
     with db.write() as c:
         programmes.end(c, who, programme_id)
 
@@ -54,6 +54,6 @@ def end_programme(programme_id: Id, db: Db, who: Planner) -> None:
 def change_planned_visit(
     visit_id: Id, body: schemas.PlannedVisitChange, db: Db, who: Planner
 ) -> programmes.Programme:
-    """Move a planned visit, or say which session it was; members left out stay as they are."""
+    """Reschedule a planned visit or link it to a session; omitted fields are unchanged."""
     with db.write() as c:
         return programmes.change_visit(c, who, visit_id, body.values())

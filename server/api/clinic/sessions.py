@@ -1,4 +1,4 @@
-"""Sessions: one visit's recording, what was found in it, and its mapping."""
+"""Sessions: the recording of one visit, its inspection and its mapping."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def change_session(
     db: Db,
     who: Annotated[Identity, require(Action.WRITE_SESSION)],
 ) -> sessions.Session:
-    """Change a session; members left out stay as they are."""
+    """Change a session; omitted fields are unchanged."""
     with db.write() as c:
         return sessions.change(c, who, session_id, body.values())
 
@@ -55,7 +55,7 @@ def delete_session(
     hub: LiveHub,
     who: Annotated[Identity, require(Action.DELETE_SESSION)],
 ) -> None:
-    """Remove a session with its recordings and results, for ever; only the audit rows stay."""
+    """Permanently delete a session with its recordings and results; only audit rows remain."""
     hub.drop_from_thread([session_id])
     erasure.erase_session(db, reviewed, settings, who, session_id)
 
@@ -64,7 +64,7 @@ def delete_session(
 def read_recording(
     session_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> schemas.RecordingAnswer:
-    """The current upload set: its files, what was found in them, the mapping."""
+    """The current upload set: files, inspection results and mapping."""
     with db.read() as c:
         found = recordings.current(c, session_id)
     trail.record_watched(who, "recording.opened", "session", session_id)
@@ -86,7 +86,7 @@ def set_manifest(
 def inspect(
     session_id: Id, db: Db, queue: Queue, blobs: Blobs, who: Annotated[Identity, require(Action.UPLOAD)]
 ) -> JobView:
-    """Ask a worker what is in the files; tables of a known shape are read as those before them."""
+    """Request an inspection of the files; tables of a known shape are mapped like earlier ones."""
     with db.read() as c:
         known = tables.find_known(c, blobs, session_id)
     with db.write() as c:

@@ -1,4 +1,4 @@
-"""The archive of a visit, to be kept or read by another Sagittal."""
+"""Archive of a visit, for storage or import into another installation."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def read_archive(
     trail: OpenTrail,
     who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> StreamingResponse:
-    """Recording, manifest, settings, results, tables and the signed report of what the pages show."""
+    """Recording, manifest, settings, results, tables and signed report of the displayed analysis."""
     with db.read() as c:
         session = sessions.get(c, session_id)
         patient = patients.get(c, session.patient_id)

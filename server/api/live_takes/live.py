@@ -1,4 +1,4 @@
-"""Live takes of a session: open, pair, command, end; the sockets are in server/live."""
+"""Live trials of a session: open, pair, command, end; for the sockets see server/live."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SOCKET = "/api/v1/live"
     "/sessions/{session_id}/live", status_code=201, response_model=schemas.OpenedTake, responses=refusals(409)
 )
 async def open_take(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> schemas.OpenedTake:
-    """Open a take; a tablet joins it with the code within ten minutes."""
+    """Open a live trial; a tablet joins it with the code within ten minutes."""
 
     def write() -> tuple[live.LiveTakeRecord, str]:
         with db.write() as c:
@@ -40,7 +40,7 @@ async def open_take(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> sch
 
 @router.get("/sessions/{session_id}/live", response_model=schemas.LiveState)
 def read_take(session_id: Id, db: Db, hub: LiveHub, trail: OpenTrail, who: Therapist) -> dict[str, Any]:
-    """Where the session's newest take stands."""
+    """State of the session's latest live trial."""
     with db.read() as c:
         sessions.get(c, session_id)
     trail.record_watched(who, "live.watched", "session", session_id)
@@ -54,7 +54,9 @@ def read_take(session_id: Id, db: Db, hub: LiveHub, trail: OpenTrail, who: Thera
     responses=refusals(409),
 )
 async def give_code(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> schemas.OpenedTake:
-    """Give another code; the one before ends, and when it is used the tablet before is sent away."""
+    """Issue another pairing code, which replaces the previous one; using it disconnects the earlier
+    tablet.
+    """
 
     def write() -> tuple[live.LiveTakeRecord, str]:
         with db.write() as c:
@@ -71,19 +73,19 @@ async def give_code(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> sch
 async def give_command(
     session_id: Id, body: schemas.LiveCommand, hub: LiveHub, who: Therapist
 ) -> dict[str, Any]:
-    """Carry a command out; it is kept with its time and who gave it."""
+    """Carry out a command; it is stored with its time and author."""
     return await hub.command(who, session_id, body.command, body.value, body.t_s)
 
 
 @router.post("/sessions/{session_id}/live/close", response_model=schemas.TakeAnswer, responses=refusals(409))
 async def close_take(session_id: Id, hub: LiveHub, who: Therapist) -> schemas.TakeAnswer:
-    """End the take without the tablet; what has come becomes the session's recording and is analysed."""
+    """End the trial without the tablet; the received data become the session's recording and are analysed."""
     return make_answer(schemas.TakeAnswer, await hub.close(who, session_id))
 
 
 @router.get("/sessions/{session_id}/live/events", response_model=list[live_events.LiveEvent])
 def list_events(session_id: Id, db: Db, trail: OpenTrail, who: Therapist) -> list[live_events.LiveEvent]:
-    """What happened in the session's takes, in order."""
+    """List events of the session's live trials in order."""
     with db.read() as c:
         sessions.get(c, session_id)
         found = [event for take in live.takes_of(c, session_id) for event in live_events.events(c, take.id)]
@@ -102,7 +104,7 @@ def list_events(session_id: Id, db: Db, trail: OpenTrail, who: Therapist) -> lis
 async def pair(
     request: Request, body: schemas.PairingCode, db: Db, hub: LiveHub, trail: OpenTrail, failures: Failures
 ) -> schemas.PairedTablet:
-    """Join a tablet to a take by its code; a code works once."""
+    """Join a tablet to a trial by its single-use code."""
     # counted per address: a stranger cannot keep other tablets out by guessing
     address = address_of(request)
     who = f"pairing from {address}"

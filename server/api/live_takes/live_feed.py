@@ -1,8 +1,8 @@
-"""The browsers' socket of a session: `WS /sessions/{sid}/live/feed`, JSON texts (docs/reference/api.md,
+"""Websocket of a session for browsers: `WS /sessions/{sid}/live/feed`, JSON texts (docs/reference/api.md,
 Live).
 
-Only goes down; commands come over the API. While a take streams, watching it counts as activity: nobody is
-signed out in the middle of a training.
+Messages are sent by the server only; commands use the API. Watching a streaming trial counts as activity, so
+that users are not signed out during a training.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import asyncio
 import contextlib
 from typing import Annotated
 
-import msgspec
 from fastapi import APIRouter, WebSocket
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.status import WS_1008_POLICY_VIOLATION, WS_1012_SERVICE_RESTART
@@ -24,6 +23,7 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.clinic import sessions
 from sagittal.server.context import Id, state_of
 from sagittal.server.live.hub import MIND_S, Hub
+from sagittal.server.live.messages import encode_json
 from sagittal.server.live.room import BrowserQueue
 from sagittal.server.nodes.pins import Pin, find_owner
 
@@ -35,7 +35,7 @@ GONE = 4404
 
 @router.websocket("/sessions/{sid}/live/feed")
 async def feed(ws: WebSocket, sid: Id, who: Annotated[Identity, require(Action.RUN_LIVE)]) -> None:
-    """Tell a browser what happens."""
+    """Send updates of the session's live trial to a browser."""
     state = state_of(ws)
     hub, db = state.hub, state.db
     await ws.accept()
@@ -44,7 +44,7 @@ async def feed(ws: WebSocket, sid: Id, who: Annotated[Identity, require(Action.R
         with db.read() as c:
             sessions.get(c, sid)
         state.trail.record_watched(who, "live.watched", "session", sid)
-        return msgspec.json.encode(hub.standing(sid))
+        return encode_json(hub.standing(sid))
 
     try:
         first = await asyncio.to_thread(look)
@@ -82,7 +82,9 @@ async def _down(ws: WebSocket, viewer: BrowserQueue) -> None:
 
 
 async def _until_moved(ws: WebSocket, sid: str) -> None:
-    """Return when another web server has the session's take: the browser then comes back and is led there."""
+    """Return when the session's trial moves to another web server; the browser then reconnects to that
+    one.
+    """
     state = state_of(ws)
     nodes = state.nodes
     while True:
@@ -101,7 +103,7 @@ async def _until_gone(ws: WebSocket) -> None:
 
 
 def _find_end(ws: WebSocket, hub: Hub, sid: str, who: Identity) -> str | None:
-    """Why the feed must end; a running live view counts as activity."""
+    """Reason why the feed must end; a running live view counts as activity."""
     take = hub.take_of(sid)
     if take is not None and take.tablet is not None:
         state_of(ws).logins.touch(who.login_id)

@@ -1,4 +1,4 @@
-"""Analyses: asked for, listed, and their files downloaded."""
+"""Analyses: request, list, and download their files."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def analyse(
     queue: Queue,
     who: Annotated[Identity, require(Action.ANALYSE)],
 ) -> JobView:
-    """Ask for an analysis; the same files, mapping, settings and version are analysed once."""
+    """Request an analysis; identical files, mapping, settings and version are analysed only once."""
     with db.write() as c:
         if body.manifest is not None:
             recordings.set_manifest(c, who, session_id, body.manifest)
@@ -43,7 +43,7 @@ def analyse(
 
 @router.get("/sessions/{session_id}/analyses", response_model=list[schemas.AnalysisAnswer])
 def list_analyses(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[schemas.AnalysisAnswer]:
-    """The finished analyses of a session, the one its pages show first."""
+    """List finished analyses of a session, the displayed one first."""
     with db.read() as c:
         sessions.get(c, session_id)
         made = analyses.of_session(c, session_id)
@@ -53,7 +53,7 @@ def list_analyses(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list
 
 @router.get("/analyses/{analysis_id}", response_model=schemas.AnalysisAnswer)
 def read_analysis(analysis_id: Id, db: Db, trail: OpenTrail, who: Reader) -> schemas.AnalysisAnswer:
-    """Open an analysis: what went in, by what version, and which files came out."""
+    """Inputs, version and result files of an analysis."""
     with db.read() as c:
         found = analyses.get(c, analysis_id)
     trail.record_opened(who, "analysis.opened", "analysis", analysis_id)
@@ -66,7 +66,7 @@ def read_analysis(analysis_id: Id, db: Db, trail: OpenTrail, who: Reader) -> sch
     responses=ANY_FILE,
 )
 def read_file(analysis_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
-    """Download a result file; its name says which analysis it is of, never of whom."""
+    """Download a result file; its name contains the id of the analysis but no patient data."""
     with db.read() as c:
         found = analyses.get(c, analysis_id)
     content = analyses.file_bytes(blobs, found, name)

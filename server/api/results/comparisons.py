@@ -1,4 +1,4 @@
-"""Two sessions of a patient compared, figure by figure."""
+"""Comparison of two sessions of a patient, parameter by parameter."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _CSV: dict[int | str, dict[str, Any]] = {
 def compare(
     session_id: Id, other_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
 ) -> Response:
-    """Every figure before and after, its change against MDC and MCID, and what may be in the way."""
+    """All parameters before and after, changes against MDC and MCID, and reasons for caution."""
     found = _opened(db, trail, who, session_id, other_id)
     content = {
         "before": _session(found.before),
@@ -55,7 +55,7 @@ def compare(
 def compare_as_table(
     session_id: Id, other_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
 ) -> Response:
-    """The same as a table."""
+    """The comparison as a table."""
     found = _opened(db, trail, who, session_id, other_id)
     name = f"changes-{found.before.session.id[:8]}-{found.after.session.id[:8]}.csv"
     return attachment(comparison_csv(comparisons.compare_sessions(reviewed, found)), name)

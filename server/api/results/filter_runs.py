@@ -1,4 +1,4 @@
-"""Orientation filters on a take: the list, references, comparisons asked for and their files."""
+"""Orientation filters on a trial: list, references, requested comparisons and their files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ ReferenceName = Annotated[str, Path(max_length=500, description="any Unicode")]
 
 @dataclass(frozen=True)
 class FilterAnswer:
-    """An orientation filter; `name` is what a comparison takes."""
+    """An orientation filter; `name` identifies it in a comparison."""
 
     name: str
     label: Annotated[str, Field(description="what is only a reconstruction says so")]
@@ -52,7 +52,7 @@ class FilterAnswer:
 
 
 class FilterRunNew(schemas.Request):
-    """Which filters to run on the analysis that the session shows, and what to hold them against."""
+    """Filters to run on the displayed analysis, and the reference to compare with."""
 
     filters: Annotated[list[FilterName], Field(min_length=1, max_length=100)]
     magnetometer: bool = True
@@ -79,7 +79,7 @@ class FilterRunAnswer:
 
 @router.get("/filters", response_model=list[FilterAnswer])
 def list_filters(who: Annotated[Identity, require(Action.READ_API)]) -> list[FilterAnswer]:
-    """The orientation filters of this version, by engine."""
+    """List the orientation filters of this version, by engine."""
     return [schemas.make_answer(FilterAnswer, f) for f in FILTERS]
 
 
@@ -93,7 +93,7 @@ def compare(
     queue: Queue,
     who: Annotated[Identity, require(Action.ANALYSE)],
 ) -> JobView:
-    """Run filters on this take as one job; the same choice on the same analysis is run once."""
+    """Run filters on this trial as one job; identical requests are run once."""
     with db.write() as c:
         return filter_runs.submit(
             c,
@@ -108,7 +108,7 @@ def compare(
 
 @router.get("/sessions/{session_id}/filter-runs", response_model=list[FilterRunAnswer])
 def list_runs(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[FilterRunAnswer]:
-    """The finished comparisons of a session, the newest first."""
+    """List finished comparisons of a session, newest first."""
     with db.read() as c:
         sessions.get(c, session_id)
         found = filter_runs.of_session(c, session_id)
@@ -118,7 +118,7 @@ def list_runs(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[Fil
 
 @router.get("/filter-runs/{run_id}", response_model=FilterRunAnswer)
 def read_run(run_id: Id, db: Db, trail: OpenTrail, who: Reader) -> FilterRunAnswer:
-    """Open a comparison: what went in, by what version, and which files came out."""
+    """Inputs, version and result files of a comparison."""
     with db.read() as c:
         found = filter_runs.get(c, run_id)
     trail.record_opened(who, "filter_run.opened", "filter_run", run_id)
@@ -131,7 +131,7 @@ def read_run(run_id: Id, db: Db, trail: OpenTrail, who: Reader) -> FilterRunAnsw
     responses=ANY_FILE,
 )
 def read_run_file(run_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
-    """Download a file of a comparison; its name says which one it is of, never of whom."""
+    """Download a file of a comparison; its name contains the id of the comparison but no patient data."""
     with db.read() as c:
         found = filter_runs.get(c, run_id)
     content = filter_runs.file_bytes(blobs, found, name)
@@ -142,7 +142,7 @@ def read_run_file(run_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail,
 
 @references.get("", response_model=list[recordings.RecordedFile])
 def list_references(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[recordings.RecordedFile]:
-    """Orientations of other systems that were uploaded to compare with."""
+    """List uploaded reference orientations of other systems."""
     with db.read() as c:
         found = reference_files.list_files(c, session_id)
     trail.record_watched(who, "references.opened", "session", session_id)
@@ -165,7 +165,7 @@ async def put_reference(
     blobs: Blobs,
     who: Uploader,
 ) -> recordings.RecordedFile:
-    """Add a reference, an OpenSim .sto or a table of quaternions; the same name replaces it."""
+    """Add a reference, an OpenSim .sto file or a table of quaternions; the same name replaces it."""
     size = read_size(request, settings.max_file_bytes)
     upload = await run_in_threadpool(
         reference_files.receive_reference, db, blobs, settings, who, session_id, name, size
@@ -190,7 +190,7 @@ def read_reference(
 
 @references.delete("/{name:path}", status_code=204)
 def delete_reference(session_id: Id, name: ReferenceName, db: Db, who: Uploader) -> None:
-    """Take a reference away; comparisons that used it stay as they are."""
+    """Delete a reference; comparisons that used it are unchanged."""
     with db.write() as c:
         reference_files.remove(c, who, session_id, name)
 

@@ -1,4 +1,4 @@
-"""Prescriptions of biofeedback, the targets they may have, and what came of them in a session."""
+"""Biofeedback prescriptions, available targets, and outcomes of a session."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from sagittal.core.feedback.prescription import SOURCES
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import list_trainable
 from sagittal.server.api.documents import refusals
 from sagittal.server.api.downloads.downloads import BINARY, attachment
@@ -37,7 +38,7 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 @router.get("/patients/{patient_id}/prescriptions", response_model=list[schemas.PrescriptionAnswer])
 def list_prescriptions(patient_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[dict[str, Any]]:
-    """The patient's prescriptions, the newest first; one that has not ended is in force."""
+    """List the patient's prescriptions, newest first; at most one is in force."""
     with db.read() as c:
         patients.get(c, patient_id)
         written = prescriptions.of_patient(c, patient_id)
@@ -60,7 +61,7 @@ def write_prescription(
     "/prescriptions/{prescription_id}/end", response_model=schemas.PrescriptionAnswer, responses=refusals(409)
 )
 def end_prescription(prescription_id: Id, db: Db, who: Therapist) -> dict[str, Any]:
-    """End a prescription; the record stays."""
+    """End a prescription; it remains on record."""
     with db.write() as c:
         return _shown(prescriptions.end(c, who, prescription_id))
 
@@ -75,11 +76,17 @@ def read_targets(
     parameter: Annotated[str, Query(max_length=64, description="one that a prescription can train")],
     side: Annotated[Side | None, Query(description="that is trained; none = both")] = None,
 ) -> list[dict[str, Any]]:
-    """What each source gives as target of a parameter for this person, or why it gives nothing."""
+    """Targets of a parameter for this patient by source, or reasons why unavailable."""
     trainable = list_trainable()
     if parameter not in trainable:
         raise Problem(
-            422, "bad_value", f"'{parameter}' cannot be trained; expected one of {', '.join(trainable)}."
+            422,
+            "bad_value",
+            Message(
+                "'{parameter}' cannot be trained; expected one of {trainable}.",
+                parameter=parameter,
+                trainable=", ".join(trainable),
+            ),
         )
     with db.read() as c:
         walk = targets.last_walk(c, reviewed, patients.get(c, patient_id))
@@ -101,7 +108,7 @@ def read_targets(
 def read_feedback(
     session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
 ) -> dict[str, object]:
-    """Strides with and without feedback, probe blocks, level, side effects, and the retention test."""
+    """Strides with and without feedback, probe blocks, level, side effects and retention test."""
     gathered = _opened(db, trail, who, session_id)
     view = feedback.view(reviewed, gathered)
     if view is not None:
@@ -113,7 +120,7 @@ def read_feedback(
 def read_feedback_table(
     session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
 ) -> Response:
-    """Every stride of the live take with its cue; without feedback only the header."""
+    """All strides of the live trial with their cues; without feedback only the header."""
     view = feedback.view(reviewed, _opened(db, trail, who, session_id))
     return attachment(feedback_csv(view), f"feedback-{session_id[:8]}.csv")
 

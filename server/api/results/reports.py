@@ -1,4 +1,4 @@
-"""The report of a session's analysis: everything its pages show, as JSON and as tables."""
+"""Report of a session's analysis, complete as JSON and in parts as tables."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ _CSV: dict[int | str, dict[str, Any]] = {
 def read_report(
     session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
 ) -> dict[str, object]:
-    """Quality, parameters with norms, cycle curves with norm bands, strides, provenance."""
+    """Data quality, parameters with norms, cycle curves with norm bands, strides, provenance."""
     return _opened(db, reviewed, trail, who, session_id).to_json()
 
 
 @router.get("/parameters.csv", response_class=Response, responses=_CSV)
 def read_parameters(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
-    """The table of parameters, left and right, with the norm."""
+    """Table of parameters, left and right, with norms."""
     report = _opened(db, reviewed, trail, who, session_id)
     return attachment(parameters_csv(report), f"parameters-{session_id[:8]}.csv")
 
@@ -52,7 +52,7 @@ def read_parameter(
     trail: OpenTrail,
     who: Reader,
 ) -> dict[str, object]:
-    """One parameter with its definition and the value of every stride, counted or not."""
+    """One parameter with its definition and the value of every stride, included or not."""
     with db.read() as c:
         session = sessions.get(c, session_id)
         patient = patients.get(c, session.patient_id)
@@ -65,7 +65,7 @@ def read_parameter(
 
 @router.get("/curves.csv", response_class=Response, responses=_CSV)
 def read_curves(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
-    """The cycle curves: mean and spread by side and per cent of the cycle, with the norm."""
+    """Cycle curves: mean and spread by side and percentage of the cycle, with norms."""
     return attachment(
         curves_csv(_opened(db, reviewed, trail, who, session_id)), f"curves-{session_id[:8]}.csv"
     )

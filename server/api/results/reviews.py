@@ -1,4 +1,4 @@
-"""Review of a session's analysis: events and strides as they count, edits, undo, redo, their signals."""
+"""Review of a session's analysis: current events and strides, edits, undo, redo, signals."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 @router.get("/edits", response_model=None, responses=_REVIEW)
 def read_review(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
-    """Events, strides and parameters as they count now, and the edits that made them so."""
+    """Current events, strides and parameters, and the edits applied."""
     return _review(reviewed, *_opened(db, trail, who, session_id, "review"))
 
 
@@ -54,7 +54,7 @@ def read_review(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, wh
 def make_edit(
     session_id: Id, body: schemas.EditNew, db: Db, reviewed: Reviewed, who: Reviewer, seen: Seen = None
 ) -> Response:
-    """Move, add or delete an event, leave a stride out or count it; everything is measured again."""
+    """Move, add or delete an event, or exclude or include a stride; parameters are recomputed."""
     edit = read_edit(body.model_dump(exclude_none=True))
     found, edits = reviews.make(db, reviewed, who, session_id, edit, seen=seen)
     return _review(reviewed, found, edits, 201)
@@ -62,19 +62,19 @@ def make_edit(
 
 @router.delete("/edits", response_model=None, responses=_REVIEW | refusals(409))
 def undo_edit(session_id: Id, db: Db, reviewed: Reviewed, who: Reviewer, seen: Seen = None) -> Response:
-    """Undo the last edit that is not undone yet."""
+    """Undo the latest edit."""
     return _review(reviewed, *reviews.undo(db, who, session_id, seen=seen))
 
 
 @router.post("/edits/redo", response_model=None, responses=_REVIEW | refusals(409))
 def redo_edit(session_id: Id, db: Db, reviewed: Reviewed, who: Reviewer, seen: Seen = None) -> Response:
-    """Make the edit again that was undone last; a new edit ends what can be redone."""
+    """Redo the edit that was undone last; a new edit clears the redo history."""
     return _review(reviewed, *reviews.redo(db, reviewed, who, session_id, seen=seen))
 
 
 @router.get("/events.csv", response_class=Response, responses=_CSV)
 def read_events(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
-    """Contacts and foot-offs as they count, edited ones with the source "manual"."""
+    """Current contacts and foot-offs as a table; edited ones have the source "manual"."""
     found, edits = _opened(db, trail, who, session_id, "events")
     events = reviewed.read_bundle(found, edits).events
     return attachment(events_csv(events), f"events-{session_id[:8]}.csv")
@@ -82,7 +82,7 @@ def read_events(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, wh
 
 @router.get("/strides.csv", response_class=Response, responses=_CSV)
 def read_strides(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
-    """Every stride with its parameters, as it counts."""
+    """Current strides with their parameters as a table."""
     found, edits = _opened(db, trail, who, session_id, "strides")
     result = reviewed.measure(found, edits)
     content = (
@@ -97,7 +97,7 @@ def read_strides(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, w
 def list_signals(
     session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
 ) -> tuple[signals.SignalLane, ...]:
-    """Which signals there are: derived ones of feet and joints, raw ones of every sensor."""
+    """List available signals: derived ones of feet and joints, raw ones of every sensor."""
     found = _watched(db, trail, who, session_id)
     return signals.list_lanes(reviewed, found)
 
@@ -114,13 +114,13 @@ def read_signal(
     end_s: Annotated[float, Query(ge=0, le=1e6, allow_inf_nan=False)] = 1e6,
     points: Annotated[int, Query(ge=1, le=signals.MOST_POINTS)] = 1000,
 ) -> Response:
-    """A window of a signal in at most so many parts, the least and the greatest value of each."""
+    """A window of a signal, downsampled to minimum and maximum per bin."""
     found = _watched(db, trail, who, session_id)
     return JSONResponse(asdict(signals.read_window(reviewed, found, name, start_s, end_s, points)))
 
 
 def _watched(db: Database, trail: AuditTrail, who: Identity, session_id: str) -> analyses.AnalysisRecord:
-    """Signals are asked for at every zoom and step."""
+    """Record access once, since signals are requested at every zoom step."""
     with db.read() as c:
         found = analyses.get_shown(c, session_id)
     trail.record_watched(who, "signals.opened", "session", session_id, {"analysis_id": found.id})
@@ -140,7 +140,9 @@ def _opened(
 def _review(
     reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, edits: edit_log.EditHistory, status: int = 200
 ) -> Response:
-    """Written without a model: two thousand events would be checked longer than they are measured."""
+    """Response without model validation, which would take longer for two thousand events than
+    computing them.
+    """
     bundle = reviewed.read_bundle(found, edits)
     events, strides, of = bundle.events.events, bundle.strides.strides, bundle.strides.columns
     times = np.round(np.array([e.time_s for e in events], np.float64), 6).tolist()

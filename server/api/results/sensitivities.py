@@ -1,4 +1,4 @@
-"""Sensitivity analyses of squats: asked for, listed, read."""
+"""Sensitivity analyses of squats: request, list, read."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Reader = Annotated[Identity, require(Action.READ_RESULT)]
 
 
 class SensitivityNew(schemas.Request):
-    """What the angles are held against, and which zero they have."""
+    """Reference and zero of the angles."""
 
     reference: Annotated[
         str | None,
@@ -56,7 +56,7 @@ def start(
     queue: Queue,
     who: Annotated[Identity, require(Action.ANALYSE)],
 ) -> JobView:
-    """Put each of 24 measures of body and sensors off, one at a time, and see how far the angles move."""
+    """Perturb each of 24 body and sensor parameters in turn, and compute the change of the angles."""
     with db.write() as c:
         return sensitivities.submit(
             c, queue, who, session_id, reference=body.reference, from_standing=body.from_standing
@@ -67,7 +67,7 @@ def start(
 def list_sensitivities(
     session_id: Id, db: Db, trail: OpenTrail, who: Reader
 ) -> list[sensitivities.StoredSensitivity]:
-    """The finished sensitivity analyses of a session, the newest first."""
+    """List finished sensitivity analyses of a session, newest first."""
     with db.read() as c:
         found = sensitivities.of_session(c, session_id)
     trail.record_watched(who, "sensitivities.opened", "session", session_id)
@@ -78,7 +78,7 @@ def list_sensitivities(
 def read_sensitivity(
     sensitivity_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
 ) -> SensitivityResult:
-    """One with its tables; `id` is that of the job. The CSV is among the files of the analysis."""
+    """One analysis with its tables; `id` is that of the job. The CSV is among the files of the analysis."""
     with db.read() as c:
         found = sensitivities.get(c, sensitivity_id)
         analysis, name = sensitivities.find_file(c, found)

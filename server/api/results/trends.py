@@ -1,4 +1,4 @@
-"""Figures over the visits of a patient: what changed since the first assessment, and how sure that is."""
+"""Parameters over the visits of a patient: changes since the first assessment and their certainty."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ Followed = Annotated[tuple[PatientHistory, tuple[Trend, ...]], Depends(_follow)]
 
 @router.get("/trends", response_model=None, responses=_JSON)
 def read_trends(followed: Followed) -> Response:
-    """Values by visit with the norm, and the change since the first assessment against MDC and MCID."""
+    """Values by visit with norms, and changes since the first assessment against MDC and MCID."""
     known, found = followed
     visits = [
         {
@@ -101,7 +101,7 @@ def read_trends(followed: Followed) -> Response:
 
 @router.get("/trends.csv", response_class=Response, responses=_CSV)
 def read_trends_table(patient_id: Id, followed: Followed) -> Response:
-    """The same as a table: one row per figure, side and visit."""
+    """The trends as a table: one row per parameter, side and visit."""
     known, found = followed
     return attachment(trends_csv(known.visits, found), f"trends-{patient_id[:8]}.csv")
 

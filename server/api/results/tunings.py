@@ -1,4 +1,4 @@
-"""Tunings of filters on trials with a reference: asked for, listed, downloaded."""
+"""Tuning of filters on trials with a reference: request, list, download."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def tune(
     queue: Queue,
     who: Annotated[Identity, require(Action.ANALYSE)],
 ) -> JobView:
-    """Fit the gains of a filter to the trials (.npz) among the session's files; analyses go before it."""
+    """Fit the gains of a filter to the trials (.npz) among the session's files; analyses have priority."""
     order = tunings.TuningOrder(**body.model_dump())
     with db.write() as c:
         return tunings.submit(c, queue, who, session_id, order)
@@ -38,7 +38,7 @@ def tune(
 
 @router.get("/sessions/{session_id}/tunings", response_model=list[tunings.StoredTuning])
 def list_tunings(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[tunings.StoredTuning]:
-    """The finished tunings of a session, the newest first."""
+    """List finished tunings of a session, newest first."""
     with db.read() as c:
         made = tunings.of_session(c, session_id)
     trail.record_watched(who, "tunings.opened", "session", session_id)

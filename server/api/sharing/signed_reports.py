@@ -1,4 +1,4 @@
-"""The therapist's text on a report, the versions that were signed, and the links to them."""
+"""Assessment text of a report, signed versions, and links to them."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ Signer = Annotated[Identity, require(Action.SIGN_REPORT)]
 
 @dataclass(frozen=True)
 class NewReportLink:
-    """A link that was just made: its address is told this once.
+    """A newly created link; its URL is shown only once.
 
     Parameters
     ----------
-    url : for whoever is to read the report. qr : the same as a picture, an address `data:image/svg+xml`.
+    url : for the recipient. qr : QR code of it as a data URL, `data:image/svg+xml`.
     """
 
     link: ReportLink
@@ -41,14 +41,14 @@ class NewReportLink:
 
 @router.put("/sessions/{session_id}/assessment", status_code=204, responses=refusals(409))
 def write_assessment(session_id: Id, body: schemas.Assessment, db: Db, who: Signer) -> None:
-    """Write the therapist's text on the report; empty = none."""
+    """Set the therapist's assessment on the report; empty = none."""
     with db.write() as c:
         signed_reports.write_assessment(c, who, session_id, body.content or "")
 
 
 @router.get("/sessions/{session_id}/signed-reports", response_model=list[SignedReport])
 def list_signed(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[SignedReport]:
-    """All versions that were signed, the newest first."""
+    """List all signed versions, newest first."""
     with db.read() as c:
         sessions.get(c, session_id)
         found = signed_reports.of_session(c, session_id)
@@ -58,14 +58,14 @@ def list_signed(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[S
 
 @router.post("/signed-reports/{report_id}/reopen", response_model=SignedReport, responses=refusals(409))
 def reopen(report_id: Id, body: schemas.Reopening, db: Db, who: Signer) -> SignedReport:
-    """Take a signed report out of force with a reason, and end its links; it stays and can be read."""
+    """Reopen a signed report with a reason, and end its links; the version remains readable."""
     with db.write() as c:
         return report_links.reopen_report(c, who, report_id, body.reason, who.display_name)
 
 
 @router.get("/sessions/{session_id}/report-links", response_model=list[ReportLink])
 def list_links(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[ReportLink]:
-    """The links to the signed reports of a session, the newest first; their addresses are not known."""
+    """List links to the signed reports of a session, newest first, without their URLs."""
     with db.read() as c:
         sessions.get(c, session_id)
         found = report_links.of_session(c, session_id)
@@ -82,7 +82,7 @@ def list_links(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[Re
 def make_link(
     report_id: Id, body: schemas.ReportLinkNew, request: Request, db: Db, who: Signer
 ) -> NewReportLink:
-    """Make a link by which somebody without an account reads this report, without the patient's code."""
+    """Create a link to this report, without the patient's code, for a reader without an account."""
     with db.write() as c:
         link, token = report_links.make(c, who, report_id, body.days, who.display_name)
     url = f"{request.base_url}r/{token}"
@@ -91,6 +91,6 @@ def make_link(
 
 @router.delete("/report-links/{link_id}", response_model=ReportLink)
 def revoke_link(link_id: Id, db: Db, who: Signer) -> ReportLink:
-    """End a link now."""
+    """End a link immediately."""
     with db.write() as c:
         return report_links.revoke(c, who, link_id)

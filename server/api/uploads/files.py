@@ -1,4 +1,4 @@
-"""Original files of a session: streamed in with constant memory, kept byte for byte, streamed out."""
+"""Original files of a session: streamed in constant memory and stored byte for byte."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 
+from sagittal.core.message import Message
 from sagittal.server.api import schemas
 from sagittal.server.api.documents import refusals
 from sagittal.server.api.downloads.downloads import BINARY, attachment
@@ -58,7 +59,7 @@ async def put_file(
     blobs: Blobs,
     who: Annotated[Identity, require(Action.UPLOAD)],
 ) -> recordings.RecordedFile:
-    """Add a file to the current recording, the raw body as its content; the same name replaces it."""
+    """Add a file with the raw body as its content to the current recording; the same name replaces it."""
     size = read_size(request, settings.max_file_bytes)
     upload = await run_in_threadpool(receiving.receive, db, blobs, settings, who, session_id, name, size)
     return await receive_body(request, upload)
@@ -79,7 +80,7 @@ async def post_files(
     blobs: Blobs,
     who: Annotated[Identity, require(Action.UPLOAD)],
 ) -> list[recordings.RecordedFile]:
-    """Add files from a form with the field `files`; a file that is refused ends the request."""
+    """Add files from a form with the field `files`; a rejected file ends the request."""
     if "content-length" not in request.headers:
         raise Problem(
             411, "length_required", "A form upload must say its length. Send a Content-Length header."
@@ -142,13 +143,13 @@ def read_file(
 def delete_file(
     session_id: Id, name: FileName, db: Db, who: Annotated[Identity, require(Action.UPLOAD)]
 ) -> schemas.RecordingAnswer:
-    """Take a file out of the current recording; analyses already made keep theirs."""
+    """Remove a file from the current recording; existing analyses keep theirs."""
     with db.write() as c:
         return schemas.make_answer(schemas.RecordingAnswer, recordings.remove_file(c, who, session_id, name))
 
 
 async def receive_body(request: Request, upload: receiving.receive) -> recordings.RecordedFile:
-    """Keep the raw body of a request as a file."""
+    """Store the raw body of a request as a file."""
     with upload:
         try:
             async for chunk in read_megabytes(request):
@@ -159,20 +160,24 @@ async def receive_body(request: Request, upload: receiving.receive) -> recording
 
 
 def read_size(request: Request, limit: int) -> int:
-    """Return how many bytes the client announces, 0 = it does not say; raise Problem 413 beyond it."""
+    """Return the announced body size in bytes, 0 = unknown; raise Problem 413 if it exceeds the limit."""
     declared = request.headers.get("content-length", "0")
     if not declared.isdecimal() or int(declared) > limit:
         raise Problem(
             413,
             "file_too_large",
-            f"The body has {declared} bytes, at most {limit} are taken. "
-            "Split the recording or ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
+            Message(
+                "The body has {declared} bytes, at most {limit} are taken. Split the recording or "
+                "ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
+                declared=declared,
+                limit=limit,
+            ),
         )
     return int(declared)
 
 
 async def read_megabytes(request: Request) -> AsyncIterator[bytes]:
-    """Yield the raw body of a request in pieces of a megabyte; raises ClientDisconnect."""
+    """Yield the raw body of a request in parts of a megabyte; raises ClientDisconnect."""
     pending = bytearray()
     async for piece in request.stream():
         pending += piece

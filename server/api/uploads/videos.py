@@ -1,4 +1,4 @@
-"""The video beside a take."""
+"""Video of a trial."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Writer = Annotated[Identity, require(Action.WRITE_SESSION)]
 
 @router.get("", response_model=videos.SessionVideo)
 def read_video(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> videos.SessionVideo:
-    """What is known of the video, and who said that the person agreed to be filmed."""
+    """Properties of the video, and the user who confirmed the patient's consent."""
     with db.read() as c:
         found = videos.get(c, session_id)
     trail.record_watched(who, "video.opened", "session", session_id)
@@ -52,7 +52,7 @@ async def put_video(
     blobs: Blobs,
     who: Writer,
 ) -> recordings.RecordedFile:
-    """Set a video beside the take, MP4, QuickTime or WebM; it replaces the one before."""
+    """Attach a video to the trial, MP4, QuickTime or WebM; replaces the previous one."""
     size = read_size(request, settings.max_file_bytes)
 
     def begin() -> videos.receive_video:
@@ -64,14 +64,14 @@ async def put_video(
 
 @router.patch("", response_model=videos.SessionVideo)
 def align_video(session_id: Id, body: schemas.VideoAlignment, db: Db, who: Writer) -> videos.SessionVideo:
-    """Say which moment of the video is the take's time 0."""
+    """Set the video time that corresponds to trial time 0."""
     with db.write() as c:
         return videos.align(c, who, session_id, body.offset_s)
 
 
 @router.delete("", status_code=204)
 def remove_video(session_id: Id, db: Db, who: Writer) -> None:
-    """Take the video away."""
+    """Remove the video."""
     with db.write() as c:
         videos.remove(c, who, session_id)
 
@@ -86,7 +86,7 @@ def remove_video(session_id: Id, db: Db, who: Writer) -> None:
 def play_video(
     request: Request, session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
 ) -> Response:
-    """The video's bytes; players ask for ranges of it."""
+    """Content of the video; supports range requests."""
     with db.read() as c:
         found, space = videos.find_stored(c, blobs, session_id)
     trail.record_watched(who, "video.opened", "session", session_id)

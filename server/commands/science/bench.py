@@ -1,4 +1,4 @@
-"""`sagittal bench fusion`: published orientation filters, listed or scored on recordings with a reference."""
+"""`sagittal bench fusion`: list published orientation filters, or score them on reference recordings."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ def bench(
     folder
         recordings (docs/science/filters.md)
     show_list
-        list them, with their sources
+        list algorithms with their sources
     out
-        write every score into a file
+        write all scores to a file
     every
-        print every recording instead of their mean
+        print each recording instead of the mean
     """
     if show_list:
         sys.stdout.write(_table(_list_algorithms()))
@@ -70,7 +70,7 @@ def bench(
 
 
 def _read_trials(folder: Path) -> list[ReferenceTrial]:
-    """Recordings of a folder that can be read; of the others what is wrong is said."""
+    """Read the recordings of a folder; errors are printed for unreadable ones."""
     from sagittal.core.errors import FormatError
     from sagittal.core.fusion.algorithms.benchmark import read_trial
 

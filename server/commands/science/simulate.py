@@ -1,4 +1,4 @@
-"""`sagittal simulate`: a recording and what really happened, in the files an analysis reads and writes."""
+"""`sagittal simulate`: write a simulated recording with its ground truth in the usual file formats."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ ACTIVITY: Final = "activity"
 
 
 def simulate(*, out: Path, script: str = "comfortable", seed: Seed = 1, hours: float = 24.0) -> int:
-    """Write `recording.parquet` and `truth/` into `out`; 2 = no such script.
+    """Write `recording.parquet` and `truth/` into `out`; 2 = unknown script.
 
-    Truth of a walk: angles, events, strides; of squats, of swings and bows: angles, phases; of a chest:
-    trunk, phases; of a test that begins on a chair: trunk, segments, scripted changes; of daily life: phases
-    and steps.
+    Ground truth of a walk: angles, events, strides; of squats, leg swings and bows: angles, phases; of a
+    chest sensor: trunk, phases; of a test that begins on a chair: trunk, segments, scripted changes; of daily
+    life: phases and steps.
 
     Parameters
     ----------
     out
-        folder for recording and truth
+        folder for recording and ground truth
     script
         comfortable, fast_with_turns, hemiparetic, squats, postures, activity … (docs/science/simulation.md)
     hours
-        of daily life, --script activity (default 24)
+        duration of daily life, --script activity (default 24)
     """
     from sagittal.core.formats import write_recording
     from sagittal.core.simulate import MOVEMENTS, SCRIPTS, Simulation, simulate_movement, simulate_scenario
@@ -74,7 +74,7 @@ def simulate(*, out: Path, script: str = "comfortable", seed: Seed = 1, hours: f
 
 
 def _simulate_activity(out: Path, seed: int, hours: float) -> int:
-    """Write hours of daily life of one sensor on the chest."""
+    """Write hours of daily life of one chest sensor."""
     from sagittal.core.errors import ParameterError
     from sagittal.core.formats import write_recording
     from sagittal.core.simulate import phase_table

@@ -1,4 +1,4 @@
-"""One's own account."""
+"""Account page of the signed-in user."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 def show_account(
     request: Request, db: Db, settings: Config, who: Annotated[Identity, require(Action.USE_ACCOUNT)]
 ) -> Response:
-    """One's own password, second factor, keys and tokens, and signing out."""
+    """Password, second factor, security keys, tokens and sign-out of the signed-in user."""
     with db.read() as c:
         tokens = api_tokens.list_tokens(c, who.user_id)
         has_factor, codes = second_factor.is_on(c, who.user_id), second_factor.count_recovery(c, who.user_id)

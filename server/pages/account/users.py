@@ -1,4 +1,4 @@
-"""Who may sign in, and as what."""
+"""User accounts and roles."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 @router.get("/users")
 def show_users(request: Request, db: Db, who: Annotated[Identity, require(Action.MANAGE_USERS)]) -> Response:
-    """Who may sign in, and as what."""
+    """User accounts and roles."""
     with db.read() as c:
         rows = accounts.list_accounts(c)
         care_teams_on = care_teams.are_on(c)

@@ -1,4 +1,4 @@
-"""What is being computed, and what was."""
+"""Current and past computations."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ KIND_WORDS: Final = {
 
 @router.get("/jobs")
 def show_jobs(request: Request, db: Db, who: Annotated[Identity, require(Action.READ_JOB)]) -> Response:
-    """What is being computed, and what was."""
+    """Current and past computations."""
     with db.read() as c:
         rows = list_jobs(c, who)
     record_listing(request, who, "job")
@@ -51,7 +51,7 @@ def show_jobs(request: Request, db: Db, who: Annotated[Identity, require(Action.
 
 
 def list_jobs(c: Connection, who: Identity) -> list[dict[str, Any]]:
-    """The newest jobs that a person may see, each with its visit."""
+    """Latest jobs that a user may see, with their visits."""
     rows = []
     for view in jobs.list_jobs(c, who, limit=JOBS_SHOWN):
         shape, word = JOB_WORDS[view.state]

@@ -1,4 +1,4 @@
-"""The form of a new visit."""
+"""Form for a new visit."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 def show_new_session(
     request: Request, db: Db, pid: Id, who: Annotated[Identity, require(Action.CREATE_SESSION)]
 ) -> Response:
-    """Ask for protocol, date, height and walking condition of a new visit."""
+    """Form with protocol, date, height and walking condition of a new visit."""
     today = now().date()
     with db.read() as c:
         patient = patients.get(c, pid)

@@ -1,4 +1,4 @@
-"""The list of patients."""
+"""Patient list."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def show_patients(
     who: Annotated[Identity, require(Action.READ_PATIENT)],
     q: Annotated[str, Query(max_length=200)] = "",
 ) -> Response:
-    """All patients, the latest visit first."""
+    """All patients, latest visit first."""
     with db.read() as c:
         found = patients.list_counted(c, who, search=q, limit=PATIENTS_SHOWN)
         rows = list_patients(c, reviewed, found.patients, results=who.may(Action.READ_RESULT))
@@ -75,7 +75,7 @@ def view_patient(p: Patient) -> dict[str, Any]:
 def list_patients(
     c: Connection, reviewed: ReviewedAnalyses, found: Sequence[Patient], *, results: bool
 ) -> list[dict[str, Any]]:
-    """Rows of the patients list, each with the state of its latest visit; with `results`, of its data."""
+    """Rows of the patient list with the state of the latest visit and, with `results`, its data quality."""
     rows = []
     takes = {take.patient_id: describe_live(take) for take in live.list_running(c)}
     newest = sessions.newest_of(c, [p.id for p in found])

@@ -1,4 +1,4 @@
-"""The programme of a patient: every planned visit, and which session it was."""
+"""Training programme of a patient: planned visits and their sessions."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ STATE_WORDS: Final[Mapping[str, tuple[str, str]]] = {
 def show_programme(
     request: Request, db: Db, pid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> Response:
-    """The newest programme of a patient: every planned visit, and which session it was."""
+    """Latest programme of a patient: planned visits and their sessions."""
     today = now().date()
     with db.read() as c:
         patient = patients.get(c, pid)
@@ -57,7 +57,7 @@ def show_programme(
 
 
 def view_programme(programme: Programme, today: dt.date) -> dict[str, Any]:
-    """A programme as a strip of weeks and a list."""
+    """Template context of a programme: timeline of weeks and list."""
     now_week = (today - programme.starts_on).days // 7 + 1
     weeks = range(min(v.week for v in programme.visits), max(v.week for v in programme.visits) + 1)
     upcoming = programme.next

@@ -1,4 +1,4 @@
-"""The same take through several orientation filters: choose, run, see how far they are apart."""
+"""Comparison of orientation filters on a trial: selection, progress and differences."""
 
 from __future__ import annotations
 
@@ -58,12 +58,12 @@ def show_algorithms(
     of: Word = None,
     against: Word = None,
 ) -> Response:
-    """Choose filters, run them, see their spread and how they agree.
+    """Select filters, run them, and view their spread and agreement.
 
     Parameters
     ----------
-    run : which comparison, else the newest. of : segment or joint angle held against the reference.
-    against : filter whose plot is drawn.
+    run : comparison to show, default the newest. of : segment or joint angle compared with the reference.
+    against : filter to plot.
     """
     with db.read() as c:
         context = read_context(c, sid)
@@ -87,7 +87,7 @@ def show_algorithms(
 
 
 def list_choices(c: Connection, session_id: str) -> dict[str, Any]:
-    """What the form offers, and the comparison that is at work or failed last."""
+    """Options of the form, and the running or last failed comparison."""
     newest = next(iter(jobs.of_session(c, session_id, kind=COMPARE_FILTERS)), None)
     return {
         "analysed": analyses.latest(c, session_id) is not None,

@@ -1,4 +1,4 @@
-"""How good the calibration of a take is: every check of every sensor, why, and what to do."""
+"""Calibration quality of a trial: all checks of all sensors, with reasons and remedies."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 def show_calibration(
     request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
 ) -> Response:
-    """The picture of the body, the verdict, and the checks of every sensor."""
+    """Body diagram, overall result, and checks of every sensor."""
     with db.read() as c:
         context = read_context(c, sid)
         if elsewhere := lead_to_days(context):

@@ -1,4 +1,4 @@
-"""Two visits side by side."""
+"""Comparison of two visits."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Ticked = Annotated[list[Annotated[str, Query(pattern=HEX_ID)]], Query(max_length
 
 @router.get("/patients/{pid}/compare")
 def choose_visits(db: Db, pid: Id, who: ResultReader, visit: Ticked) -> Response:
-    """Go on to the comparison of the two visits that were ticked, or back when they are not two."""
+    """Redirect to the comparison of two selected visits, or back if not exactly two are selected."""
     with db.read() as c:
         patients.get(c, pid)
     to = f"/sessions/{visit[0]}/compare/{visit[1]}" if len(set(visit)) == 2 else f"/patients/{pid}"
@@ -51,7 +51,7 @@ def show_comparison(
     other: Id,
     who: ResultReader,
 ) -> Response:
-    """Two sessions: curves over one another, every figure before and after, in words."""
+    """Two sessions: overlaid curves, all parameters before and after, summary in words."""
     with db.read() as c:
         found = comparisons.pair(c, sid, other)
     record_opening(request, who, "session", found.before.session.id)
@@ -63,7 +63,7 @@ def show_comparison(
 
 
 def view_comparison(reviewed: ReviewedAnalyses, found: SessionPair) -> dict[str, Any]:
-    """The comparison page: charts with the earlier means behind, the table under its headings, sources."""
+    """Template context: charts with earlier means, table with headings, sources."""
     rows = comparisons.compare_sessions(reviewed, found)
     _, old = reports.read(
         reviewed, found.before.found, found.before.edits, found.patient, found.before.session
@@ -114,7 +114,7 @@ def view_comparison(reviewed: ReviewedAnalyses, found: SessionPair) -> dict[str,
 
 
 def _pairs(rows: Sequence[ComparedRow]) -> list[tuple[ComparedRow, int]]:
-    """Rows with how many share their title: the number on the first of them, 0 on the others."""
+    """Rows with the number of rows that share their title on the first of them, 0 on the others."""
     names = [r.change.name for r in rows]
     return [
         (r, names.count(name) if names.index(name) == i else 0)

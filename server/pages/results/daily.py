@@ -1,4 +1,4 @@
-"""Daily life on the session page and in the week report, and beside the clinic's walks on the trends page."""
+"""Template context of daily life for session page, week report and trends page."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TEMPLATES: Final = {"session.html": "daily.html", "print.html": "daily-print.htm
 
 
 def draw_daily(view: DailyLifeView | None) -> dict[str, Any] | None:
-    """What the templates of daily life show, with the charts drawn."""
+    """Template context of daily life, with charts rendered."""
     if view is None:
         return None
     found = view.found

@@ -1,4 +1,4 @@
-"""Downloads, the health of the estimator, provenance, running again."""
+"""Downloads, state of the estimator, provenance, and repeated analysis."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ FILE_WORDS: Final[Mapping[str, str]] = {
 def show_data(
     request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> Response:
-    """Downloads, the estimator's health, provenance, running again."""
+    """Downloads, state of the estimator, provenance, and repeated analysis."""
     with db.read() as c:
         context = read_context(c, sid)
         context |= list_downloads(c, blobs, sid, results=who.may(Action.READ_RESULT))
@@ -68,7 +68,7 @@ def show_data(
 
 
 def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results: bool) -> dict[str, Any]:
-    """Files to download, estimator, sensor checks, provenance and the mapping behind the shown analysis."""
+    """Template context: files, estimator, sensor checks, provenance and mapping of the displayed analysis."""
     this = recordings.current(c, session_id)
     found = analyses.of_session(c, session_id) if results else []
     shown = found[0] if found else None
@@ -109,7 +109,7 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
 
 
 def _list_exports(c: Connection, context: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The formats for other programs: to download, at work, or to be asked for; none without an analysis."""
+    """Export formats: available, in progress, or to be requested; none without an analysis."""
     shown = context["analysis"]
     if shown is None:
         return []
@@ -137,7 +137,9 @@ def _ask_again(
     shown: analyses.AnalysisRecord | None,
     earlier: analyses.AnalysisRecord,
 ) -> dict[str, Any] | None:
-    """What asks for an earlier set-up of the same files again; None where it is that of the shown one."""
+    """Request for restoring an earlier setup of the same files; None if it is that of the displayed
+    analysis.
+    """
     if this is None or shown is None or earlier.recording_id != this.id:
         return None
     if repairs.take_setup(None, earlier.manifest) == repairs.take_setup(None, shown.manifest):
@@ -149,7 +151,7 @@ def _ask_again(
 
 
 def _asked_for(config: Mapping[str, Any]) -> str | None:
-    """The estimator somebody chose by name."""
+    """Label of the estimator chosen by the user, None if automatic."""
     asked = (config.get("poses") or {}).get("estimator")
     return None if asked is None else choice_label(asked)
 

@@ -1,4 +1,4 @@
-"""The page that opens a number: its definition, its strides, and the way to their moments."""
+"""Page of one parameter: definition, strides, and links to their times."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def show_parameter(
     name: Annotated[str, Path(pattern=r"^[a-z0-9_]{1,64}$")],
     who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
-    """One parameter of a session with every stride behind it."""
+    """One parameter of a session with all its strides."""
     with db.read() as c:
         context = read_measured_context(c, sid)
         found = analyses.get_shown(c, sid)

@@ -1,4 +1,4 @@
-"""One patient: who, the programme, how it goes in five figures, visits with their takes, notes."""
+"""Patient page: identity, programme, five key parameters, visits with their trials, notes."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def show_patient(
     pid: Id,
     who: Annotated[Identity, require(Action.READ_PATIENT)],
 ) -> Response:
-    """One patient: who, the programme, how it goes in five figures, visits with their takes, notes."""
+    """Patient page: identity, programme, five key parameters, visits with their trials, notes."""
     results = who.may(Action.READ_RESULT)
     with db.read() as c:
         patient = patients.get(c, pid)
@@ -93,7 +93,7 @@ def show_patient(
 
 
 def view_team(c: Connection, who: Identity, patient_id: str) -> dict[str, Any] | None:
-    """The care team and who opened the patient in an emergency; None where the clinic has no teams."""
+    """Care team and emergency access; None if the clinic has no care teams."""
     if not care_teams.are_on(c):
         return None
     people = care_teams.list_people(c, patient_id)
@@ -108,7 +108,7 @@ def view_team(c: Connection, who: Identity, patient_id: str) -> dict[str, Any] |
 
 
 def list_facts(patient: patients.Patient, walks: str | None) -> list[tuple[str, str]]:
-    """Who it is and how the person walks, in a line."""
+    """One-line summary of the patient and usual walking condition."""
     facts = [
         ("Note", patient.note),
         ("Affected side", patient.affected_side or ""),
@@ -122,7 +122,7 @@ def list_facts(patient: patients.Patient, walks: str | None) -> list[tuple[str, 
 def list_notes(
     written: Sequence[notes.PatientNote], rows: Sequence[Mapping[str, Any]], who: Identity
 ) -> list[dict[str, Any]]:
-    """Notes about the patient and those of visits, the latest day first."""
+    """Notes about the patient and notes of visits, latest date first."""
     writes, others = who.may(Action.WRITE_PATIENT), who.may(Action.MANAGE_USERS)
     found: list[dict[str, Any]] = [
         {
@@ -150,12 +150,12 @@ def list_visits(
     done: Sequence[AnalysedSession],
     planned: Mapping[str, PlannedVisit],
 ) -> list[dict[str, Any]]:
-    """The visits of a patient, newest first, each with its takes; what is not analysed is a visit of its own.
+    """Visits of a patient, newest first, with their trials; unanalysed sessions are separate visits.
 
     Parameters
     ----------
-    done : what is analysed, oldest first; empty for who may not see results. planned : session → the visit
-        of a programme that it was.
+    done : analysed sessions, oldest first; empty for users without access to results.
+    planned : session → its planned visit.
     """
     takes_now = {take.session_id: describe_live(take) for take in live.list_running(c)}
     running = find_active_jobs(c, [patient_id], lambda j: j.session_id)
@@ -203,7 +203,7 @@ def list_visits(
 
 
 def _measure(reviewed: ReviewedAnalyses, visit: ClinicVisit) -> TakesFigure | None:
-    """The walking speed of every take and their mean; None where it cannot be read or was not measured."""
+    """Gait speed of every trial and their mean; None if unreadable or not measured."""
     try:
         return visits.measure_visit(reviewed, visit).get((SPEED, None))
     except UNREADABLE:
@@ -217,7 +217,7 @@ def _view_speed(
     planned: Mapping[str, VisitKind],
     scale: tuple[float, float] | None,
 ) -> dict[str, Any]:
-    """Speed of a visit with that of its takes, and its change since the visit it is compared with."""
+    """Gait speed of a visit and its trials, and the change since the visit used for comparison."""
     own = measured[id(visit)]
     by_take = {} if own is None else own.by_take
     view: dict[str, Any] = {
@@ -244,7 +244,7 @@ def _print(p: Parameter | None) -> str | None:
 
 
 def _find_page(s: sessions.Session, *, live: bool) -> str:
-    """The page of a session on which there is something to do."""
+    """The page of a session that requires action."""
     if live:
         return "/live"
     return "/upload" if s.state in {"empty", "uploaded"} else ""

@@ -1,4 +1,4 @@
-"""The profile of a walk as pages show it: the sagittal score and the bars of its curves."""
+"""Movement profile of a walk on pages: sagittal score and bars of the curves."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sagittal.server.results.reviewed import ReviewedAnalyses
 def view_profile(
     reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any], bar_height: int
 ) -> tuple[dict[str, Any] | None, list[dict[str, Any]]]:
-    """The sagittal score and the bars of its curves, both with the visit before; None, [] without curves."""
+    """Sagittal score and bars of the curves, with the previous visit; None, [] without curves."""
     if model.profile is None or model.quality.kind == "bad":
         return None, []
     earlier, before = None, context.get("before")
@@ -49,7 +49,7 @@ def _print_sides(bar: ProfileBar) -> dict[str, str]:
 
 
 def _change_score(before: ProfileBar, now: ProfileBar) -> tuple[ChangeWords, ...]:
-    """Of each side with both values; no source has a limit for it, so there is no verdict."""
+    """Both values of each side; not assessed, as no limit has been published."""
     term = find_term("gps_sagittal_deg")
     return tuple(
         ChangeWords(

@@ -1,4 +1,4 @@
-"""How sure the angles of squats are: one measure of body or sensors off at a time."""
+"""Uncertainty of squat angles: sensitivity to single body and sensor parameters."""
 
 from __future__ import annotations
 
@@ -42,11 +42,12 @@ def show_sensitivity(
     run: Annotated[str | None, Query(max_length=100)] = None,
     show: Annotated[str, Query(max_length=20)] = "step",
 ) -> Response:
-    """Start one, follow it, read its tables.
+    """Start a sensitivity analysis, follow its progress, view its tables.
 
     Parameters
     ----------
-    run : which one, else the newest. show : change by steps, by a share of the nominal value, or in %.
+    run : analysis to show, default the newest. show : change per step, per fraction of the nominal value, or
+        in %.
     """
     with db.read() as c:
         context = read_context(c, sid)
@@ -65,7 +66,7 @@ def show_sensitivity(
 
 
 def list_choices(c: Connection, session_id: str) -> dict[str, Any]:
-    """What the form offers, and the job that is at work or failed last."""
+    """Options of the form, and the running or last failed job."""
     newest = next(iter(jobs.of_session(c, session_id, kind=SENSITIVITY)), None)
     analysed = analyses.latest(c, session_id)
     names = [f.name for f in reference_files.list_files(c, session_id)]

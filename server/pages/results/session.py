@@ -1,4 +1,4 @@
-"""The report of a session: the overview, all curves, and the sheets of paper."""
+"""Report of a session: overview, all curves, and printed pages."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def show_overview(
     sid: Id,
     who: Annotated[Identity, require(Action.READ_SESSION)],
 ) -> Response:
-    """Is the data good, how does this person walk."""
+    """Data quality and summary of the gait."""
     return _show_report(request, db, reviewed, sid, who, OVERVIEW)
 
 
@@ -127,7 +127,9 @@ def show_values(
     sid: Id,
     who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
-    """All other values by group: a page, and the part of the overview that opens with its first fold."""
+    """All other values by group: a page, and the part of the overview loaded with its first expanded
+    group.
+    """
     template = VALUES if FRAGMENT in request.headers else "values.html"
     return _show_report(request, db, reviewed, sid, who, template)
 
@@ -142,7 +144,7 @@ def show_print(
     who: Annotated[Identity, require(Action.READ_RESULT)],
     named: bool = False,
 ) -> Response:
-    """Sheets of A4 for the browser's own print: in short, all values, curves; with the name if asked for."""
+    """A4 pages for the browser's print function: summary, all values, curves; with the name if requested."""
     context = gather_report(db, reviewed, sid, who, PAPER)
     if context["report"] is None:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
@@ -171,7 +173,7 @@ def _show_report(
 
 
 def choose_template(template: str, context: Mapping[str, Any]) -> str:
-    """The template of a page, of daily life its own."""
+    """Template of a page; daily life has its own."""
     is_daily = context["session"].protocol == "activity"
     return daily.TEMPLATES.get(template, template) if is_daily else template
 
@@ -183,7 +185,7 @@ def gather_report(
     who: Identity,
     template: str,
 ) -> dict[str, Any]:
-    """What a page or the sheets of a session's report show; `report` is None where nothing is analysed."""
+    """Template context of a session's report; `report` is None if nothing is analysed."""
     paper = template == PAPER
     with db.read() as c:
         context = read_measured_context(c, sid)
@@ -222,7 +224,7 @@ def gather_report(
 def view_report(
     reviewed: ReviewedAnalyses, this: AnalysedSession, context: Mapping[str, Any], *, page: str
 ) -> Mapping[str, Any]:
-    """The report of an analysis with its charts drawn for a page; drawn once for the same records."""
+    """Report of an analysis with rendered charts, cached for the same records."""
     before: AnalysedSession | None = context.get("before")
     controls: Sequence[ControlVisit] = context["controls"]
     key = (
@@ -302,9 +304,9 @@ def _draw_report(
 
 
 def _follow(reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any]) -> TrendStrip | None:
-    """Speed and score up to this visit, of those walked alike; None on screen, of few, of poor data.
+    """Gait speed and score up to this visit under the same condition; None on screen or with too few visits.
 
-    The takes of a day are one visit, the last of them; those with poor or damaged data are left out.
+    Trials of one day form one visit, represented by the last; those with poor or damaged data are omitted.
     """
     alike: Sequence[tuple[AnalysedSession, VisitKind]] = context.get("alike", ())
     if model.headline is None or model.quality.kind == "bad" or len(alike) < LEAST_VISITS:
@@ -319,13 +321,13 @@ def _follow(reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str
 
 
 def _draw_panels(model: ReportModel, heights: Mapping[bool, int]) -> list[dict[str, Any]]:
-    """All cycle charts; those of the last row also say the unit of the x axis."""
+    """All cycle charts; those of the last row include the unit of the x axis."""
     last_row = len(model.panels) - COLUMNS
     return [draw_chart(p, heights[i >= last_row], x_unit=i >= last_row) for i, p in enumerate(model.panels)]
 
 
 def _list_for_clock(model: ReportModel, variables: Sequence[str]) -> dict[str, Any]:
-    """What the page's clock needs, with some variables' curves only, in whole degrees as it says them."""
+    """Data for the page's clock, with some curves only, rounded to whole degrees."""
     curves: Mapping[str, Any] = model.replay["curves"]  # type: ignore[assignment]
     spans: Sequence[Mapping[str, Any]] = model.replay["strides"]  # type: ignore[assignment]
     strides = [[s["side"], s["start_s"], s["end_s"], int(s["used"])] for s in spans]
@@ -341,7 +343,7 @@ def _list_for_clock(model: ReportModel, variables: Sequence[str]) -> dict[str, A
 
 
 def view_strides(model: ReportModel) -> dict[str, Any]:
-    """What overview and timeline say of the strides: how many, beside which norms, and why there are none."""
+    """Summary of strides for overview and timeline: number used, norms, and reason if there are none."""
     return {
         "used": model.used,
         "norm_source": model.norm_source,
@@ -352,7 +354,7 @@ def view_strides(model: ReportModel) -> dict[str, Any]:
 
 
 def explain_emptiness(model: ReportModel) -> str:
-    """Say why an analysis has no strides, or no squats, to show."""
+    """Reason why an analysis has no strides or squats to show."""
     causes = [w.message for code in NO_STRIDE_CODES for w in model.warnings if w.code == code]
     what = "squat" if any(name == SQUAT for name, _ in model.groups) else "stride"
     read = f"{seconds(model.duration_s)} of data were read, but no complete {what} was seen in them."
@@ -363,7 +365,7 @@ def explain_emptiness(model: ReportModel) -> str:
 
 
 def _notices(model: ReportModel) -> list[dict[str, Any]]:
-    """Notices by severity; those of one kind share a box, what stopped the analysis has its own place."""
+    """Notices by severity, grouped by kind; errors that stopped the analysis are shown separately."""
     boxes: dict[tuple[str, str], dict[str, Any]] = {}
     for w in sorted(model.warnings, key=lambda w: SEVERITIES.index(w.kind)):
         if w.message == model.problem:
@@ -376,7 +378,7 @@ def _notices(model: ReportModel) -> list[dict[str, Any]]:
 
 
 def _not_compared(session: Session, model: ReportModel) -> str | None:
-    """Why the table has no column of change, None where it has."""
+    """Reason why the table has no column of changes, None if it has."""
     if model.since is not None:
         return None
     if session.feedback:

@@ -1,4 +1,4 @@
-"""Which visits go into the tables of a study."""
+"""Selection of visits for the tables of a study."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TICKED_AT_MOST: Final = 100
 def show_study(
     request: Request, db: Db, choice: StudyVisits, who: Annotated[Identity, require(Action.EXPORT_STUDY)]
 ) -> Response:
-    """The visits that fit a choice, and their tables to download."""
+    """Visits that match the selection, and download of their tables."""
     with db.read() as c:
         found = studies.list_visits(c, who, choice)
     asked = {

@@ -1,4 +1,4 @@
-"""The takes of one visit beside each other, as the overview of each of them shows them."""
+"""Side-by-side trials of one visit, for the overview of each."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def view_takes(
     session_id: str,
     first: Sequence[ParameterRow],
 ) -> dict[str, Any] | None:
-    """The first values of every take of this visit and their mean; None where it has only this one."""
+    """First values of every trial of this visit and their mean; None with a single trial."""
     visit = visits.find_visit_of(done, session_id)
     if visit is None or len(visit.takes) < 2:
         return None

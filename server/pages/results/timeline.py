@@ -1,4 +1,4 @@
-"""Strides, events and signals over time, to look at and to correct."""
+"""Strides, events and signals over time, for review and correction."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def show_timeline(
     sid: Id,
     who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
-    """Strides, events and signals over time, to look at and to correct."""
+    """Strides, events and signals over time, for review and correction."""
     with db.read() as c:
         context = read_measured_context(c, sid)
         if elsewhere := lead_to_days(context):
@@ -61,7 +61,7 @@ def show_numbers(
     sid: Id,
     who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
-    """The part of the timeline page that follows an edit; asked for in another way, the page itself."""
+    """Part of the timeline page updated after an edit; redirects to the page if requested directly."""
     if FRAGMENT not in request.headers:
         return RedirectResponse(f"/sessions/{sid}/timeline#numbers", status_code=303)
     with db.read() as c:
@@ -79,13 +79,13 @@ def read_model(
     edits: edit_log.EditHistory,
     context: Mapping[str, Any],
 ) -> ReportModel:
-    """The report of an analysis, compared with no visit."""
+    """Report of an analysis without comparison to other visits."""
     patient, session = context["patient"], context["session"]
     return reports.read(reviewed, found, edits, patient, session, None, context["controls"])[1]
 
 
 def view_numbers(model: ReportModel) -> dict[str, Any]:
-    """What of the report stands beside the timeline and changes with every edit."""
+    """Part of the report shown with the timeline, which changes with every edit."""
     return {
         **view_strides(model),
         "first": select_first(model),

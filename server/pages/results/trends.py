@@ -1,4 +1,4 @@
-"""Figures over the visits of a patient."""
+"""Parameters over the visits of a patient."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def show_trends(
     protocol: Protocol | None = None,
     like: Annotated[str | None, Query(pattern=HEX_ID)] = None,
 ) -> Response:
-    """Figures over the visits of a patient."""
+    """Parameters over the visits of a patient."""
     with db.read() as c:
         patient = patients.get(c, pid)
         done, plans = histories.read(c, patient)
@@ -88,7 +88,7 @@ def show_trends(
 
 
 def list_ahead(history: PatientHistory) -> list[PlannedAssessment]:
-    """Assessments of the newest programme that are still to come."""
+    """Upcoming assessments of the latest programme."""
     plans = history.programmes[:1]
     return [
         PlannedAssessment(v.label, v.planned_on)
@@ -99,11 +99,11 @@ def list_ahead(history: PatientHistory) -> list[PlannedAssessment]:
 
 
 def view_daily_trend(walked: PatientHistory | None, performance: Sequence[PerformanceDay]) -> dict[str, Any]:
-    """Capacity beside performance: charts over one time axis, and every value in a table.
+    """Capacity and performance on a common time axis, and a table of all values.
 
     Parameters
     ----------
-    walked : visits in the clinic that were walked alike, None where there is none.
+    walked : clinic visits under the same condition, None if there are none.
     """
     capacity = [] if walked is None else histories.read_capacity(walked)
     rows = [
@@ -139,7 +139,7 @@ def view_daily_trend(walked: PatientHistory | None, performance: Sequence[Perfor
 
 
 def draw_figures(history: PatientHistory, trained: str | None) -> dict[str, Any] | None:
-    """Five figures over the visits of one condition, each of one side; None without a visit.
+    """Five parameters over the visits of one condition, one side each; None without a visit.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def draw_figures(history: PatientHistory, trained: str | None) -> dict[str, Any]
 
 
 def _pick_side(trend: Trend, affected: Side | None) -> TrendSeries:
-    """The line that stands for a figure: of the affected side, else of the side further from the norm."""
+    """The side shown for a parameter: the affected side, otherwise the one further from the norm."""
     mine = next((line for line in trend.lines if line.side == affected), None)
     if mine is not None or trend.norm is None:
         return mine or trend.lines[0]
@@ -181,7 +181,7 @@ def _pick_side(trend: Trend, affected: Side | None) -> TrendSeries:
 
 
 def view_trends(history: PatientHistory, chosen: Sequence[str], height: int = 196) -> dict[str, Any]:
-    """The trends page: charts of the chosen figures, the choice, limits with sources, and the table.
+    """Template context: charts of the selected parameters, selection, limits with sources, and table.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def _figure(
 
 
 def _waiting(line: TrendSeries) -> str:
-    """What is said as long as there are not two assessments."""
+    """Text shown until there are two assessments."""
     if line.base is None:
         return "no assessment yet"
     if line.points[line.base].estimated:
@@ -276,7 +276,7 @@ def _column(v: AnalysedVisit) -> dict[str, Any]:
 
 
 def _rows(trend: Trend, visits: Sequence[AnalysedVisit]) -> list[dict[str, Any]]:
-    """A row per side: the value of every visit, then the verdict."""
+    """One row per side: values of all visits, then the assessment of the change."""
     rows = []
     for line in trend.lines:
         by_visit = {p.visit: p for p in line.points}

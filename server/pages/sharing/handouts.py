@@ -1,4 +1,4 @@
-"""What is handed out beside the report: the patient's leaflet, and the report over all visits."""
+"""Handouts in addition to the report: the patient's leaflet, and the report over all visits."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ CHART_HEIGHT: Final = 108
 def show_leaflet(
     request: Request, db: Db, reviewed: Reviewed, trail: OpenTrail, sid: Id, who: Reader
 ) -> Response:
-    """The leaflet for the patient: plain words, large print."""
+    """Leaflet for the patient in plain language and large print."""
     context = gather_leaflet(db, reviewed, sid)
     trail.record_opened(who, "leaflet.opened", "session", sid)
     return render_sheets(request, who, LEAFLET, **context)
@@ -58,7 +58,7 @@ def make_leaflet(
     sid: Id,
     who: Reader,
 ) -> Response:
-    """The same as PDF."""
+    """The leaflet as PDF."""
     context = gather_leaflet(db, reviewed, sid)
     trail.record_opened(who, "leaflet.opened", "session", sid)
     return print_pdf(request, settings, LEAFLET, context, f"leaflet-{sid[:8]}.pdf")
@@ -68,7 +68,7 @@ def make_leaflet(
 def show_course(
     request: Request, db: Db, reviewed: Reviewed, trail: OpenTrail, pid: Id, who: Reader
 ) -> Response:
-    """The report over all visits: the main figures with the measurement error, conditions, dates."""
+    """Report over all visits: main parameters with measurement errors, conditions, dates."""
     context = gather_course(db, reviewed, pid)
     trail.record_opened(who, "course.opened", "patient", pid)
     return render_sheets(request, who, COURSE, **context)
@@ -84,14 +84,14 @@ def make_course(
     pid: Id,
     who: Reader,
 ) -> Response:
-    """The same as PDF."""
+    """The report over all visits as PDF."""
     context = gather_course(db, reviewed, pid)
     trail.record_opened(who, "course.opened", "patient", pid)
     return print_pdf(request, settings, COURSE, context, f"course-{pid[:8]}.pdf")
 
 
 def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[str, Any]:
-    """What the leaflet of a walk shows; raises Conflict where there is no analysed walk."""
+    """Template context of the leaflet of a walk; raises Conflict if no walk is analysed."""
     with db.read() as c:
         patient = patients.get(c, sessions.get(c, sid).patient_id)
         done = histories.list_analysed(c, patient.id)
@@ -124,12 +124,12 @@ def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[s
 
 
 def _is_usable(numbers: Numbers) -> bool:
-    """Whether a number may be told, or be compared with: not of poor data."""
+    """Whether values may be reported and compared: not with poor data quality."""
     return numbers.verdict[0] != "bad"
 
 
 def gather_course(db: Database, reviewed: ReviewedAnalyses, pid: str) -> dict[str, Any]:
-    """What the report over the visits shows; raises Conflict where nothing is analysed."""
+    """Template context of the report over the visits; raises Conflict if nothing is analysed."""
     with db.read() as c:
         patient = patients.get(c, pid)
         done, plans = histories.read(c, patient)

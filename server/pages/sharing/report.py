@@ -1,4 +1,4 @@
-"""A session's report as a document: its PDF, signing, its versions, and who may read it by a link."""
+"""A session's report as a document: PDF, signing, versions, and links."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ Reader = Annotated[Identity, require(Action.READ_RESULT)]
 
 @router.get("/sessions/{sid}/report")
 def show_desk(request: Request, db: Db, sid: Id, who: Reader) -> Response:
-    """The therapist's text, signing, the versions that were signed, the links to them."""
+    """Assessment text, signing, signed versions and their links."""
     with db.read() as c:
         context = read_context(c, sid)
         if analyses.latest(c, sid) is None:
@@ -76,7 +76,7 @@ def make_draft(
     who: Reader,
     named: bool = False,
 ) -> Response:
-    """The report as it stands now, as PDF; it says that it is not signed, and whose it is if asked for."""
+    """Current report as PDF, marked as unsigned, with the patient's name if requested."""
     context = _gather(db, reviewed, sid, who)
     trail.record_opened(who, "report.opened", "session", sid)
     context |= name_on_paper(request, db, settings, who, context["patient"].id, named=named)
@@ -92,7 +92,7 @@ def sign(
     sid: Id,
     who: Annotated[Identity, require(Action.SIGN_REPORT)],
 ) -> dict[str, str]:
-    """Sign the report as it stands now: its document is made once, kept, and locked."""
+    """Sign the current report: its document is created once, stored and locked."""
     report_id, language = new_id(), language_of(request)
     with db.read() as c:
         signature = signed_reports.prepare_signature(c, sid, report_id, who.display_name)
@@ -112,7 +112,7 @@ def sign(
 
 @router.get("/signed-reports/{report_id}")
 def show_signed(db: Db, blobs: Blobs, trail: OpenTrail, report_id: Id, who: Reader) -> Response:
-    """A signed report, byte by byte as it was signed."""
+    """A signed report, exactly as signed."""
     with db.read() as c:
         session_id = signed_reports.get(c, report_id).session_id
         content = signed_reports.read_document(c, blobs, report_id)
@@ -124,7 +124,7 @@ def show_signed(db: Db, blobs: Blobs, trail: OpenTrail, report_id: Id, who: Read
 def show_signed_pdf(
     db: Db, blobs: Blobs, trail: OpenTrail, settings: Config, report_id: Id, who: Reader
 ) -> Response:
-    """The same as PDF."""
+    """The signed report as PDF."""
     with db.read() as c:
         found = signed_reports.get(c, report_id)
     trail.record_opened(who, "signed_report.opened", "session", found.session_id, {"report_id": report_id})
@@ -136,7 +136,7 @@ def show_signed_pdf(
 def show_shared(
     request: Request, db: Db, blobs: Blobs, trail: OpenTrail, throttle: Failures, token: str
 ) -> Response:
-    """The report that a link leads to, for who has its address; without the patient's code."""
+    """The report of a link, without the patient's code."""
     address = address_of(request)
     guessed = f"{SHARED} {address}"  # who guesses elsewhere stops nobody here
     try:

@@ -1,4 +1,4 @@
-"""The upload page: the files, what was found in them, which sensor is probably where."""
+"""Upload page: files, inspection results, and sensor placement."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def show_upload(
     who: Annotated[Identity, require(Action.READ_SESSION)],
     lengths: Annotated[bool, Query(description="show the lengths of the body at once")] = False,
 ) -> Response:
-    """Upload files, see what was found in them, say which sensor is where."""
+    """Upload files, view inspection results, and assign sensors to segments."""
     with db.read() as c:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
@@ -108,7 +108,7 @@ def show_upload(
 
 
 def view_upload(c: Connection, this: StoredRecording | None, s: Session, p: Patient) -> dict[str, Any]:
-    """Files of the session, the waiting inspection, what was found."""
+    """Template context: files of the session, running inspection, results."""
     files = [
         {"name": f.name, "size": f.size, "href": f"/api/v1/sessions/{s.id}/files/{quote(f.name)}"}
         for f in (this.files if this else ())
@@ -139,13 +139,13 @@ def view_upload(c: Connection, this: StoredRecording | None, s: Session, p: Pati
 
 
 def _asks_columns(manifest: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
-    """Whether a table may want to be described, or was: then its columns are shown."""
+    """Whether a table needs or has a mapping, so that its columns are shown."""
     left = any(n["code"] == "file_not_read" for n in found.get("notices", ()))
     return not found or left or any(s.get("columns") for s in manifest.get("sources") or ())
 
 
 def _said(tree: Mapping[str, Any]) -> dict[str, object]:
-    """Values by their path, without those nobody gave."""
+    """Values by path, omitting missing ones."""
     return {path: value for path, value in _paths(tree) if value is not None}
 
 
@@ -159,7 +159,7 @@ def _paths(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, obj
 
 
 def find_remembered(c: Connection, s: Session) -> Mapping[str, str | None]:
-    """Which sensor sat where at this patient's other visits, the newest analysed one that says so."""
+    """Sensor placement at this patient's latest other analysed visit that has one."""
     for other in reversed(histories.list_analysed(c, s.patient_id)):
         if other.session.id == s.id:
             continue
@@ -170,13 +170,13 @@ def find_remembered(c: Connection, s: Session) -> Mapping[str, str | None]:
 
 
 def _recall(c: Connection, this: StoredRecording, s: Session) -> LastPlaces:
-    """Where the sensors of this upload were in the clinic's last takes, those of other patients too."""
+    """Placement of this upload's sensors in the clinic's latest trials, including other patients'."""
     own = [d["device_id"] for d in (this.inspection or {})["devices"]]
     return recall_places(c, own, but=s.id)
 
 
 def fits_names(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, str | None]) -> bool:
-    """Whether no file and no sensor's name says another place, or such a place of another sensor."""
+    """Whether the placement is consistent with segments named by files or sensor labels."""
     by_name = [d for d in devices if d["basis"] in {"declared", "label"} and d["suggested"]]
     named = {d["device_id"]: d["suggested"] for d in by_name}
     taken = {segment: device for device, segment in named.items()}
@@ -184,7 +184,7 @@ def fits_names(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, str |
 
 
 def fits_movement(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, str | None]) -> bool:
-    """Whether a remembered mapping covers these sensors and does not contradict how they move now."""
+    """Whether a remembered mapping covers these sensors and is consistent with their movement."""
     own = {d["device_id"] for d in devices}
     worn = {device for device, segment in sensors.items() if segment}
     if not worn or not worn <= own:
@@ -205,16 +205,17 @@ def fits_movement(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, st
 def view_inspection(
     this: StoredRecording, earlier: Mapping[str, str | None], last: LastPlaces = NO_PLACES
 ) -> dict[str, Any]:
-    """What the inspection found: facts, sensors with their most likely segment, notices.
+    """Template context of an inspection: facts, sensors with their most likely segment, notices.
 
-    A sensor's place is, in this order: what a person set, what the files declare, that of this patient's last
-    visit with these sensors, what a name says, that of the clinic's last take with it, what movement
-    suggests. Earlier takes count as a whole or not at all: names or movement may contradict them.
+    The segment of a sensor is, in order of priority: set by the user, declared by the files, from this
+    patient's last visit with these sensors, from a name, from the clinic's last trial with it, suggested by
+    movement. Earlier placements are used as a whole or not at all, if inconsistent with names or movement.
 
     Parameters
     ----------
-    earlier : mapping of an earlier visit; used when it covers these sensors and fits how they move.
-    last : of the clinic's last takes; used where nothing else is known and it fits names and movement.
+    earlier : mapping of an earlier visit, used if it covers these sensors and fits their movement.
+    last : placement in the clinic's latest trials, used if nothing else is known and it fits names and
+        movement.
     """
     found: Mapping[str, Any] = this.inspection or {}
     devices: Sequence[Mapping[str, Any]] = found["devices"]
@@ -245,7 +246,7 @@ def view_inspection(
 def _as_before(
     chosen: Mapping[str, tuple[str | None, str | None]], last: LastPlaces
 ) -> dict[str, Any] | None:
-    """How many places were taken over from an earlier take and from whose, for one notice; None = none."""
+    """Number of placements taken from an earlier trial and its origin, for one notice; None = none."""
     bases = [basis for segment, basis in chosen.values() if segment]
     for basis in ("remembered", "last_take"):
         if n := bases.count(basis):
@@ -260,7 +261,7 @@ def _segment(
     past: Mapping[str, str | None],
     usual: Mapping[str, str | None],
 ) -> tuple[str | None, str | None]:
-    """Segment to preselect and what that rests on; of a leg whose side is unknown, leg 1 is tried as left."""
+    """Segment to preselect and its basis; for a leg of unknown side, leg 1 is assumed to be left."""
     if device["device_id"] in said:
         return said[device["device_id"]], "manifest"
     if device["declared"]:
@@ -299,7 +300,7 @@ def _sensor(device: Mapping[str, Any], segment: str | None) -> dict[str, Any]:
 
 
 def quote_id(sensor: str) -> str:
-    """The id of a sensor, which may be the name of a file, in a sentence; a segment by its name."""
+    """A sensor id in a sentence, quoted as it may be a file name; a segment by its name."""
     return SEGMENT_NAMES.get(sensor) or quote_text(UserText(sensor))
 
 
@@ -336,7 +337,7 @@ def _at_rest(still: Sequence[float]) -> str:
 
 
 def _notices(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
-    """Every notice once; copies are gathered into one sentence, unused files have their own list."""
+    """Distinct notices; file copies share one sentence, unused files are listed separately."""
     copies = [d for d in devices if d["duplicate_of"]]
     notices = []
     if copies:

@@ -1,4 +1,4 @@
-"""Cycle curves, range bars and the stride strip, for page and print alike (server/report/charts/svg.py)."""
+"""Cycle curves, range bars and the stride strip, for pages and print (server/report/charts/svg.py)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ X_TICKS: Final = (0, 20, 40, 60, 80, 100)
 
 @dataclass(frozen=True)
 class CycleWords:
-    """What a chart goes over, what its parts are called, and the unit of its x axis."""
+    """Name of the cycle, name of its parts, and unit of the x axis."""
 
     over: str
     counted: str
@@ -58,21 +58,21 @@ def cycle_svg(
     earlier: CurvePanel | None = None,
     over: CycleWords = STRIDE,
 ) -> str:
-    """Draw one panel: band, grid, foot-off, single strides, means, cursor, words, from back to front.
+    """Draw one chart from back to front: band, grid, foot-off, single strides, means, cursor, text.
 
     Parameters
     ----------
-    height : px with margins, of which the stylesheet gives 18 above and 20 (34 with `x_unit`) below.
-    x_unit : print the unit of the x axis below; once per column. over : what the curves go over.
-    single_strides : draw thin strides, each a path with its number in the stride list as `data-stride`.
-    glance : of single strides draw at most `GLANCE_STRIDES` a side, spread over the take, and those and the
-        norm in steps of 4 %, means in steps of 2 %: a third of the bytes.
-    earlier : the same variable in an earlier session; its means are drawn thin, behind.
+    height : px including margins, which the stylesheet sets to 18 above and 20 (34 with `x_unit`) below.
+    x_unit : print the unit of the x axis; once per column. over : cycle of the curves.
+    single_strides : draw thin single strides, each a path with its index in the stride list as `data-stride`.
+    glance : draw at most `GLANCE_STRIDES` single strides per side, spread over the trial; these and the norm
+        in steps of 4 %, means in steps of 2 %, which takes a third of the bytes.
+    earlier : the same variable in an earlier session; its means are drawn thin, in the background.
 
     Returns
     -------
     str
-        A `<div class="chart cycle">`; empty when the panel has no curve.
+        A `<div class="chart cycle">`; empty if the panel has no curve.
     """
     if panel.reason is not None:
         return ""
@@ -112,11 +112,11 @@ def range_svg(
     scale: tuple[float, float],
     width: int = 120,
 ) -> str:
-    """Draw one row of the parameter table: norm ± 1 SD as a box with its mean, values clipped at the ends.
+    """Draw one row of the parameter table: norm ± 1 SD as a box with its mean; values are clipped.
 
     Parameters
     ----------
-    marks : "left" a filled disc, "right" a ring, "both" a disc in ink → value.
+    marks : "left" (filled disc), "right" (ring) or "both" (dark disc) → value.
     norm : mean and standard deviation.
     """
     boxes = [] if norm is None else [(norm[0] - norm[1], norm[0] + norm[1])]
@@ -124,10 +124,10 @@ def range_svg(
 
 
 def strip_svg(strides: Strides, duration_s: float, height: int = 92) -> str:
-    """Draw all strides over time: stance full, swing light, left out faded with a cross, a line for now.
+    """Draw all strides over time with the cursor: stance solid, swing light, excluded ones faded and crossed.
 
-    Every stride is a `<g>`, in the order of the stride list. One left out says why; the page's script names
-    the others, which are many.
+    Every stride is a `<g>`, in the order of the stride list. Excluded strides state their reason; labels of
+    the others are added by the page's script, as there are many.
     """
     plot_height = height - 24
     marks = "".join(_stride_mark(s, duration_s) for s in strides.strides)
@@ -220,17 +220,17 @@ class _CyclePlot(PlotArea):
         return [f"{10 * i} {v}" for i, v in enumerate(self._heights(angle))]
 
     def _heights(self, angle: Floats) -> list[int]:
-        """Whole thousandths of the plot from its top."""
+        """Integer thousandths of the plot from its top."""
         heights: list[int] = np.rint(1000 * (self.high - angle) / (self.high - self.low)).astype(int).tolist()
         return heights
 
     def _path(self, angle: Floats, step: int) -> str:
-        """The curve in % of the plot, interrupted where it has no value."""
+        """Path of a curve in % of the plot, interrupted where it has no value."""
         known = find_runs(np.isfinite(angle))
         return "".join(self._run(angle[a:b], step, a) for a, b in known)
 
     def _run(self, angle: Floats, step: int, first: int) -> str:
-        """One piece of a curve: its first point, then where each next one lies from the last."""
+        """One continuous part of a curve: its first point, then relative moves."""
         y = self._heights(angle)
         across = 10 * step
         moves = " ".join([f"{across}{b - a:+d}" for a, b in pairwise(y)])

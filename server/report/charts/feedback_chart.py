@@ -1,7 +1,7 @@
-"""Draws a take with feedback: every stride over the zone of its level, filled with feedback, open without.
+"""Chart of a trial with feedback: strides over the zone of their level, solid with feedback, open without.
 
-The rules are those of the cycle curves (server/report/charts/svg.py): the plot stretches, dots and text do
-not.
+Follows the conventions of the cycle curves (server/report/charts/svg.py): the plot stretches, dots and text
+do not.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ NARROW: Final = 50.0
 
 
 def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str:
-    """Draw the strides in their order.
+    """Draw the strides in order.
 
     Parameters
     ----------
@@ -69,12 +69,12 @@ def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str
 
 
 def _opens(m: MatchedStride) -> bool:
-    """The stride is of the block a visit begins with, which may have no level yet."""
+    """Whether the stride belongs to the opening block of a visit, which may have no level yet."""
     return m.cue.why_not in {"baseline", "retention"}
 
 
 def _block(m: MatchedStride) -> str:
-    """Word of a block without feedback, "" in training."""
+    """Name of a block without feedback, "" in training."""
     why = m.cue.why_not
     if why == "baseline":
         return "before"
@@ -84,7 +84,7 @@ def _block(m: MatchedStride) -> str:
 def _runs(
     strides: Sequence[MatchedStride], key: Callable[[MatchedStride], object]
 ) -> Iterator[tuple[int, int, MatchedStride]]:
-    """First and last number of strides in a row with the same key, and the first of them."""
+    """First and last index of consecutive strides with the same key, and the first stride."""
     start = 0
     for _, group in groupby(strides, key):
         found = list(group)
@@ -93,7 +93,7 @@ def _runs(
 
 
 def _range(strides: Sequence[MatchedStride], content: Prescription) -> tuple[float, float]:
-    """Ends of the value axis: zones and values, but not what lies far off."""
+    """Limits of the value axis: zones and values, excluding distant outliers."""
     low = min(m.cue.zone_low for m in strides)
     high = max(m.cue.zone_high for m in strides)
     width = (content.target.sd or 0.0) * content.progression.sd_per_level or (high - low)

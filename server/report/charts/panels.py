@@ -1,4 +1,4 @@
-"""Cycle curves as they are drawn and tabled: degrees, left and right, the norm where comparable."""
+"""Cycle curves for charts and tables: degrees, left and right, with norms where comparable."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ DRAWN_STRIDES: Final = 40
 
 @dataclass(frozen=True, eq=False)
 class SideCurve:
-    """One side of one variable.
+    """Curve of one side of one variable.
 
     Parameters
     ----------
-    mean_deg, sd_deg : (101,) over the counted strides; None without strides, sd also with one. NaN where the
-        leg model's knee rests on its limit in most strides.
-    n : strides behind the mean. strides : index in the stride list → (101,) deg, counted strides to draw, NaN
-        where they rest there.
-    foot_off_pct, foot_off_sd : terminal contact, % of cycle, None if not found.
+    mean_deg, sd_deg : (101,) over the included strides; None without strides, sd also with one. NaN where the
+        knee of the leg model is at its limit in most strides.
+    n : number of strides in the mean. strides : index in the stride list → (101,) deg, included strides to
+        draw, NaN where the knee is at its limit.
+    foot_off_pct, foot_off_sd : foot-off, % of cycle, None if not detected.
     """
 
     mean_deg: Floats | None
@@ -65,14 +65,14 @@ class CurvePanel:
 
     Parameters
     ----------
-    title : with the zero in words, "Knee flexion, from standing".
-    zero : what the curves are measured from, None without angles. added_deg : what of it a goniometer read,
-        by side, and was added; empty from standing.
-    low_confidence : frontal and transverse planes, and joints without a sensor on both of their segments.
+    title : including the zero, "Knee flexion, from standing".
+    zero : zero of the curves, None without angles. added_deg : goniometer reading added to it, by side; empty
+        if relative to standing.
+    low_confidence : frontal and transverse planes, and joints without a sensor on both segments.
     reason : why there is no curve, None if there is one.
-    norm : band to draw, of the same zero; None where there is none. norm_note : what must be said about it,
-        or why there is none though a norm exists.
-    comfortable : the same people's band at their comfortable speed, where `norm` is at the person's own.
+    norm : band with the same zero; None if there is none. norm_note : remarks on the norm, or why an existing
+        norm is not shown.
+    comfortable : band of the same group at comfortable speed, if `norm` is at the patient's speed.
     """
 
     variable: Variable
@@ -90,15 +90,15 @@ class CurvePanel:
 def curve_panels(
     bundle: Bundle, curves: CycleCurves | None, norms: Norms, own: Norms | None = None
 ) -> tuple[CurvePanel, ...]:
-    """All panels in reading order; a variable without a curve keeps its place and says why.
+    """All panels in display order; a variable without a curve keeps its place with a reason.
 
-    Where a goniometer was used on both sides the curves are anatomical, else from standing.
+    Curves are anatomical if a goniometer was used on both sides, otherwise relative to standing.
 
     Parameters
     ----------
     curves : of the bundle's angles over its strides, None without angles.
-    norms, own : published reference, and the clinic's own controls; the first that has a band of the same
-        zero gives it, to a variable that sensors measure.
+    norms, own : published reference, and the clinic's own controls; the first with a band of the same zero is
+        used, for measured variables only.
     """
     estimated = list_estimated_variables(bundle.estimator)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
@@ -116,8 +116,9 @@ def curve_panels(
 
 
 def same_zero(before: CurvePanel, after: CurvePanel) -> tuple[CurvePanel, CurvePanel]:
-    """Two panels of a variable to be drawn in one: both from standing unless both are anatomical; the earlier
-    one without curves where only one of them comes from a take in which somebody stood."""
+    """Convert two panels of a variable to a common zero: relative to standing unless both are anatomical. The
+    earlier one loses its curves if only one trial includes quiet standing.
+    """
     if before.zero == after.zero or None in (before.zero, after.zero):
         return before, after
     if "walking" in (before.zero, after.zero):
@@ -181,7 +182,7 @@ def _title(variable: Variable, zero: Zero | None) -> str:
 
 
 def _moved(curve: SideCurve, by_deg: float) -> SideCurve:
-    """The curve with its zero moved."""
+    """The curve with a shifted zero."""
     if by_deg == 0.0 or curve.mean_deg is None:
         return curve
     strides = {i: row + by_deg for i, row in curve.strides.items()}

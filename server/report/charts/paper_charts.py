@@ -1,4 +1,4 @@
-"""Figures of a page as a renderer of paper needs them, which knows no style of the page inside of an `<svg>`.
+"""Prepares charts for a print renderer, which does not apply the page's styles inside an `<svg>`.
 
 On a page charts stretch with their column, strokes keep their width, and colours come from the design tokens
 (server/report/charts/svg.py). Here each chart gets its width in px, its shapes are moved to it, the margins
@@ -35,13 +35,13 @@ _NOT_HERE: Final = ("vector-effect", "paint-order", "cursor", "font-variant-nume
 
 @dataclass(frozen=True)
 class ChartStyles:
-    """What style sheets say of charts.
+    """Chart-related part of style sheets.
 
     Parameters
     ----------
-    rules : the rules for what is inside of a chart, colours written out.
+    rules : rules for elements within a chart, with colours resolved.
     margins : class of a chart → top, right, bottom, left in px.
-    tokens : design tokens as paper has them.
+    tokens : design tokens for print.
     """
 
     rules: str
@@ -73,7 +73,7 @@ def read_chart_styles(styles: str) -> ChartStyles:
 
 
 def prepare_figures(page: Element, styles: ChartStyles) -> None:
-    """Rewrite every figure of a page in its tree."""
+    """Rewrite all charts in the tree of a page."""
     parents = {child: parent for parent in page.iter() for child in parent}
     symbols = {s.get("id"): s for s in page.iter(f"{SVG}symbol")}
     patterns = list(page.iter(f"{SVG}pattern"))
@@ -119,7 +119,7 @@ def _draw_chart(figure: Element, classes: list[set[str]], styles: ChartStyles) -
 
 
 def _fix_size(figure: Element, width: float, height: float) -> None:
-    """Give what is measured in parts of the plot area its place in px."""
+    """Convert relative sizes and positions of a plot area to px."""
     for part in list(figure):
         if part.get("hidden") is not None or "cursor" in _classes(part):
             figure.remove(part)
@@ -153,7 +153,7 @@ def _stretch(group: Element, x: float, y: float) -> None:
 
 
 def stretch_path(path: str, x: float, y: float) -> str:
-    """A path of straight lines (M L H V, their small letters, Z), each number times that of its axis.
+    """Scale a path of straight lines (M L H V, lower case too, Z) along each axis.
 
     >>> stretch_path("M0 500l20-10H40v5z", 0.5, 2.0)
     'M 0.00 1000.00 l 10.00 -20.00 H 20.00 v 10.00 z'
@@ -191,7 +191,7 @@ def _write_out(text: str, tokens: Mapping[str, str]) -> str:
 
 
 def _read_margin(text: str) -> tuple[float, float, float, float]:
-    """The four lengths of a `padding` in px."""
+    """Parse the four lengths of a `padding` in px."""
     found = [float(n.removesuffix("px")) for n in text.split() if re.fullmatch(r"[\d.]+(px)?", n)]
     top = found[0] if found else 0.0
     right = found[1] if len(found) > 1 else top

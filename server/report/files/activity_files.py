@@ -1,9 +1,9 @@
-"""The files of a take of daily life, written and read back (what they hold: core/activity/result.py).
+"""Result files of a daily-life recording (for their content see core/activity/result.py).
 
 activity.json              device, periods of wear, days, hours, transitions, candidates, bouts, turns
-activity_spans.parquet     the day from end to end: start_s, end_s, kind, confidence, evidence
+activity_spans.parquet     the entire day: start_s, end_s, kind, confidence, evidence
 activity_spans.csv         the same as text
-activity_inclination.parquet  t_s (whole seconds) and inclination_deg, null where it is not known
+activity_inclination.parquet  t_s (whole seconds) and inclination_deg, null if unknown
 activity_steps.parquet     time_s of every step
 transitions.csv            transitions and candidates in order of time
 walking_bouts.csv          walking bouts
@@ -53,7 +53,7 @@ STEPS: Final = "activity_steps.parquet"
 
 
 def write_activity(found: ActivityResult) -> dict[str, bytes]:
-    """Write what the monitor found as files, name → bytes."""
+    """Write the result of activity monitoring as files, name → bytes."""
     return {
         NAME: json.dumps(summarise_activity(found), ensure_ascii=False, allow_nan=False, indent=1).encode(),
         SPANS: _spans_parquet(found.spans),
@@ -83,7 +83,7 @@ def write_activity(found: ActivityResult) -> dict[str, bytes]:
 
 
 def summarise_activity(found: ActivityResult) -> dict[str, object]:
-    """Content of activity.json: all but spans, steps and the inclination, which are columns."""
+    """Content of activity.json: everything except spans, steps and inclination, which have own files."""
     return {
         "schema": SCHEMA,
         "segment": found.segment,
@@ -109,7 +109,7 @@ def summarise_activity(found: ActivityResult) -> dict[str, object]:
 
 
 def read_activity(files: Mapping[str, bytes]) -> ActivityResult:
-    """Read back what `write_activity` wrote.
+    """Read the files of `write_activity`.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def read_activity(files: Mapping[str, bytes]) -> ActivityResult:
 
 
 def _transitions_csv(found: ActivityResult) -> bytes:
-    """Those that count and those that do not, told apart by `status`."""
+    """Transitions and rejected candidates, distinguished by `status`."""
     rows: list[tuple[object, ...]] = [
         (
             t.time_s,

@@ -1,4 +1,4 @@
-"""The files that a comparison of filters yields, the same for the page and the downloads.
+"""Result files of a filter comparison, for page and downloads.
 
 filters.json       everything: filters, spread over time and cycle, reference, provenance (schema 1)
 filters.csv        one row per filter: cost and agreement
@@ -62,9 +62,9 @@ def filter_run_files(found: FilterComparison) -> dict[str, bytes]:
 
 
 def orientations_parquet(found: FilterComparison, most_rows: int = MOST_ROWS) -> bytes:
-    """Orientations as Parquet: `t_s` (float64), `segment`, `filter`, `qw` … `qz` (float32), null where lost.
+    """Orientations as Parquet: `t_s` (float64), `segment`, `filter`, `qw` … `qz` (float32), null if lost.
 
-    `sample_step` beside the columns says which samples are in the file: all (1), every second (2) …
+    The metadata entry `sample_step` gives the decimation: all samples (1), every second (2) …
     """
     parts = [(f.label, s, q) for f in found.filters for s, q in found.orientations.get(f.name, {}).items()]
     step = max(1, -(-len(found.t_s) * len(parts) // most_rows))
@@ -81,7 +81,7 @@ def orientations_parquet(found: FilterComparison, most_rows: int = MOST_ROWS) ->
 
 
 def bin_values(values: Floats, reduce: Any) -> Floats:
-    """At most BINS values, each of one stretch (m,) by a function that leaves NaN out; NaN where all are."""
+    """Reduce values to at most BINS bins with a function that ignores NaN; NaN where all values are."""
     size = -(-len(values) // BINS)
     padded = np.pad(values, (0, -len(values) % size), constant_values=np.nan).reshape(-1, size)
     out = np.full(len(padded), np.nan)
@@ -125,7 +125,7 @@ def _row(f: FilterAgreement) -> dict[str, object]:
 
 
 def _score(score: OrientationScore | None) -> dict[str, float] | None:
-    """Degrees; None stays None."""
+    """Convert to degrees; None remains None."""
     return None if score is None else {name: _deg(getattr(score, name)) for name in SCORES}
 
 
@@ -226,7 +226,7 @@ def _time_csv(spreads: Sequence[FilterSpread], t_s: Floats) -> bytes:
 
 
 def _reference_csv(found: FilterComparison, r: ReferenceScores) -> bytes:
-    """RMSE of whole orientations has no bias; that of angles has bias and limits."""
+    """Agreement with the reference: RMSE for orientations; bias and limits as well for angles."""
     label = {f.name: f.label for f in found.filters}
 
     def rows() -> Iterator[Sequence[object]]:

@@ -1,4 +1,4 @@
-"""Two sessions of a person side by side: every figure before and after, the change and its verdict."""
+"""Comparison of two sessions of a patient: all parameters before and after, changes and their assessment."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ NormsOfTwo = tuple[Norms, Norms]
 
 @dataclass(frozen=True)
 class ComparedRow:
-    """A figure of one side, or of the whole take.
+    """A parameter of one side or of the whole trial.
 
     Parameters
     ----------
-    before, after : as printed, "–" where not measured. reason : why there is no number after, else None.
+    before, after : as printed, "–" if not measured. reason : why the later value is missing, otherwise None.
     """
 
     title: str
@@ -50,11 +50,11 @@ class ComparedRow:
 def compare_figures(
     before: Numbers, after: Numbers, norms: NormsOfTwo | None = None, affected: Side | None = None
 ) -> tuple[Change, ...]:
-    """What changed of every figure that either session has, in the order of the table.
+    """Changes of all parameters present in either session, in table order.
 
     Parameters
     ----------
-    norms : of the earlier and of the later session, each at its own speed; without them changes have no
+    norms : for the earlier and the later session, each at its own speed; without them changes have no
         direction.
     """
     known = None if norms is None else (norms[0].values, norms[1].values)
@@ -76,7 +76,7 @@ def compare_rows(
     *,
     comparable: bool = True,
 ) -> tuple[ComparedRow, ...]:
-    """The table of a comparison; without verdicts where the two were not walked alike."""
+    """Table of a comparison; changes are not assessed if the walking conditions differ."""
     reasons = {(p.name, p.side): p.reason for p in collect_figures(after)}
     rows = []
     for found in compare_figures(before, after, norms, affected):
@@ -93,10 +93,10 @@ def compare_rows(
 
 
 def add_changes(groups: Sequence[Group], found: Sequence[Change]) -> tuple[Group, ...]:
-    """Rows of a session's table with their change since an earlier one, where both have a number.
+    """Add changes since an earlier session to the rows of a table, where both have a value.
 
-    Of a number that is not measured alike it says so. A level from the anatomical zero shows the change of
-    the same one from standing, which every visit has.
+    Values with different measurement methods are marked as such. An angle relative to the anatomical zero
+    shows the change relative to standing, which is available at every visit.
     """
     words: dict[str, list[ChangeWords]] = {}
     for c in found:
@@ -114,7 +114,7 @@ def add_changes(groups: Sequence[Group], found: Sequence[Change]) -> tuple[Group
 
 
 def comparison_csv(rows: Sequence[ComparedRow]) -> bytes:
-    """One row per figure and side, numbers in full."""
+    """One row per parameter and side, with unrounded numbers."""
     header = (
         *("name", "side", "unit", "before", "after", "change", "verdict", "towards_norm"),
         *("mdc", "mdc_source", "mcid", "mcid_source", "reason"),

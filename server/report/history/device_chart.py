@@ -1,4 +1,4 @@
-"""Draws what the takes showed of a sensor over their days, by the rules of the trends (trend_chart.py)."""
+"""Charts of a sensor's checks over time, following the conventions of trends (trend_chart.py)."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def draw_device(
     least: float,
     band: tuple[float, float] | None = None,
 ) -> str | None:
-    """Draw a figure of a sensor over the days of its takes; None where it was never measured.
+    """Draw a quantity of a sensor over the dates of its trials; None if it was never measured.
 
     Parameters
     ----------
-    least : height of the value axis that is not fallen below, so that noise does not look like a change.
-    band : within which a value is no change.
+    least : minimum range of the value axis, so that noise does not look like a change.
+    band : range of values that are not a change.
     """
     there = [(x, v) for x, v in zip(_places(days), values, strict=True) if v is not None]
     if not there:
@@ -56,7 +56,7 @@ def draw_device(
 
 
 def _name_days(plot: PlotArea, days: Sequence[dt.date]) -> None:
-    """Days under the axis, the first and the last before those between."""
+    """Dates below the axis, giving priority to the first and last."""
     at = _places(days)
     taken: list[float] = []
     for i in (0, len(days) - 1, *range(1, len(days) - 1)):
@@ -67,7 +67,7 @@ def _name_days(plot: PlotArea, days: Sequence[dt.date]) -> None:
 
 
 def _places(days: Sequence[dt.date]) -> list[float]:
-    """Where takes stand on the axis, 0 to 1000; takes of one day lie beside each other."""
+    """Positions of trials on the axis, 0 to 1000; trials of one day are placed side by side."""
     span = (days[-1] - days[0]).days
     if span == 0:
         n = len(days)

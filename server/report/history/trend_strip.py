@@ -1,4 +1,4 @@
-"""The trend on the first sheet of paper: speed and score over the visits walked alike, in three lines."""
+"""Trend on the first printed page: speed and score over comparable visits, in three lines."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ WIDTH, HEIGHT, ROOM = 74, 15, 4
 
 @dataclass(frozen=True)
 class TrendStripLine:
-    """One side of a figure, or the whole take.
+    """One side of a parameter, or the whole trial.
 
     Parameters
     ----------
-    values : as printed, one per shown visit; "–" where there is none. estimated : which of them are.
-    change : of the last visit since `since`, None where either has no value. limit : its measurement error
-        (MDC), "" where none is known. why_none : no change is said, "" where one is or the last visit has
-        no value. since : day of the visit that it counts from, None = the first one.
+    values : as printed, one per displayed visit; "–" if missing. estimated : mask of estimated values.
+    change : of the last visit since `since`, None if either has no value. limit : its measurement error
+        (MDC), "" if unknown. why_none : reason for a missing change, "" if there is one or the last visit has
+        no value. since : date of the base visit, None = the first one.
     """
 
     title: str
@@ -63,14 +63,14 @@ class TrendStripLine:
 
 @dataclass(frozen=True)
 class TrendStrip:
-    """The lines over the shown visits.
+    """The lines over the displayed visits.
 
     Parameters
     ----------
-    days : of the shown visits, oldest first. hidden : how many visits between the first two are not shown.
-    missing : day and reason of each value that is not there, the same ones once.
-    later : title and day of what changed since a later visit than the first, which has no value to compare
-        with: none, an estimated one, or one of training.
+    days : of the displayed visits, oldest first. hidden : number of omitted visits between the first two.
+    missing : date and reason of each missing value, without repetition.
+    later : title and date for changes since a later visit than the first, whose value is missing, estimated
+        or from a training.
     """
 
     days: tuple[dt.date, ...]
@@ -81,11 +81,11 @@ class TrendStrip:
 
 
 def trend_strip(visits: Sequence[AnalysedVisit], affected: Side | None = None) -> TrendStrip | None:
-    """Follow speed and score up to the last of these visits; None of fewer than three.
+    """Trend of speed and score up to the last of these visits; None for fewer than three.
 
     Parameters
     ----------
-    visits : walked alike, oldest first. affected : side, None = none or both.
+    visits : under the same condition, oldest first. affected : side, None = none or both.
     """
     if len(visits) < LEAST_VISITS:
         return None
@@ -146,7 +146,7 @@ def _explain(visit: AnalysedVisit, name: str, side: Side | None) -> str:
 
 
 def _draw_line(line: TrendSeries, visits: Sequence[AnalysedVisit]) -> str:
-    """A small line over the days of all visits, the measurement error around its base as a band."""
+    """A small line over the dates of all visits, with the measurement error of its base as a band."""
     first = visits[0].performed_on
     days = max(1, (visits[-1].performed_on - first).days)
     band = () if line.mdc is None else (line.start - line.mdc, line.start + line.mdc)

@@ -1,4 +1,4 @@
-"""What is behind a number: the strides it is the mean of, and those it is not, each with its moment."""
+"""Strides of a parameter, included and excluded, each with its time."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CSS: Final[dict[Side, tuple[str, float]]] = {"left": ("dl", 5.2), "right": ("dr"
 
 @dataclass(frozen=True)
 class StrideValue:
-    """The figure of one stride, null where it has none; `index` is its place in the stride list."""
+    """Value of one stride, null if missing; `index` is its position in the stride list."""
 
     index: int
     side: Side
@@ -45,8 +45,8 @@ class ParameterStrides:
 
     Parameters
     ----------
-    row : as in the table. definition : in a sentence. strides : of the whole list; empty for a figure that is
-        not one of strides. svg : its strides over time, empty without any.
+    row : as in the table. definition : in a sentence. strides : all strides; empty for a parameter not based
+        on strides. svg : chart of the strides over time, empty without any.
     """
 
     row: ParameterRow
@@ -55,7 +55,7 @@ class ParameterStrides:
     svg: str
 
     def to_json(self) -> dict[str, object]:
-        """The same as plain values for JSON."""
+        """Convert to JSON types."""
         content = {
             "parameter": self.row,
             "definition": self.definition,
@@ -68,11 +68,11 @@ class ParameterStrides:
 def open_row(
     row: ParameterRow, strides: Strides, column: Column | None, duration_s: float
 ) -> ParameterStrides:
-    """Open a row of the table.
+    """Strides of a table row.
 
     Parameters
     ----------
-    column : the figure of every stride of the list, None where it is not one of strides.
+    column : values of all strides, None if the parameter is not based on strides.
     """
     digits = CATALOGUE[row.name].digits if row.name in CATALOGUE else 2
     values = () if column is None else tuple(
@@ -92,7 +92,9 @@ def open_row(
 
 
 def _chart(row: ParameterRow, values: Sequence[StrideValue], duration_s: float) -> str:
-    """Every stride as a mark that leads to its moment, the norm as a band, means of the counted as lines."""
+    """Chart of all strides as linked marks, with the norm as a band and means of the included ones as
+    lines.
+    """
     shown = [s for s in values if s.value is not None]
     if not shown or duration_s <= 0.0:
         return ""

@@ -1,7 +1,7 @@
-"""Drawings of daily life: the ribbon of a day, trunk inclination below it, walking bouts, steps.
+"""Charts of daily life: activity ribbon, trunk inclination, walking bouts, steps.
 
-A kind is told by its colour and by the height of its bar; what is not known is hatched or dotted. The rules
-are those of all charts (server/report/charts/svg.py).
+Activities are distinguished by colour and bar height; unknown periods are hatched or dotted. Follows the
+conventions of all charts (server/report/charts/svg.py).
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ LEAN_RANGE: Final = (-90.0, 90.0)
 
 
 def ribbon_svg(found: ActivityResult, day: DayTotals) -> str:
-    """Draw 24 hours of what the person did."""
+    """Draw the activities of 24 hours."""
     plot = PlotArea((0.0, 1.0), RIBBON_PX)
     for hour in range(25):
         plot.add_upright("ax" if hour % 6 == 0 else "g", 1000 * hour / 24)
@@ -82,7 +82,7 @@ def ribbon_svg(found: ActivityResult, day: DayTotals) -> str:
 
 
 def kind_swatch(kind: ActivityKind) -> str:
-    """Draw the sign of a kind for the legend."""
+    """Draw the legend symbol of an activity."""
     width, height = 26, 14
     top = format_coordinate(height * (1.0 - LEVELS[kind]))
     box = f'x="0" y="{top}" width="{width}" height="{format_coordinate(height * LEVELS[kind])}"'
@@ -95,7 +95,7 @@ def kind_swatch(kind: ActivityKind) -> str:
 
 
 def inclination_svg(found: ActivityResult, day: DayTotals) -> str:
-    """Draw the inclination of the trunk over 24 hours: median and the middle 80 % of every ten minutes."""
+    """Draw trunk inclination over 24 hours: median and central 80 % of every ten minutes."""
     plot = PlotArea(LEAN_RANGE, RIBBON_PX)
     for hour in range(0, 25, 6):
         plot.add_upright("ax", 1000 * hour / 24)
@@ -123,13 +123,13 @@ def inclination_svg(found: ActivityResult, day: DayTotals) -> str:
 
 
 def bouts_svg(bins: Sequence[BoutBin]) -> str:
-    """Draw the number of walking bouts by their length."""
+    """Draw the number of walking bouts by length."""
     bars = [(b.label, float(b.bouts), True) for b in bins]
     return bars_svg(bars, "Walking bouts by length; the table has the numbers", height=150)
 
 
 def steps_svg(found: ActivityResult, days: Sequence[DayTotals]) -> str:
-    """Draw steps of every day; of a single day steps of every hour."""
+    """Draw steps per day, or per hour for a single day."""
     if len(found.days) > 1:
         bars = [
             (d.label, float(own.steps) if own.worn_h > 0.0 else None, d.counted)
@@ -146,11 +146,11 @@ def steps_svg(found: ActivityResult, days: Sequence[DayTotals]) -> str:
 def bars_svg(
     bars: Sequence[tuple[str, float | None, bool]], title: str, height: int, *, values: bool = True
 ) -> str:
-    """Draw bars with their numbers above them.
+    """Draw bars with their values above them.
 
     Parameters
     ----------
-    bars : label, height (None = not known, a dash), and whether it is full: one that is not is dashed.
+    bars : label, height (None = unknown, drawn as a dash), and whether complete; incomplete ones are dashed.
     values : write the numbers.
     """
     top = max((value for _, value, _ in bars if value is not None), default=0.0) or 1.0
@@ -172,7 +172,7 @@ def bars_svg(
 
 
 def _find_pieces(found: ActivityResult, day: DayTotals) -> dict[ActivityKind, list[tuple[int, int]]]:
-    """Runs of half minutes [first, last) of every kind; outside the recording there are none."""
+    """Runs of half minutes [first, last) of every activity; none outside the recording."""
     share = np.zeros((len(KINDS), SLOTS))
     for s in found.spans:
         a = (max(s.start_s, day.start_s) - day.midnight_s) / SLOT_S
@@ -196,13 +196,13 @@ def _find_pieces(found: ActivityResult, day: DayTotals) -> dict[ActivityKind, li
 
 
 def _box(first: int, last: int, level: float) -> str:
-    """A bar of a path, 0 to 1000 both ways."""
+    """Path of a bar, 0 to 1000 both ways."""
     x, wide = 1000 * first / SLOTS, 1000 * (last - first) / SLOTS
     return f"M{x:.2f} 1000V{format_coordinate(1000 * (1 - level))}h{wide:.2f}V1000z"
 
 
 def _patterned(kind: ActivityKind, first: int, last: int) -> str:
-    """A bar whose pattern must not stretch."""
+    """A bar with a pattern that does not stretch."""
     height = RIBBON_PX * LEVELS[kind]
     return (
         f'<rect fill="url(#{PATTERNS[kind]})" x="{100 * first / SLOTS:.3f}%" '
@@ -221,7 +221,7 @@ def _add_hours(plot: PlotArea, found: ActivityResult) -> None:
 
 
 def _known_runs(values: Floats) -> list[slice]:
-    """Stretches without NaN."""
+    """Runs without NaN."""
     known = np.concatenate(([False], np.isfinite(values), [False]))
     starts = np.flatnonzero(~known[:-1] & known[1:]).tolist()
     ends = np.flatnonzero(known[:-1] & ~known[1:]).tolist()
@@ -229,7 +229,7 @@ def _known_runs(values: Floats) -> list[slice]:
 
 
 def _outline(plot: PlotArea, ends: Sequence[float], course: Floats) -> str:
-    """Steps along the upper values and back along the lower ones."""
+    """Outline along the upper values and back along the lower ones."""
     up = [(x, plot.y(v)) for i, v in enumerate(course[:, 2].tolist()) for x in (ends[i], ends[i + 1])]
     low = [(x, plot.y(v)) for i, v in enumerate(course[:, 0].tolist()) for x in (ends[i], ends[i + 1])]
     return "M" + "L".join(_point(x, y) for x, y in (*up, *reversed(low))) + "z"

@@ -1,7 +1,7 @@
-"""A recording of daily life in words: days, hours, transitions, walking bouts and trunk inclination.
+"""View of a daily-life recording: days, hours, transitions, walking bouts and trunk inclination.
 
-What the monitor found is core/activity/result.py; the drawings are server/report/view/daily_charts.py,
-names of kinds and days server/report/words/daily_words.py.
+For the results see core/activity/result.py, for the charts server/report/view/daily_charts.py, for names of
+activities and days server/report/words/daily_words.py.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ class DayTotals:
 
     Parameters
     ----------
-    label : date, or "Day 2" without a clock. part : which part of it was recorded, empty for the whole day.
-    midnight_s : where its ribbon begins, from the first sample. times : column of TOTALS → h:min.
-    counted : worn long enough for the means.
+    label : date, or "Day 2" without a clock. part : recorded part, empty for the whole day.
+    midnight_s : start of its ribbon, relative to the first sample. times : column of TOTALS → h:min.
+    counted : wear time is sufficient for the means.
     """
 
     label: str
@@ -88,7 +88,7 @@ class HourTotals:
 
 @dataclass(frozen=True)
 class TransitionTotals:
-    """One kind of transition: how often on each day, and how large."""
+    """One kind of transition: count per day, and size."""
 
     label: str
     per_day: tuple[int, ...]
@@ -100,7 +100,7 @@ class TransitionTotals:
 
 @dataclass(frozen=True)
 class TransitionEvent:
-    """A transition, or a lean that does not count with its reason."""
+    """A transition, or a rejected forward lean with the reason."""
 
     when: str
     label: str
@@ -123,7 +123,7 @@ class BoutBin:
 
 @dataclass(frozen=True)
 class LeanRow:
-    """Trunk inclination during one kind, in whole degrees, positive forward."""
+    """Trunk inclination during one activity, in whole degrees, positive forward."""
 
     label: str
     hours: str
@@ -134,15 +134,15 @@ class LeanRow:
 
 @dataclass(frozen=True, eq=False)
 class DailyLifeView:
-    """What the page and the week report of daily life show.
+    """Content of the daily-life page and week report.
 
     Parameters
     ----------
-    found : what everything here was made from. place : where the sensor was worn.
-    has_clock : days and hours are those of the device's clock, else they count from the first sample.
-    columns : of the totals that have anything to say. mean : of the days worn long enough, None where there
-        is none. events : the first transitions and candidates in order of time, of `events_total`.
-    lean_reason : why no inclination is known, None where it is.
+    found : the underlying result. place : sensor placement.
+    has_clock : days and hours follow the device's clock, otherwise counted from the first sample.
+    columns : totals with data. mean : of days with sufficient wear time, None if there are none.
+    events : the first transitions and candidates in order of time, of `events_total`.
+    lean_reason : why inclination is unknown, None if known.
     """
 
     found: ActivityResult
@@ -161,7 +161,7 @@ class DailyLifeView:
     lean_reason: str | None
 
     def to_json(self) -> dict[str, object]:
-        """What of it goes into the report's JSON; spans, steps and inclination lie in files of their own."""
+        """Content of the report's JSON; spans, steps and inclination have separate files."""
         return {
             "segment": self.found.segment,
             "started_at": None if self.found.started_at is None else self.found.started_at.isoformat(),
@@ -173,7 +173,7 @@ class DailyLifeView:
 
 
 def daily_life_view(found: ActivityResult | None) -> DailyLifeView | None:
-    """Put a recording of daily life into words; None of any other take."""
+    """View of a daily-life recording; None for other trials."""
     if found is None:
         return None
     days = tuple(_describe_day(found, i, d) for i, d in enumerate(found.days))
@@ -213,7 +213,7 @@ def daily_life_view(found: ActivityResult | None) -> DailyLifeView | None:
 
 
 def bin_bouts(bouts: Sequence[ActivityBout]) -> tuple[BoutBin, ...]:
-    """Sort walking bouts by their length."""
+    """Group walking bouts by length."""
     ends = [*BIN_EDGES_S, np.inf]
     places = np.searchsorted(BIN_EDGES_S, [b.duration_s for b in bouts], "right")
     rows = []
@@ -266,7 +266,7 @@ def _describe_day(found: ActivityResult, i: int, d: ActivityDay) -> DayTotals:
 
 
 def _average(days: Sequence[ActivityDay]) -> DayTotals | None:
-    """Mean of the days worn long enough."""
+    """Mean of the days with sufficient wear time."""
     own = [d for d in days if d.worn_h >= WORN_H]
     if not own:
         return None
@@ -316,7 +316,7 @@ def _describe_event(found: ActivityResult, e: PosturalTransition | TransitionCan
 
 
 def _describe_leans(found: ActivityResult) -> tuple[LeanRow, ...]:
-    """Median and the middle 90 % of inclination in each kind; not of lying: on a side none is forward."""
+    """Median and central 90 % of inclination per activity; lying is excluded."""
     values, kinds = found.inclination_deg, label_seconds(found)
     rows = []
     for i, kind in enumerate(KINDS):
@@ -330,7 +330,7 @@ def _describe_leans(found: ActivityResult) -> tuple[LeanRow, ...]:
 
 
 def label_seconds(found: ActivityResult) -> np.ndarray:
-    """(seconds,) index into KINDS of what the middle of every second is."""
+    """(seconds,) index into KINDS of the activity at the middle of every second."""
     seconds = np.arange(len(found.inclination_deg)) + 0.5
     places = np.searchsorted([s.start_s for s in found.spans], seconds, "right") - 1
     kinds = np.array([KINDS.index(s.kind) for s in found.spans], dtype=np.intp)
@@ -338,12 +338,12 @@ def label_seconds(found: ActivityResult) -> np.ndarray:
 
 
 def inclination_course(found: ActivityResult, start_s: float, end_s: float) -> tuple[Floats, Floats]:
-    """Course of inclination in windows of COURSE_S.
+    """Inclination in windows of COURSE_S.
 
     Returns
     -------
-    t_s : (n,) start of each window. course : (n, 3) 10 %, 50 % and 90 % of its seconds, NaN where fewer than
-        a tenth of them are known.
+    t_s : (n,) start of each window. course : (n, 3) 10 %, 50 % and 90 % of its seconds, NaN if fewer than a
+        tenth of them are known.
     """
     first, last = int(start_s), min(int(np.ceil(end_s)), len(found.inclination_deg))
     n = max(0, -(-(last - first) // COURSE_S))

@@ -1,4 +1,4 @@
-"""What feedback did in a session: strides with and without it, probes, level, side effects, retention."""
+"""Outcome of feedback in a session: strides with and without it, probes, level, side effects, retention."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _HOW_TO_READ: Final = (
 
 @dataclass(frozen=True)
 class ProbeComparison:
-    """A probe block beside the training strides right before it."""
+    """A probe block and the training strides immediately before it."""
 
     number: int
     start_s: float
@@ -62,7 +62,7 @@ class ProbeComparison:
 
 @dataclass(frozen=True)
 class FeedbackView:
-    """The section of a session page, of its print, and of the interface."""
+    """Feedback section for the session page, print and API."""
 
     title: str
     words: tuple[tuple[str, str], ...]
@@ -79,16 +79,16 @@ class FeedbackView:
 
     @property
     def target(self) -> str:
-        """Mean ± sd and who they are of."""
+        """Mean ± sd and its source."""
         return target_words(self.content)
 
     @property
     def retention_words(self) -> str:
-        """How much the first strides of this visit differ from the last ones trained."""
+        """Difference of the first strides of this visit from the last trained ones."""
         return "" if self.retention is None else format_signed(self.retention.difference, self.term)
 
     def to_json(self) -> dict[str, object]:
-        """Plain JSON with every stride."""
+        """JSON types with all strides."""
         shown = reduce_to_plain(
             {
                 "prescription": self.content.to_json(),
@@ -113,7 +113,7 @@ class FeedbackView:
 
 
 def list_analysed_strides(strides: Strides, column: Column) -> tuple[AnalysedStride, ...]:
-    """The stride list with the value of the trained parameter."""
+    """Strides with the value of the trained parameter."""
     return tuple(
         AnalysedStride(s.side, s.start_s, value, s.excluded_reason is None)
         for s, value in zip(strides.strides, column, strict=True)
@@ -127,11 +127,11 @@ def feedback_view(
     before: PreviousTraining | None = None,
     limb: Limb | None = None,
 ) -> FeedbackView:
-    """Put the result of a take into words.
+    """View of the result of a trial.
 
     Parameters
     ----------
-    before : the visit whose end the retention block is held against. limb : of the trained side.
+    before : visit whose end is compared with the retention block. limb : of the trained side.
     """
     term = parameter_term(content.parameter)
     rows = tuple(
@@ -164,7 +164,7 @@ def feedback_view(
 
 
 def _notes(split: FeedbackSplit, term: Term) -> tuple[str, ...]:
-    """How to read it, and what could not be used."""
+    """Explanations, and data that could not be used."""
     said = [_HOW_TO_READ, f"Side effects: the last {LAST} strides against the first {FIRST} of the take."]
     live = split.live_difference
     if live.mean is not None and live.sd is not None:

@@ -1,4 +1,4 @@
-"""Beside the target: what else changed over a take, and what was left of the last training."""
+"""Side effects of feedback during a trial, and retention since the last training."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ EFFECT_REASONS: Final = {
 
 @dataclass(frozen=True)
 class SideEffectRow:
-    """A side effect; `kind` is ok, warn, or none where it cannot be judged."""
+    """A side effect; `kind` is ok, warn, or none if it cannot be assessed."""
 
     name: str
     label: str
@@ -49,11 +49,11 @@ class SideEffectRow:
 
 @dataclass(frozen=True)
 class Retention:
-    """The first strides of this visit against the last training strides of the one before.
+    """First strides of this visit compared with the last training strides of the previous one.
 
     Parameters
     ----------
-    verdict : in words, with the limit it follows.
+    verdict : in words, with the underlying limit.
     """
 
     session_id: str
@@ -68,7 +68,7 @@ class Retention:
 
 @dataclass(frozen=True)
 class PreviousTraining:
-    """The visit of the same training before this one."""
+    """The previous visit with the same training."""
 
     session_id: str
     performed_on: dt.date
@@ -78,7 +78,7 @@ class PreviousTraining:
 def side_effects(
     content: Prescription, baseline: Baseline, strides: Sequence[AnalysedStride], curves: CycleCurves | None
 ) -> GuardState:
-    """What changed beside the target over the take: the live guard, on the strides of the analysis."""
+    """Side effects during the trial, from the rules of the live guard applied to the analysed strides."""
     watch = GuardWatch(content, baseline)
     rows = {} if curves is None else {
         (side, i): k for side, index in curves.stride_index.items() for k, i in enumerate(index)
@@ -98,7 +98,7 @@ def side_effects(
 
 
 def describe_effects(content: Prescription, guard: GuardState, term: Term) -> tuple[SideEffectRow, ...]:
-    """The other side and the sagittal profile in words."""
+    """Side effects on the other side and the sagittal profile, in words."""
     other = "other side" if content.side is None else "right" if content.side == "left" else "left"
     gps = Term("Sagittal profile score", "°", "", 1, (0, 20), ("larger", "smaller"))
     return (
@@ -125,7 +125,7 @@ def _effect(name: str, label: str, effect: SideEffect, term: Term) -> SideEffect
 def compare_retention(
     content: Prescription, split: FeedbackSplit, before: PreviousTraining, term: Term, limb: Limb | None
 ) -> Retention | None:
-    """Compare the retention block with the end of the training before; None without either."""
+    """Compare the retention block with the end of the previous training; None if either is missing."""
     now, end = split.kinds.get("retention"), before.split.end
     if now is None or now.mean is None or end.mean is None:
         return None

@@ -1,4 +1,4 @@
-"""A comparison of filters as its page shows it: sentences, table, charts, and the reference."""
+"""View of a filter comparison: sentences, table, charts, and reference."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ CLEAR: Final = 1.05
 
 @dataclass(frozen=True)
 class SpreadPanel:
-    """One chart; `numbers` = side letter or "", and the RMS over the take in degrees."""
+    """One chart; `numbers` = side letter or "", and the RMS over the trial in degrees."""
 
     title: str
     svg: str
@@ -47,7 +47,7 @@ class SpreadPanel:
 
 @dataclass(frozen=True)
 class SpreadRow:
-    """A quantity of one side in the table: texts of degrees, over the take, in stance, in swing, largest."""
+    """Table row for one side of a quantity: degrees as text, over the trial, in stance, in swing, maximum."""
 
     title: str
     side: Side | None
@@ -56,7 +56,7 @@ class SpreadRow:
 
 @dataclass(frozen=True)
 class FilterRow:
-    """A filter in the table; numbers are texts, "" where there is none; told = what went wrong."""
+    """Table row of a filter; numbers are texts, "" if missing; told = error message."""
 
     name: str | None
     label: str
@@ -70,7 +70,7 @@ class FilterRow:
 
 @dataclass(frozen=True)
 class ReferenceRow:
-    """A filter against the reference in the chosen quantity: texts of degrees."""
+    """A filter compared with the reference in the selected quantity: degrees as text."""
 
     name: str | None
     label: str
@@ -80,11 +80,11 @@ class ReferenceRow:
 
 @dataclass(frozen=True)
 class ReferenceView:
-    """What is said of the reference.
+    """Comparison with the reference.
 
     Parameters
     ----------
-    choices : (value, words, chosen) of what it can be looked at for. heads : of the table's columns.
+    choices : (value, words, chosen) of available quantities. heads : column headings of the table.
     """
 
     source: str
@@ -99,7 +99,7 @@ class ReferenceView:
 
 @dataclass(frozen=True)
 class ComparisonView:
-    """Everything of the page that is of one comparison."""
+    """Content of the page for one comparison."""
 
     headline: str
     sentences: tuple[str, ...]
@@ -113,11 +113,11 @@ class ComparisonView:
 def view_comparison(
     content: bytes, over: Over, of: str | None = None, filter_name: str | None = None
 ) -> ComparisonView:
-    """Read filters.json into what the page shows.
+    """View of a filters.json.
 
     Parameters
     ----------
-    of : segment or joint angle that is held against the reference. filter_name : whose plot is drawn.
+    of : segment or joint angle compared with the reference. filter_name : filter to plot.
     """
     found: dict[str, Any] = json.loads(content)
     spreads = {s["name"]: s for s in found["spreads"]}
@@ -147,7 +147,7 @@ def view_comparison(
 
 
 def _headline(spreads: Mapping[str, Any], ran: int, sensors: int) -> str:
-    """What the choice of a filter changes, in one sentence."""
+    """Effect of the choice of filter, in one sentence."""
     filters, worn = (
         f"{n} {plural(n, word, f'{word}s')}" for n, word in ((ran, "filter"), (sensors, "sensor"))
     )
@@ -169,7 +169,7 @@ def _notes(found: Mapping[str, Any], has_cycles: bool) -> list[str]:
 
 
 def _sides(spreads: Mapping[str, Any], name: str, ending: str) -> dict[Side | None, Any]:
-    """Spreads of a quantity by side; of one that has no side under None."""
+    """Spreads of a quantity by side; None for a quantity without sides."""
     if name == "pelvis_rotation":
         name, ending = "pelvis", "_heading"
     if f"{name}{ending}" in spreads:
@@ -180,7 +180,7 @@ def _sides(spreads: Mapping[str, Any], name: str, ending: str) -> dict[Side | No
 def _panels(
     quantities: Sequence[tuple[str, dict[Side | None, Any]]], over: Over, end: float
 ) -> tuple[SpreadPanel, ...]:
-    """Charts of quantities that are known, on one value axis."""
+    """Charts of the known quantities, on a common value axis."""
     drawn = []
     for title, found in quantities:
         lines: dict[Side | None, Floats] = {}
@@ -206,7 +206,7 @@ def _panels(
 
 
 def _spread_rows(s: Mapping[str, Any]) -> list[SpreadRow]:
-    """One row; of what belongs to both legs one for the cycles of each."""
+    """One row per side; bilateral quantities have one for the cycles of each leg."""
     sides: list[Side | None] = list(s["stance"]) or [None]
     return [
         SpreadRow(
@@ -297,7 +297,7 @@ def _figure(b: Mapping[str, Any], quantity: str) -> str:
 
 
 def name_quantity(name: str) -> str:
-    """A quantity in words: "Knee flexion, left", "Left shank, heading"."""
+    """Name of a quantity: "Knee flexion, left", "Left shank, heading"."""
     base, _, suffix = name.rpartition("_")
     if suffix in QUANTITIES:
         return f"{place_words(base).capitalize()}, {suffix}"

@@ -1,9 +1,9 @@
-"""What stands out in a take and what changed since the visit before, in a few sentences.
+"""Findings of a trial and changes since the previous visit, in a few sentences.
 
-Every figure may speak by its distance from the norm, from the other side or from the visit before. Its size
-says how far beyond what people and measurement vary by: a figure speaks when that is above 1. Of the figures
-that tell the same thing the largest speaks (docs/science/headline.md). What is beyond the norm or the other
-side is found by server/report/view/standouts.py.
+A parameter can be compared with the norm, the other side or the previous visit. The deviation is divided by
+the combined variation between subjects and measurement error; values above 1 are findings. Of related
+parameters only the largest finding is reported (docs/science/headline.md). Deviations from the norm or the
+other side are found by server/report/view/standouts.py.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ class HeadlineSentence:
 
     Parameters
     ----------
-    name : parameter that proves it. side : leg spoken of, None = both or none.
-    kind : what the figure was held against. size : how often it is beyond what varies by itself.
-    against : whom the figure was held against, in words. relevant : a change that is clinically relevant.
+    name : underlying parameter. side : leg concerned, None = both or none.
+    kind : type of comparison. size : deviation relative to normal variation.
+    against : reference group, in words. relevant : the change is clinically relevant.
     """
 
     name: str
@@ -73,13 +73,13 @@ class HeadlineSentence:
 
     @property
     def text(self) -> str:
-        """The sentence without its bold part marked."""
+        """The sentence as plain text."""
         return f"{self.before}{self.strong}{self.after}"
 
 
 @dataclass(frozen=True)
 class ChangeLeft:
-    """A real change that no sentence had room for: its figure, by how much, and the verdict in words."""
+    """A real change omitted for lack of space: parameter, difference, and assessment in words."""
 
     title: str
     side: Side | None
@@ -89,13 +89,13 @@ class ChangeLeft:
 
 @dataclass(frozen=True)
 class Headline:
-    """What a person reads first.
+    """Summary of findings and changes.
 
     Parameters
     ----------
-    badge : how many strides count, in one sentence; empty for poor data.
-    stands_out, changed : all sentences, largest first. looked_at : figures that could have spoken.
-    changes : every change since the visit before, by its verdict.
+    badge : number of included strides, in one sentence; empty for poor data.
+    stands_out, changed : all sentences, largest first. looked_at : number of parameters considered.
+    changes : all changes since the previous visit, by assessment.
     """
 
     badge: str
@@ -106,29 +106,29 @@ class Headline:
 
     @property
     def shown_changes(self) -> tuple[HeadlineSentence, ...]:
-        """Changes that have room."""
+        """Changes that fit."""
         return self.changed[: max(KEPT, MOST - len(self.stands_out))]
 
     @property
     def shown(self) -> tuple[HeadlineSentence, ...]:
-        """What stands out, as far as there is room."""
+        """Findings that fit."""
         return self.stands_out[: MOST - len(self.shown_changes)]
 
     @property
     def compared_with(self) -> str:
-        """Whom the sentences shown hold the figures against; empty without a sentence."""
+        """Reference groups of the displayed sentences; empty without any."""
         *before, last = dict.fromkeys(s.against for s in self.shown) or ("",)
         said = f"{', '.join(before)} and {last}" if before else last
         return f"against {said}" if said else ""
 
     @property
     def ranks(self) -> dict[str, int]:
-        """Rank of the sentence by the name of its figure; printed at the row of that name."""
+        """Rank of sentences by parameter name, printed in the row of that parameter."""
         return {s.name: rank for rank, s in enumerate(self.shown, 1)}
 
     @property
     def curve_ranks(self) -> dict[str, tuple[int, ...]]:
-        """Ranks of the sentences about figures of a cycle curve, by its variable; printed at its chart."""
+        """Ranks of sentences about cycle curves, by variable, printed with the chart."""
         ranks: dict[str, tuple[int, ...]] = {}
         for name, rank in self.ranks.items():
             entry = find_entry(from_standing(name) or name)
@@ -138,13 +138,13 @@ class Headline:
 
     @property
     def standouts_left(self) -> tuple[str, ...]:
-        """Labels of what stands out and has no room."""
+        """Labels of findings that do not fit."""
         left = self.stands_out[len(self.shown) :]
         return tuple(dict.fromkeys(parameter_term(from_standing(s.name) or s.name).label for s in left))
 
     @property
     def changes_left(self) -> tuple[ChangeLeft, ...]:
-        """Real changes that no sentence shown tells."""
+        """Real changes not covered by a displayed sentence."""
         return tuple(
             ChangeLeft(
                 find_term(c.name, c.unit).label,
@@ -159,7 +159,7 @@ class Headline:
 
 
 def _tells(sentence: HeadlineSentence, fact: ChangedFact) -> bool:
-    """Whether a sentence says a changed fact; one without a side speaks of both."""
+    """Whether a sentence covers a change; a sentence without a side covers both."""
     return any(
         sentence.name == c.name
         and (sentence.side is None or name_fact(c.name, sentence.side) == name_fact(c.name, c.side))
@@ -168,11 +168,11 @@ def _tells(sentence: HeadlineSentence, fact: ChangedFact) -> bool:
 
 
 def say_badge(kind: str, strides: Strides) -> str:
-    """How many strides count, in one sentence; empty for data that are not good enough to count them.
+    """Number of included strides, in one sentence; empty for poor data.
 
     Parameters
     ----------
-    kind : ok, warn or bad, of the data as a whole.
+    kind : overall data quality, ok, warn or bad.
     """
     if kind == "bad":
         return ""
@@ -187,7 +187,7 @@ def say_badge(kind: str, strides: Strides) -> str:
 
 
 def find_changes(changes: SortedChanges) -> tuple[HeadlineSentence, ...]:
-    """Sentences on the real changes: what is clinically relevant first, then the largest."""
+    """Sentences about real changes: clinically relevant ones first, then the largest."""
     real: dict[str, list[tuple[Change, float]]] = {}
     relevant: set[str] = set()
     for fact in changes.real:
@@ -200,7 +200,7 @@ def find_changes(changes: SortedChanges) -> tuple[HeadlineSentence, ...]:
 
 
 def take_largest(found: Sequence[HeadlineSentence]) -> tuple[HeadlineSentence, ...]:
-    """Of each family the sentence that says most: what is relevant first, then the largest."""
+    """The most important sentence of each family: relevant ones first, then the largest."""
     order = {name: i for i, name in enumerate(PHRASES)}
 
     def place(s: HeadlineSentence) -> tuple[bool, float, int]:
@@ -214,7 +214,7 @@ def take_largest(found: Sequence[HeadlineSentence]) -> tuple[HeadlineSentence, .
 
 
 def _of_change(group: Sequence[tuple[Change, float]]) -> Iterator[HeadlineSentence]:
-    """One sentence of the sides of a figure that changed."""
+    """One sentence for the sides of a parameter that changed."""
     worst, size = max(group, key=lambda pair: pair[1])
     p, by = PHRASES[worst.name], worst.difference or 0.0
     sides = {c.side: c.difference or 0.0 for c, _ in group}
@@ -245,7 +245,7 @@ def make_sentence(
     side: Side | None,
     people: str = "",
 ) -> HeadlineSentence:
-    """Make a sentence of a pattern, its bold part between asterisks; sizes are cut at LARGEST."""
+    """Create a sentence from a pattern with its bold part between asterisks; sizes are capped at LARGEST."""
     against = people or {"sides": "the other side", "limit": "limits"}.get(kind, "")
     legs = {} if side is None else {"side": side, "other": OTHER[side]}
     before, strong, after = pattern.format(**words, **legs).split("*")
@@ -253,7 +253,7 @@ def make_sentence(
 
 
 def choose_digits(name: str) -> int:
-    """Degrees and steps a minute whole, shares to a tenth, metres and seconds to a hundredth."""
+    """Decimals: none for degrees and steps/min, one for percentages, two for metres and seconds."""
     term = parameter_term(name)
     return {"°": 0, "steps/min": 0, "%": 1}.get(term.unit, 2)
 

@@ -1,4 +1,4 @@
-"""What must be said beside tables and curves: who the norm's people are, what the zero is."""
+"""Notes on tables and curves: reference groups and zeros."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def norm_note(
     norms: Norms,
     controls: ControlGroup | None = None,
 ) -> str:
-    """Who the reference people are, or why there are none; always something."""
+    """Reference group, or the reason why there is none; never empty."""
     sentences = []
     if norms.reason is not None:
         sentences.append(NO_NORM.get(norms.reason, norms.reason))
@@ -66,7 +66,7 @@ def norm_note(
 
 
 def _matched_note(norms: Norms) -> str:
-    """Who was asked to walk at this speed, and what they are not."""
+    """Reference group that was asked to walk at this speed, and its limitations."""
     at = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
     return (
         f"Norm: {ASKED}{at}, overground, mean ± 1 SD ({SOURCE}). They are not people who are slow from habit "
@@ -75,7 +75,7 @@ def _matched_note(norms: Norms) -> str:
 
 
 def _own_note(controls: ControlGroup) -> str:
-    """Who the clinic's own controls are, or that they are too few."""
+    """Description of the clinic's own controls, or that there are too few."""
     if controls.reason is not None:
         return f"Own controls who walk as fast: {controls.n}, too few to compare with."
     small = ", a small group" if controls.note == "small_group" else ""
@@ -83,7 +83,7 @@ def _own_note(controls: ControlGroup) -> str:
 
 
 def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]:
-    """How to read the curves, in sentences: zero, offsets, confidence, what is drawn."""
+    """Explanations of the curves, in sentences: zero, offsets, confidence, elements."""
     if bundle.angles is None:
         return ()
     labels = {v.name: v.label.lower() for v in VARIABLES if v.plane == "sagittal"}
@@ -128,7 +128,7 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
 
 
 def _interrupted(panels: Sequence[CurvePanel]) -> list[str]:
-    """Which curves have no value at some of their points."""
+    """Curves without a value at some points."""
     broken = [
         p.variable.label
         for p in panels
@@ -139,7 +139,7 @@ def _interrupted(panels: Sequence[CurvePanel]) -> list[str]:
 
 
 def _norm_notes(panels: Sequence[CurvePanel]) -> list[str]:
-    """What must be said about the norm, once for all variables it concerns."""
+    """Notes on norms, each once for all variables concerned."""
     concerned: dict[str, list[str]] = {}
     for p in panels:
         if p.norm_note and p.reason is None:

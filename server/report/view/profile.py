@@ -1,4 +1,4 @@
-"""The movement analysis profile: how far each curve is from healthy adults.
+"""Movement analysis profile: distance of each curve from healthy adults.
 
 docs/science/norms-and-scores.md, "GVS and GPS".
 """
@@ -49,9 +49,8 @@ class ProfileRow:
 
     Parameters
     ----------
-    left, right, healthy, svg : against people at the person's speed where `ProfileView.at_speed`.
-    comfortable_left, comfortable_right : against people at their comfortable speed, "" where the above are
-        against these already.
+    left, right, healthy, svg : against subjects at the patient's speed if `ProfileView.at_speed`.
+    comfortable_left, comfortable_right : against subjects at comfortable speed, "" if the above already are.
     """
 
     title: str
@@ -67,7 +66,7 @@ class ProfileRow:
 
 @dataclass(frozen=True)
 class ProfileBar:
-    """A row in numbers, degrees: of each side with a value, and of healthy people where known."""
+    """A row as numbers, degrees: of each side with a value, and of healthy subjects if known."""
 
     title: str
     values: Mapping[Side, float]
@@ -77,14 +76,14 @@ class ProfileBar:
 
 @dataclass(frozen=True)
 class ProfileView:
-    """Rows of the profile, GDI* in words, what it leaves out, and who the reference people are.
+    """Rows of the profile, GDI* in words, its limitations, and the reference group.
 
     Parameters
     ----------
-    at_speed : the reference people were asked to walk at the person's speed.
-    bars : of the curves with high confidence. score : the sagittal profile score over them, levels removed,
-        from people at their comfortable speed, as over the visits; None where too many curves miss.
-    score_at_speed : the same from people at the person's speed, None where nobody walked so.
+    at_speed : the reference group was asked to walk at the patient's speed.
+    bars : of the curves with high confidence. score : sagittal profile score over them, with offsets removed,
+        against subjects at comfortable speed, as in trends; None if too many curves are missing.
+    score_at_speed : the score against subjects at the patient's speed, None if unavailable.
     """
 
     rows: tuple[ProfileRow, ...]
@@ -97,12 +96,12 @@ class ProfileView:
 
 
 def profile_view(comfortable: Scores, matched: Scores | None = None) -> ProfileView | None:
-    """None when no curve could be scored.
+    """View of a profile; None if no curve could be scored.
 
     Parameters
     ----------
-    comfortable, matched : scores of the same curves, against people at their comfortable speed and at the
-        person's own; None where nobody walked so.
+    comfortable, matched : scores of the same curves, against subjects at comfortable speed and at the
+        patient's speed; None if unavailable.
     """
     scores = comfortable if matched is None else matched
     rows, bars = [], []
@@ -139,10 +138,10 @@ def _total(scores: Scores) -> ProfileBar | None:
 
 
 def bar_svg(bar: ProfileBar, before: ProfileBar | None, height: int = BAR_HEIGHT) -> str:
-    """Draw both sides of a bar over each other, left filled, right outlined; a tick at the visit before.
+    """Draw the bars of both sides, left filled, right outlined, with a tick at the previous visit.
 
-    Solid line: the middle of healthy people; dashed: 95 of 100 are below. A longer bar is cut at BARS_DEG.
-    `height` in px.
+    Solid line: median of healthy subjects; dashed: 95th percentile. Bars are clipped at BARS_DEG. `height` in
+    px.
     """
 
     def x(value: float) -> str:
@@ -179,7 +178,7 @@ def _numbers(title: str, found: Mapping[Side, Score]) -> ProfileBar:
 def _beside(
     row: ProfileRow, comfortable: Scores, shown: Scores, name: str, mode: Mode, variable: str | None = None
 ) -> ProfileRow:
-    """The row with the scores against people at their comfortable speed, where others are shown."""
+    """The row with added scores against subjects at comfortable speed, if others are shown."""
     if comfortable is shown:
         return row
     left, right = (_text(comfortable.find(name, mode, side, variable)) for side in SIDES)
@@ -206,14 +205,16 @@ def _text(score: Score) -> str:
 
 
 def _bar(marks: dict[Side, float], healthy: tuple[float, float, float] | None) -> str:
-    """Healthy to the 75th (dark) and 95th percentile (light), median as a line; left disc, right ring."""
+    """Bar to the 75th (dark) and 95th percentile (light) of healthy subjects with median, left and right
+    marks.
+    """
     median, p75, p95 = healthy or (None, None, None)
     boxes = [(0.0, end) for end in (p95, p75) if end is not None]
     return draw_bar(marks, boxes, median, (0.0, SCALE_DEG), WIDTH)
 
 
 def _index(scores: Scores) -> str:
-    """GDI* of the sagittal profile; an index that misses is said with its reason."""
+    """GDI* of the sagittal profile; a missing index is given with its reason."""
     parts = []
     for side in SIDES:
         s = scores.find("gdi_star_sagittal", MODE, side)

@@ -1,4 +1,4 @@
-"""A sensitivity analysis of squats as files, text and page, in the layout of Kianifar's tables 2 and 3.
+"""Sensitivity analysis of squats as files, text and page, in the layout of Kianifar's tables 2 and 3.
 
 {stem}.json   everything, angles in degrees (schema 1)      {stem}.csv   one row per parameter and angle
 """
@@ -91,7 +91,7 @@ GROUPS: Final[tuple[tuple[str, Mapping[str, str]], ...]] = (
 def summarise_sensitivity(
     legs: Mapping[Side, SensitivityTable], reference: str | None, *, from_standing: bool
 ) -> dict[str, Any]:
-    """Everything as plain JSON values; `reference` = name of what it was held against, None = itself."""
+    """Convert to JSON types; `reference` = name of the reference, None = itself."""
     table = next(iter(legs.values()))
     steps = {row.unit: row.step for row in table.rows}
     found = reduce_to_plain(
@@ -151,7 +151,7 @@ def sensitivity_files(found: Mapping[str, Any], stem: str) -> dict[str, bytes]:
 
 
 def sensitivity_csv(found: Mapping[str, Any]) -> bytes:
-    """One row per leg, parameter and angle; what is not defined is empty."""
+    """One row per leg, parameter and angle; undefined values are empty."""
 
     def cells(values: list[float | None] | None, i: int) -> float | None:
         return None if values is None else values[i]
@@ -170,7 +170,7 @@ def sensitivity_csv(found: Mapping[str, Any]) -> bytes:
 
 
 def tell_sensitivity(found: Mapping[str, Any]) -> list[str]:
-    """Lines for a terminal: tables 2 and 3 in % where there is a reference, and changes in degrees."""
+    """Lines for a terminal: tables 2 and 3 in % if there is a reference, and changes in degrees."""
     lines: list[str] = []
     against = found["reference"]
     share, steps = f"± {found['relative_pct']:g} %", _say_steps(found)
@@ -202,7 +202,7 @@ def _say_steps(found: Mapping[str, Any]) -> str:
 def _texts(
     values: Sequence[float | None] | None, columns: tuple[int, ...], averaged: tuple[int, ...], digits: int
 ) -> list[str]:
-    """Cells of a row, the average of some columns behind them."""
+    """Cells of a row, followed by the average of some columns."""
     if values is None:
         return ["–"] * (len(columns) + bool(averaged))
     chosen = [values[i] for i in columns]
@@ -228,7 +228,7 @@ class SensitivityCell:
 
 @dataclass(frozen=True)
 class SensitivityLine:
-    """A parameter in words, the paper's name, its cells, and why they are empty."""
+    """A parameter in words, its name in the paper, its cells, and the reason if they are empty."""
 
     words: str
     name: str
@@ -238,12 +238,12 @@ class SensitivityLine:
 
 @dataclass(frozen=True)
 class SensitivityLeg:
-    """Tables 2 and 3 of a leg side by side.
+    """Tables 2 and 3 for one leg.
 
     Parameters
     ----------
-    parts : title of each table and its columns. groups : title and lines. average : last line, None where
-        quantities are no quotients. errors : RMS errors against the reference in words, empty without one.
+    parts : title of each table and its columns. groups : title and lines. average : last line, None for
+        quantities that are not ratios. errors : RMS errors against the reference in words, empty without one.
     """
 
     side: str
@@ -255,12 +255,12 @@ class SensitivityLeg:
 
 @dataclass(frozen=True)
 class SensitivityView:
-    """What the page shows.
+    """Content of the page.
 
     Parameters
     ----------
-    shown : one of `SHOWN`, and choices : (value, words) of those that can be shown.
-    sentences : what the numbers say, the most important first.
+    shown : one of `SHOWN`, and choices : (value, words) of those available.
+    sentences : interpretation, the most important first.
     """
 
     reference: str | None
@@ -278,7 +278,7 @@ REASONS: Final[Mapping[str | None, str]] = {
 
 
 def view_sensitivity(content: bytes, shown: str) -> SensitivityView:
-    """The view of a {stem}.json; `shown` that it does not have becomes "step"."""
+    """View of a {stem}.json; an unavailable `shown` is replaced by "step"."""
     found = json.loads(content)
     choices = [("step", f"{found['step_mm']:g} mm and {found['step_deg']:g}°")]
     choices.append(("share", f"± {found['relative_pct']:g} %"))
@@ -296,7 +296,7 @@ def view_sensitivity(content: bytes, shown: str) -> SensitivityView:
 
 
 def _speak(found: Mapping[str, Any]) -> Iterator[str]:
-    """What matters most, and how much less the body does."""
+    """Most important parameters, and the smaller influence of the body."""
     largest = {title: _find_largest(found, names) for title, names in GROUPS}
     what = "error changes" if found["reference"] is not None else "angle changes"
     turn, place, body = (largest[title] for title, _ in GROUPS)
@@ -311,7 +311,7 @@ def _speak(found: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _find_largest(found: Mapping[str, Any], names: Mapping[str, str]) -> tuple[float, str]:
-    """Largest change by a step, and of which angle by which parameter in words."""
+    """Largest change caused by a step, with angle and parameter in words."""
     most, where = -1.0, ""
     for leg in found["legs"]:
         for row in leg["rows"]:

@@ -1,4 +1,4 @@
-"""What was checked of every sensor's clock and place, in words; also where nothing could be judged."""
+"""Consistency checks of every sensor's clock and placement in words, including those not possible."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NOT_JUDGED: Final = "cannot be judged"
 
 @dataclass(frozen=True)
 class SensorCheck:
-    """One sensor: words for its clock and its place, with a kind (ok, warn, or none where not judged)."""
+    """One sensor: words for its clock and placement, with a kind (ok, warn, or none if not checked)."""
 
     sensor: str
     clock: str
@@ -24,12 +24,11 @@ class SensorCheck:
 
 @dataclass(frozen=True)
 class SensorChecks:
-    """All sensors of a take.
+    """All sensors of a trial.
 
     Parameters
     ----------
-    exchanged : pairs that were found on each other's segments, in words; empty where none.
-    notes : what the table cannot say, in sentences.
+    exchanged : pairs of swapped sensors, in words; empty if none. notes : supplementary sentences.
     """
 
     rows: tuple[SensorCheck, ...]
@@ -38,7 +37,7 @@ class SensorChecks:
 
 
 def sensor_checks(found: Mapping[str, Any] | None) -> SensorChecks | None:
-    """View of `agreement` in analysis.json; None where an older version wrote it or one sensor was worn."""
+    """View of `agreement` in analysis.json; None for older versions or a single sensor."""
     if found is None or len(found["sensors"]) < 2:
         return None
     rows = tuple(_row(s) for s in found["sensors"])

@@ -1,6 +1,6 @@
-"""Figures of a take that stand out: each against its norm, a limit or the other side, in one sentence.
+"""Findings of a trial: parameters compared with norm, limit or other side, one sentence each.
 
-What becomes of the sentences says server/report/view/headline.py.
+For the selection of sentences see server/report/view/headline.py.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ AT_SPEED: Final = "people at this speed"
 def find_standouts(
     rows: Sequence[ParameterRow], norms: Norms, flags: Sequence[Flag] = ()
 ) -> tuple[tuple[HeadlineSentence, ...], int]:
-    """Figures beyond the norm, a limit or the other side, largest first, and how many could have been.
+    """Findings against norm, limits or the other side, largest first, and the number considered.
 
     Parameters
     ----------
-    rows : of the parameter table, every angle from the zero of its curve (`level.choose_zero`).
-    norms : they were held against.
+    rows : of the parameter table, every angle with the zero of its curve (`level.choose_zero`).
+    norms : used for the comparison.
     flags : values against limits.
     """
     told = [row for row in rows if _phrases(row.name) is not None and not row.low_confidence]
@@ -98,7 +98,7 @@ def _of_row(row: ParameterRow, norms: Norms) -> Iterator[HeadlineSentence]:
 
 
 def _certain_z(row: ParameterRow, cell: TableCell | None) -> float | None:
-    """Deviations from the norm's mean, of people and of the measurement together; None without a norm."""
+    """z-score that includes measurement uncertainty; None without a norm."""
     if cell is None or cell.z is None or row.norm_sd is None:
         return None
     measured = 0.0 if cell.uncertainty is None else cell.uncertainty / NORMAL_95
@@ -130,16 +130,16 @@ def _norm_words(row: ParameterRow, p: Phrases) -> str:
 
 
 def _people(row: ParameterRow, family: Family) -> str:
-    """Of whom a norm is: speed itself cannot be held against people at this speed."""
+    """Reference group of a norm; gait speed itself cannot be compared at matched speed."""
     if family == "speed":
         return "people of this age"
     return AT_SPEED if family == "step" or row.comfortable is not None else "healthy people"
 
 
 def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence | None:
-    """The sides against each other, of the one further from its norm.
+    """Comparison of the sides, naming the one further from its norm.
 
-    None where strides and measurement leave open which is larger, and where both are within the norm.
+    None if the larger side is uncertain given strides and measurement error, or if both are within the norm.
     """
     s = row.symmetry
     if s is None or not s.clear or s.low is None or s.high is None or not (p.less or p.more):
@@ -173,10 +173,10 @@ def _has_norm(row: ParameterRow) -> bool:
 
 
 def _side_off_norm(row: ParameterRow) -> Side | None:
-    """The side further from its norm; None where both are within it, as their row shows them.
+    """The side further from the norm; None if both are within it, as their row indicates.
 
-    The uncertainty of a level is mostly common to both sides (the definition of a contact); whether the sides
-    differ is judged by the interval of their difference.
+    The uncertainty of an absolute value is mostly common to both sides (the definition of a contact); whether
+    the sides differ is determined by the confidence interval of their difference.
     """
     z = {side: c.z for side in SIDES if (c := _cell(row, side)) is not None and c.z is not None}
     furthest = max(z, key=lambda side: abs(z[side]))
@@ -184,7 +184,7 @@ def _side_off_norm(row: ParameterRow) -> Side | None:
 
 
 def _join_steps(found: list[HeadlineSentence], rows: Mapping[str, ParameterRow]) -> list[HeadlineSentence]:
-    """Short steps and a quick cadence are one sentence."""
+    """Combine short steps and high cadence into one sentence."""
     steps, cadence = rows.get("step_length_m"), rows.get("cadence_spm")
     if steps is None or cadence is None or cadence.both is None or steps.norm_mean is None:
         return found
@@ -205,7 +205,7 @@ def _join_steps(found: list[HeadlineSentence], rows: Mapping[str, ParameterRow])
 
 
 def _of_flags(flags: Sequence[Flag]) -> list[HeadlineSentence]:
-    """What only a limit judges: the pelvis that a side lifts in swing."""
+    """Findings based on limits only: raised pelvis in swing."""
     return [
         make_sentence(
             f.measure,

@@ -1,4 +1,4 @@
-"""The parameter table: left, right, difference in words, norm where comparable, a reason where no number."""
+"""Parameter table: left, right, difference in words, comparable norms, reasons for missing values."""
 
 from __future__ import annotations
 
@@ -46,15 +46,15 @@ BEYOND_SD: Final = 2.0
 
 @dataclass(frozen=True)
 class TableCell:
-    """One number with what is behind it; `title` says it in full.
+    """One number with its statistics; `title` is the full text.
 
     Parameters
     ----------
     ci : 95 % confidence interval of the mean over the strides. cv_pct : None below 10 strides.
-    z, percentile : among the norm's people, None without a comparable norm or with too few strides.
-    few : "3 strides" where they are too few to be compared with anything, else "".
-    uncertainty : value ± this holds the truth with 95 %, by strides and measurement; None where not known.
-    plus_minus : "± 0.03", "" without. known_by : both parts in words, for the page of the parameter.
+    z, percentile : relative to the norm, None without a comparable norm or with too few strides.
+    few : "3 strides" if too few for a comparison, otherwise "".
+    uncertainty : 95 % uncertainty from strides and measurement; None if unknown.
+    plus_minus : "± 0.03", "" without. known_by : both components in words, for the parameter page.
     """
 
     value: float
@@ -78,19 +78,18 @@ class ParameterRow:
 
     Parameters
     ----------
-    both : value of the whole take; else `left` and `right`, None where not measured.
+    both : value of the whole trial; otherwise `left` and `right`, None if not measured.
     difference : left against right in words. norm : "62.6 ± 2.0". norm_mean, norm_sd, norm_n, norm_source :
-        behind it; None where no comparable norm exists or too few strides of every side count, `norm_note`
-        then says why if there is a reason.
-        norm_group : its people in words.
-    comfortable : norm of people at their comfortable speed, with its figures, where `norm` is of people at
-        the person's own; else None.
-    reason : words in place of all numbers, None if there is any. side_reason : of the only side without one.
-    whole : told of the take, not of its sides.
-    low_confidence : of an angle that the estimator's model gives; it has no norm. low_side : the only side of
-        which that is so, empty where it is of all that have a value.
-    symmetry : left against right in numbers, None unless both sides have one of enough strides.
-    change : since the visit before, of every side that has one; empty without such a visit.
+        its statistics; None without a comparable norm or with too few included strides on every side;
+        `norm_note` then gives the reason, if any. norm_group : reference group in words.
+    comfortable : norm at comfortable speed with its statistics, if `norm` is at the patient's speed;
+        otherwise None.
+    reason : replaces all numbers, None if there are any. side_reason : for the only side without one.
+    whole : applies to the trial, not to its sides.
+    low_confidence : angle estimated by a model, without a norm. low_side : the only side concerned, empty if
+        all sides with a value are.
+    symmetry : left against right in numbers, None unless both sides have enough strides.
+    change : since the previous visit, for every side with one; empty without such a visit.
     """
 
     name: str
@@ -123,14 +122,14 @@ class ParameterRow:
 
     @property
     def symmetry_words(self) -> str:
-        """Ratio, index and angle of the two sides in words; empty where they do not clearly differ."""
+        """Ratio, index and angle of the two sides in words; empty unless they clearly differ."""
         return "" if self.symmetry is None or not self.symmetry.clear else symmetry_words(self.symmetry)
 
     change: tuple[ChangeWords, ...] = ()
 
     @property
     def z_words(self) -> str:
-        """Standard deviations from the norm's mean, left and right; empty without a norm."""
+        """z-scores left and right, in words; empty without a norm."""
         cells = (self.both,) if self.both is not None else (self.left, self.right)
         if all(c is None or c.z is None for c in cells):
             return ""
@@ -138,7 +137,7 @@ class ParameterRow:
 
     @property
     def z_marks(self) -> tuple[tuple[str, bool], ...]:
-        """Standard deviations from the norm's mean as text and whether beyond what healthy people vary by."""
+        """z-scores as text and whether they exceed the normal range."""
         cells = (self.both,) if self.both is not None else (self.left, self.right)
         if all(c is None or c.z is None for c in cells):
             return ()
@@ -165,12 +164,12 @@ def parameter_rows(
     affected: Side | None = None,
     zero: Zero = "standing",
 ) -> tuple[ParameterRow, ...]:
-    """Rows in the order of the table; parameters without wording come last under their own name.
+    """Rows in table order; parameters without a label come last under their own name.
 
     Parameters
     ----------
-    affected : side that ratios are taken of, None = left over right.
-    zero : what the levels of joint angles are measured from.
+    affected : numerator of ratios, None = left over right.
+    zero : zero of joint angles.
     """
     found: dict[str, dict[str | None, Parameter]] = {}
     for p in parameters:
@@ -239,7 +238,7 @@ def _norm_text(norm: NormValue | None, term: Term) -> str | None:
 
 
 def _unsure(row: ParameterRow, sides: Mapping[str | None, Parameter]) -> ParameterRow:
-    """An angle of low confidence is held against nobody, nor against the other side; a measured side is."""
+    """Remove comparisons of low-confidence angles with norm and other side; measured sides keep theirs."""
     unsure = tuple(side for side, p in sides.items() if p.estimated and p.mean is not None)
     if not unsure:
         return row
@@ -279,7 +278,7 @@ def _unsure(row: ParameterRow, sides: Mapping[str | None, Parameter]) -> Paramet
 def _difference(
     left: TableCell | None, right: TableCell | None, term: Term, symmetry: Symmetry | None
 ) -> str | None:
-    """Words for left against right; None where too few strides are compared."""
+    """Words for left against right; None if too few strides are compared."""
     if left is None or right is None or symmetry is None:
         return None
     same = difference_words(left.value, right.value, term)
@@ -329,7 +328,7 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
 
 
 def _known_by(p: Parameter, term: Term) -> str:
-    """What the uncertainty is made of, in words; empty where it is not known."""
+    """Components of the uncertainty, in words; empty if unknown."""
     entry = CATALOGUE.get(p.name)
     if p.u_own is None or p.u_common is None or entry is None or entry.errors is None:
         return ""
@@ -352,7 +351,7 @@ def _sd_digits(term: Term) -> int:
 
 
 def _unknown(name: str, sides: Mapping[str | None, Parameter]) -> Term:
-    """A parameter that the wording does not know yet shows its own name."""
+    """Term for a parameter without a label: its own name."""
     values = [p.mean for p in sides.values() if p.mean is not None] or [0.0]
     low, high = min(*values, 0.0), max(*values, 1.0)
     unit = next(iter(sides.values())).unit

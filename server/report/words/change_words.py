@@ -1,4 +1,4 @@
-"""A change between two sessions in words: how much, beyond measurement error or not, relevant or not."""
+"""Wording of a change between two sessions: size, measurement error, clinical relevance."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ SCORE_TERMS: Final[Mapping[str, Term]] = {
 
 @dataclass(frozen=True)
 class ChangeWords:
-    """A change as a table or a chart says it.
+    """A change in words for tables and charts.
 
     Parameters
     ----------
-    size : "+0.22" or "0.00" in the unit of the figure. mark : "up" or "down" beyond the measurement error,
-        "" within it, "none" where no verdict is possible.
-    verdict : in words. limits : the limits behind it with their sources, in sentences.
-    about : what changed where that is not the number beside it, else "".
+    size : "+0.22" or "0.00" in the unit of the parameter. mark : "up" or "down" if larger than the
+        measurement error, "" if within it, "none" if not assessable.
+    verdict : in words. limits : underlying limits with their sources, in sentences.
+    about : the changed quantity if it differs from the displayed value, otherwise "".
     """
 
     side: str | None
@@ -56,14 +56,14 @@ class ChangeWords:
 
     @property
     def short(self) -> str:
-        """The verdict in two words where there are such."""
+        """The assessment in two words, if possible."""
         if self.mark in {"up", "down"}:
             return "changed"
         return "within error" if not self.mark else SHORT.get(self.verdict, self.verdict)
 
 
 def find_term(name: str, unit: str = "") -> Term:
-    """How a figure is called; one without wording shows its own name."""
+    """Term of a parameter; its own name if it has no label."""
     if name in CATALOGUE:
         term = parameter_term(name)
         return replace(term, label=title_of(name, term.label))
@@ -73,7 +73,7 @@ def find_term(name: str, unit: str = "") -> Term:
 
 
 def change_words(change: Change) -> ChangeWords:
-    """Say a change in words."""
+    """Describe a change in words."""
     term = find_term(change.name, change.unit)
     if change.difference is None:
         said = NOT_ALIKE_WORDS if change.reason == NOT_MEASURED_ALIKE else "not measured in both"
@@ -87,13 +87,13 @@ def change_words(change: Change) -> ChangeWords:
 
 
 def format_difference(difference: float, term: Term) -> str:
-    """A difference with its sign, "+0.22"; without one where it rounds to nothing."""
+    """A difference with its sign, "+0.22"; without sign if it rounds to zero."""
     text = format_number(difference, term.digits)
     return f"+{text}" if difference > 0 and float(f"{difference:.{term.digits}f}") else text
 
 
 def limit_words(change: Change) -> tuple[str, ...]:
-    """The limits of a figure with their sources, whoever they were found on."""
+    """Limits of a parameter with their sources, for any population."""
     term = find_term(change.name, change.unit)
     unit = "" if not term.unit else term.unit if term.unit in "°%" else f"\u202f{term.unit}"
     said = []
@@ -106,7 +106,7 @@ def limit_words(change: Change) -> tuple[str, ...]:
 
 
 def format_limit(limit: float, term: Term) -> str:
-    """A limit of change without its unit: a decimal more than tenths need, metres in millimetres."""
+    """A limit of change without its unit: one decimal more than for tenths, metres in millimetres."""
     return format_number(limit, max(term.digits, 3 if term.unit == "m" else 1))
 
 

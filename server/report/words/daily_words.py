@@ -1,6 +1,6 @@
-"""What daily life is called: its kinds and transitions in words, durations, times of day and days.
+"""Wording of daily life: activities and transitions, durations, times of day and days.
 
-Without a clock hours and days count from the first sample.
+Without a clock, hours and days are counted from the first sample.
 """
 
 from __future__ import annotations
@@ -79,7 +79,9 @@ def format_hours(minutes: float) -> str:
 
 
 def find_midnight(found: ActivityResult, at_s: float) -> float:
-    """Where the day of a moment begins, s from the first sample (below 0 on the first day of a clock)."""
+    """Start of the day that contains a time, s from the first sample (negative on the first day of a
+    clock).
+    """
     return float(np.floor((at_s + _since_midnight(found)) / DAY_S) * DAY_S - _since_midnight(found))
 
 
@@ -90,7 +92,7 @@ def clock_label(found: ActivityResult, at_s: float) -> str:
 
 
 def find_day_label(found: ActivityResult, at_s: float) -> str:
-    """Name of the day of a moment, empty outside all days."""
+    """Name of the day that contains a time, empty outside all days."""
     for i, d in enumerate(found.days):
         if d.start_s <= at_s < d.end_s:
             return day_label(i, d.date)

@@ -1,4 +1,4 @@
-"""What is said of a sensor by its checks: a verdict, why, what to do (docs/science/devices.md, "Limits")."""
+"""Wording of sensor checks: assessment, reasons and remedies (docs/science/devices.md, "Limits")."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ ADVICE: Final = {
 
 @dataclass(frozen=True)
 class DeviceVerdict:
-    """What people read of a sensor.
+    """Assessment of a sensor in words.
 
     Parameters
     ----------
-    kind : look of the state, "ok", "warn" or "none". reasons : sentences, each with what to do.
+    kind : style of the state, "ok", "warn" or "none". reasons : sentences, each with a remedy.
     """
 
     kind: str
@@ -47,7 +47,7 @@ class DeviceVerdict:
 def judge_device(
     course: DeviceCourse, checks: Sequence[DeviceCheck], days: Sequence[dt.date]
 ) -> DeviceVerdict:
-    """Put a course in words; `checks` and their `days` are the ones it was followed over."""
+    """Describe the history of a sensor; `checks` and their `days` are those it was computed from."""
     if course.newest is None:
         return DeviceVerdict("none", "Not measured", (NOT_MEASURED[checks[-1].reason or "no_rest"],))
     late: tuple[str, ...] = ()

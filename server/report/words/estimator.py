@@ -1,4 +1,4 @@
-"""Which pose estimator ran, on what, and what it measured about itself, in words."""
+"""Wording of the pose estimator, its input, and its self-assessment."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ HIDDEN: Final = ("min_eigenvalue",)
 
 @dataclass(frozen=True)
 class HealthRow:
-    """One measured quantity: the worst of its kind and where, its limit, and the verdict."""
+    """One health measure: worst value and its location, limit, and result."""
 
     label: str
     where: str
@@ -75,10 +75,10 @@ class EstimatorView:
 
     Parameters
     ----------
-    kind, verdict : ok, warn or bad and its word. reduced : words, None when the take allowed what is worn.
-    choices : (value, words, asked for now) of what can be asked for on these sensors.
-    estimated : sentence about angles that no two sensors measure, empty when there are none.
-    paper : where the method comes from; None = our own, or one that this version does not know.
+    kind, verdict : ok, warn or bad and its word. reduced : words, None if all sensors could be used.
+    choices : (value, words, selected) of estimators available for these sensors.
+    estimated : sentence about estimated angles, empty if there are none.
+    paper : reference of the method; None = our own, or unknown to this version.
     """
 
     name: str
@@ -94,7 +94,7 @@ class EstimatorView:
 
 
 def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
-    """View of `estimator` in analysis.json; None when the analysis stopped before the poses."""
+    """View of `estimator` in analysis.json; None if the analysis stopped before the poses."""
     if e is None:
         return None
     name, verdict, asked = str(e["name"]), str(e["verdict"]), str(e["requested"])
@@ -118,13 +118,13 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
 
 
 def method_label(method: str) -> str:
-    """Name of `Poses.method` as people read it; one that this version does not know as it is."""
+    """Label of `Poses.method`; unchanged if unknown to this version."""
     known = BY_METHOD.get(method)
     return known.label if known is not None else NO_FIGURE_LABEL if method == NO_FIGURE else method
 
 
 def choice_label(name: str) -> str:
-    """What a form offers as this estimator; one that this version does not know as it is."""
+    """Label of an estimator in forms; unchanged if unknown to this version."""
     return BY_NAME[name].choice if name in BY_NAME else name
 
 
@@ -134,17 +134,17 @@ def _method_note(method: str) -> str:
 
 
 def list_estimated_angles(e: Mapping[str, Any] | None) -> frozenset[str]:
-    """Angles with their side that the estimator's model gives rather than two sensors."""
+    """Angles with their side that are estimated by a model rather than measured by two sensors."""
     return frozenset() if e is None else frozenset(e["estimated_angles"])
 
 
 def list_estimated_variables(e: Mapping[str, Any] | None) -> frozenset[str]:
-    """The same without the side."""
+    """Estimated variables without the side."""
     return frozenset(a.removesuffix("_l").removesuffix("_r") for a in list_estimated_angles(e))
 
 
 def _told(angles: frozenset[str], method: str) -> frozenset[str]:
-    """Those that are a result: not what the model holds fixed."""
+    """Angles that are results rather than fixed by the model."""
     fixed = BY_METHOD[method].fixed if method in BY_METHOD else ()
     return frozenset(a for a in angles if a.removesuffix("_l").removesuffix("_r") not in fixed)
 
@@ -163,7 +163,7 @@ def _estimated(angles: frozenset[str]) -> str:
 
 
 def _rows(health: list[Mapping[str, Any]]) -> tuple[HealthRow, ...]:
-    """The worst finding of each name, judged ones first."""
+    """The worst value of each measure, assessed ones first."""
     worst: dict[str, Mapping[str, Any]] = {}
     for f in health:
         was = worst.get(f["name"])

@@ -1,4 +1,4 @@
-"""A prescription of biofeedback in words: what is trained, the target, what is shown when, when it ends."""
+"""Wording of a biofeedback prescription: parameter, target, modes, schedule and end."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def name_target(content: Prescription) -> str:
 
 
 def side_words(side: Side | None) -> str:
-    """Which side is trained."""
+    """Trained side in words."""
     return "both sides" if side is None else side
 
 
@@ -42,7 +42,7 @@ def format_quantity(value: float, term: Term, digits: int | None = None) -> str:
 
 
 def digits_of(content: Prescription) -> int:
-    """Decimals of values beside the target: one more than the table has where its sd would hardly show."""
+    """Decimals of values next to the target: one more than in tables if the sd would hardly be visible."""
     digits, sd = CATALOGUE[content.parameter].digits, content.target.sd
     return digits + 1 if sd is not None and sd < 5.0 * 10.0**-digits else digits
 
@@ -58,7 +58,7 @@ def target_words(content: Prescription) -> str:
 
 
 def prescription_words(content: Prescription) -> list[tuple[str, str]]:
-    """The record as label and text, in reading order."""
+    """The prescription as label and text, in display order."""
     return [
         ("Trained", name_target(content)),
         ("Target", target_words(content)),
@@ -72,7 +72,7 @@ def prescription_words(content: Prescription) -> list[tuple[str, str]]:
 
 
 def schedule_words(content: Prescription) -> str:
-    """Which strides get feedback."""
+    """Schedule of strides with feedback, in words."""
     s = content.schedule
     if s.kind == "every":
         said = "every stride"

@@ -1,8 +1,8 @@
-"""Blobs in a bucket of any store that speaks S3: objects `<prefix>/blobs/<space>/<sha256>`.
+"""Blobs in an S3-compatible bucket: objects `<prefix>/blobs/<space>/<sha256>`.
 
-A file is received into the local folder `incoming` and put from there; it is acknowledged when the bucket has
-confirmed it. Whatever keeps the bucket from answering is StoreAway, within seconds: nothing is known then, so
-nothing is taken for missing. One prefix belongs to one clinic.
+A file is received into the local folder `incoming` and uploaded from there; it is acknowledged when the
+bucket has confirmed it. Any failure to reach the bucket raises StoreAway within seconds, so that files are
+not mistaken for missing. One prefix belongs to one clinic.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class BucketBlobs(BlobStore):
     Parameters
     ----------
     url : s3://name/prefix. incoming : local folder in which files are received.
-    note : called when the bucket has taken a file, before that is acknowledged.
+    note : called when the bucket has stored a file, before it is acknowledged.
 
     Raises
     ------
@@ -67,7 +67,7 @@ class BucketBlobs(BlobStore):
         self._note()
 
     def probe(self) -> None:
-        """See BlobStore; the bucket is asked for all that a clinic needs of it."""
+        """See BlobStore; tests all operations that a clinic requires of the bucket."""
         self._brief.put(_PROBE, b"probe")
         self._brief.load(_PROBE)
         next(self._brief.list(_BLOBS), None)
@@ -77,13 +77,13 @@ class BucketBlobs(BlobStore):
             file.write(bytes(4096))
 
     def keeps_versions(self) -> bool:
-        """Whether the bucket keeps what is removed: who was erased would still be in it."""
+        """Whether the bucket keeps versions of removed objects, including erased patients."""
         version = self._brief.put(_PROBE, b"probe")
         self._brief.delete([_PROBE])
         return version not in {None, "null"}
 
     def is_empty(self) -> bool:
-        """Whether there is no object at all under the prefix, but for what a killed `probe` left."""
+        """Whether there are no objects under the prefix, except the remains of a killed `probe`."""
         return all(found["path"] == _PROBE for found in self._bucket.list(""))
 
     def _load(self, space: str, sha256: str) -> bytes | None:
@@ -127,7 +127,7 @@ class BucketBlobs(BlobStore):
         self._bucket.delete([found["path"] for found in self._bucket.list(f"{folder}/")])
 
     def settle(self, spaces: Iterable[str]) -> None:
-        """See BlobStore; an answer of the bucket is final."""
+        """See BlobStore; responses of the bucket are final."""
         fs.sync_folder(self.incoming)
 
 
@@ -146,7 +146,7 @@ class BucketTrash(Trash):
                 yield one
 
     def prepare(self, found: Collection[Address], at: dt.datetime) -> None:
-        """See Trash; the copies are made."""
+        """See Trash; creates the copies."""
         for space, name in found:
             self._bucket.copy(f"{_BLOBS}{space}/{name}", _way(space, name, at))
 
@@ -155,14 +155,14 @@ class BucketTrash(Trash):
         self._brief.delete([f"{_BLOBS}{space}/{name}" for space, name in found])
 
     def forget(self, found: Collection[Address], at: dt.datetime) -> None:
-        """See Trash; the copies go."""
+        """See Trash; deletes the copies."""
         self._bucket.delete([_way(space, name, at) for space, name in found])
 
     def settle(self, found: Collection[Address], at: dt.datetime) -> None:
-        """See Trash; an answer of the bucket is final."""
+        """See Trash; responses of the bucket are final."""
 
     def receive(self, one: TrashedFile, path: Path) -> None:
-        """Take over a local file that lies in the trash of a folder."""
+        """Upload a local file from the trash of a folder."""
         self._bucket.put(_TRASH + one.way, path)
 
     def put_back(self, one: TrashedFile) -> None:

@@ -1,8 +1,8 @@
-"""Stored files that nothing refers to any more: `trash/<when>/<space>/<sha256>`, kept for 30 days.
+"""Unreferenced stored files: `trash/<when>/<space>/<sha256>`, retained for 30 days.
 
-A folder `<when>` (UTC, 20260314T031500Z) has the shape of `blobs/`, so files can be put back by hand. What
-lies there is known from the names alone. In a folder a file is moved by one rename, a crash leaves it here or
-there, and `trash/list.txt` says the same for people. In a bucket it is copied, then removed.
+A folder `<when>` (UTC, 20260314T031500Z) has the layout of `blobs/`, so files can be restored manually. The
+content is determined by names alone. In a folder each file is moved by one rename, so a crash leaves it in
+either place, and `trash/list.txt` lists the files for users. In a bucket a file is copied, then removed.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Address = tuple[str, str]
 
 @dataclass(frozen=True)
 class TrashedFile:
-    """One file in the trash: which blob it was, its length in bytes, and since when it lies there."""
+    """One file in the trash: its blob, size in bytes, and time of removal."""
 
     space: str
     name: str
@@ -39,58 +39,58 @@ class TrashedFile:
 
     @property
     def until(self) -> dt.datetime:
-        """When it is removed for good."""
+        """Time of permanent deletion."""
         return self.since + KEPT
 
     @property
     def way(self) -> str:
-        """Where it lies within the trash: `<when>/<space>/<sha256>`."""
+        """Path within the trash: `<when>/<space>/<sha256>`."""
         return f"{name_stamp(self.since)}/{self.space}/{self.name}"
 
 
 class Trash(ABC):
-    """All of it; `place` says to people where it is."""
+    """Trash of a blob store; `place` describes its location to users."""
 
     place: str
 
     @abstractmethod
     def files(self) -> Iterator[TrashedFile]:
-        """Every file, the oldest first; what is not ours is passed over, and what goes meanwhile."""
+        """All files, oldest first; foreign files and those that disappear meanwhile are skipped."""
 
     @abstractmethod
     def prepare(self, found: Collection[Address], at: dt.datetime) -> None:
-        """Do what takes time before `take`, which is called under a lock."""
+        """Do the time-consuming part of `take`, which is called under a lock."""
 
     @abstractmethod
     def take(self, found: Collection[Address], at: dt.datetime) -> None:
-        """Move stored files here, all of them prepared; survives a power cut only after `settle`."""
+        """Move prepared files here; durable only after `settle`."""
 
     @abstractmethod
     def forget(self, found: Collection[Address], at: dt.datetime) -> None:
-        """Undo `prepare` of what was not taken."""
+        """Undo `prepare` for files not taken."""
 
     @abstractmethod
     def settle(self, found: Collection[Address], at: dt.datetime) -> None:
-        """Make what `take` did survive a power cut."""
+        """Make the effects of `take` durable."""
 
     @abstractmethod
     def put_back(self, one: TrashedFile) -> None:
-        """Give a file its place among the blobs again, durably."""
+        """Durably restore a file to the blobs."""
 
     @abstractmethod
     def open(self, one: TrashedFile) -> BinaryIO:
-        """Its bytes as they are; raises OSError, StoreAway."""
+        """Open unverified content; raises OSError, StoreAway."""
 
     @abstractmethod
     def remove(self, space: str, names: Iterable[str] | None = None) -> None:
-        """Remove these files of a space for good, durably; None = the whole space."""
+        """Permanently and durably remove these files of a space; None = the whole space."""
 
     @abstractmethod
     def drop(self, found: Collection[TrashedFile]) -> None:
-        """Remove files for good."""
+        """Permanently remove files."""
 
     def expire(self, now: dt.datetime) -> int:
-        """Remove for good what has lain here long enough; return how many files."""
+        """Permanently remove expired files; return their number."""
         old = [one for one in self.files() if one.until <= now]
         if old:
             self.drop(old)
@@ -98,16 +98,16 @@ class Trash(ABC):
 
     @abstractmethod
     def tidy(self) -> None:
-        """Put things in order after files have gone."""
+        """Clean up after files have been removed."""
 
 
 def name_stamp(at: dt.datetime) -> str:
-    """`<when>`."""
+    """Format `<when>`."""
     return at.astimezone(dt.UTC).strftime(_STAMP)
 
 
 def parse_way(way: str, size: int) -> TrashedFile | None:
-    """The file at `<when>/<space>/<sha256>`; None when it is none of ours."""
+    """The file at `<when>/<space>/<sha256>`; None if the path is foreign."""
     stamp, _, rest = way.partition("/")
     space, _, name = rest.partition("/")
     since = _parse_stamp(stamp)
@@ -125,11 +125,11 @@ def _parse_stamp(name: str) -> dt.datetime | None:
 
 
 class FolderTrash(Trash):
-    """The folder; made when the first file comes.
+    """Trash in a folder, created with the first file.
 
     Parameters
     ----------
-    blobs : the folder that files come from, on the same file system.
+    blobs : folder of the stored files, on the same file system.
     """
 
     def __init__(self, root: Path, blobs: Path) -> None:
@@ -137,7 +137,7 @@ class FolderTrash(Trash):
         self._blobs = blobs
 
     def path(self, one: TrashedFile) -> Path:
-        """Where a file lies."""
+        """Path of a file."""
         return self.root / one.way
 
     def files(self) -> Iterator[TrashedFile]:
@@ -151,7 +151,7 @@ class FolderTrash(Trash):
                         yield TrashedFile(folder.name, path.name, size, since)
 
     def prepare(self, found: Collection[Address], at: dt.datetime) -> None:
-        """See Trash; a rename needs nothing."""
+        """See Trash; a rename requires no preparation."""
 
     def take(self, found: Collection[Address], at: dt.datetime) -> None:
         """See Trash."""
@@ -159,10 +159,10 @@ class FolderTrash(Trash):
             fs.move_file(self._blobs / space / name, self._folder(at) / space / name)
 
     def forget(self, found: Collection[Address], at: dt.datetime) -> None:
-        """See Trash; nothing was done."""
+        """See Trash; there is nothing to undo."""
 
     def settle(self, found: Collection[Address], at: dt.datetime) -> None:
-        """See Trash; writes the list too."""
+        """See Trash; also writes the list."""
         if not found:
             return
         for space in sorted({space for space, _ in found}):
@@ -202,7 +202,7 @@ class FolderTrash(Trash):
         self.tidy()
 
     def tidy(self) -> None:
-        """Remove empty folders and write the list, after files have gone."""
+        """Remove empty folders and write the list."""
         for stamp, _ in self._stamps():
             for folder in (*_entries(stamp), stamp):
                 if folder.is_dir() and not folder.is_symlink() and not _entries(folder):
@@ -210,7 +210,7 @@ class FolderTrash(Trash):
         self.write_list()
 
     def write_list(self) -> None:
-        """Write `list.txt`: since, until, bytes and place of every file."""
+        """Write `list.txt`: removal, expiry, size and path of every file."""
         if not self.root.is_dir():
             return
         lines = [
@@ -224,7 +224,7 @@ class FolderTrash(Trash):
         return self.root / name_stamp(at)
 
     def _stamps(self) -> list[tuple[Path, dt.datetime]]:
-        """Folders and their times, the oldest first."""
+        """Folders and their times, oldest first."""
         found = []
         for path in sorted(self.root.iterdir()) if self.root.is_dir() else ():
             since = _parse_stamp(path.name)
@@ -234,7 +234,7 @@ class FolderTrash(Trash):
 
 
 def _entries(folder: Path) -> list[Path]:
-    """What lies in a folder, by name; nothing when it is none or has gone."""
+    """Content of a folder, by name; empty if it is not a folder or has disappeared."""
     try:
         return [] if folder.is_symlink() else sorted(folder.iterdir())
     except (FileNotFoundError, NotADirectoryError):
@@ -242,7 +242,7 @@ def _entries(folder: Path) -> list[Path]:
 
 
 def _size(path: Path) -> int | None:
-    """Bytes of a file; None when it is none or has gone."""
+    """Size of a file in bytes; None if it is not a file or has disappeared."""
     try:
         found = path.lstat()
     except FileNotFoundError:

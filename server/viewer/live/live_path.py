@@ -1,4 +1,4 @@
-"""Where a person is and where they go, smoothed without delay and without their sway."""
+"""Position and heading of the walker, smoothed without delay and without lateral sway."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ Sample = tuple[float, float, float, float]
 
 
 class LivePath:
-    """Position and heading over the last two windows of about a stride.
+    """Position and heading over the last two windows of about one stride.
 
-    The mean over a window hides the sway but is half a window late; what it moved since the window before is
-    how much it lacks, so that a steady walk is followed exactly.
+    The mean over a window removes the sway but lags by half a window; the change from the previous window
+    compensates this lag, so that steady walking is followed exactly.
     """
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class LivePath:
         self._clear()
 
     def push(self, t_s: float, x: float, y: float, heading: float) -> tuple[float, float, float]:
-        """Take in a place in m and a heading in rad and return both smoothed."""
+        """Add a position in m and a heading in rad and return both smoothed."""
         if self._late.samples and not 0.0 <= t_s - self._late.samples[-1][0] <= GAP_S:
             self._clear()
         # unwrapped, so that a turn through ±π is a turn like any other
@@ -56,7 +56,7 @@ class LivePath:
 
 
 class _Window:
-    """Samples and their sums, kept up to date from one to the next."""
+    """Samples with incrementally updated sums."""
 
     def __init__(self) -> None:
         self.samples: deque[Sample] = deque()

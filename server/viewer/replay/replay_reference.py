@@ -1,4 +1,4 @@
-"""Walks made of curves that can be laid over a replay: the norm at this speed, and one side for both legs."""
+"""Reference walks for overlay on a replay: the norm at this speed, or one side's curves for both legs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Curves = Mapping[str, Floats]
 def find_references(
     reviewed: ReviewedAnalyses, this: AnalysedSession, patient: Patient, motion: ReplayMotion
 ) -> dict[GhostName, Callable[[], GhostMotion | None]]:
-    """Return name → finds the walk when it is first asked for; None where curves or strides are missing."""
+    """Return name → function that computes the walk on first use; None if curves or strides are missing."""
 
     def match(curves: Curves, lead: Side) -> GhostMotion | None:
         if not all(name in curves for name in SAGITTAL):
@@ -45,7 +45,7 @@ def find_references(
 
 
 def _average_side(reviewed: ReviewedAnalyses, this: AnalysedSession, side: Side) -> Curves:
-    """Mean curves of the strides of a side that count, rad, with its standing angles put back."""
+    """Mean curves of a side's included strides, rad, with standing angles added."""
     bundle = reviewed.read_bundle(this.found, this.edits)
     if bundle.angles is None:
         return {}
