@@ -120,7 +120,7 @@ class Catalogue:
             return self.day(value)
         if isinstance(value, str):
             return str(value) if isinstance(value, UserText) else self.translate(value)
-        return self._values.localise(format(value, spec))
+        return format(value, spec).replace(".", self._values.decimal_mark)
 
 
 def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:

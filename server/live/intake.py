@@ -27,6 +27,7 @@ from sagittal.core.formats.live_log import (
     view_samples,
 )
 from sagittal.core.message import Message
+from sagittal.core.plurals import plural
 from sagittal.server.live import protocol
 from sagittal.server.live.protocol import MOST_UNACKED, CloseCode, ProtocolError
 
@@ -231,8 +232,12 @@ class Intake:
             return IntakeAnswer(
                 protocol.error(
                     MISMATCH,
-                    f"The tablet counts {finish.count} batches, {self.next_seq} have come; send the rest and "
-                    "finish again.",
+                    Message(
+                        f"The tablet counts {{count}} {plural(finish.count, 'batch', 'batches')}, "
+                        "{next_seq} have come; send the rest and finish again.",
+                        count=finish.count,
+                        next_seq=self.next_seq,
+                    ),
                     next_seq=self.next_seq,
                 )
             )

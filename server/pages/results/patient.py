@@ -12,6 +12,7 @@ from sqlalchemy import Connection
 from starlette.responses import Response
 
 from sagittal.core.change import parameter_changes
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.core.parameters.result import Parameter
 from sagittal.server.auth.access import require
@@ -228,7 +229,12 @@ def _view_speed(
     }
     if own is not None and scale is not None and own.mean.mean is not None:
         said = ", ".join(text for text in view["speeds"] if text)
-        view["figure"] = takes_svg(own.takes, own.mean, scale, f"Takes {said}, mean {view['speed']} m/s")
+        view["figure"] = takes_svg(
+            own.takes,
+            own.mean,
+            scale,
+            Message("Takes {said}, mean {speed} m/s", said=said, speed=view["speed"]),
+        )
     before = visits.find_before(grouped, visit, planned)
     if before is not None:
         earlier = measured[id(before)]

@@ -13,6 +13,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
 from sagittal.core.errors import FormatError
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue.entry import SQUAT
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
@@ -348,7 +349,9 @@ def view_strides(model: ReportModel) -> dict[str, Any]:
         "used": model.used,
         "norm_source": model.norm_source,
         "at_speed": model.at_speed,
-        "stride_words": f"{sum(model.used.values())} of {len(model.strides)} used",
+        "stride_words": Message(
+            "{sum} of {strides} used", sum=sum(model.used.values()), strides=len(model.strides)
+        ),
         "empty_reason": explain_emptiness(model),
     }
 
@@ -357,9 +360,15 @@ def explain_emptiness(model: ReportModel) -> str:
     """Reason why an analysis has no strides or squats to show."""
     causes = [w.message for code in NO_STRIDE_CODES for w in model.warnings if w.code == code]
     what = "squat" if any(name == SQUAT for name, _ in model.groups) else "stride"
-    read = f"{seconds(model.duration_s)} of data were read, but no complete {what} was seen in them."
+    read = Message(
+        "{duration_s} of data were read, but no complete {what} was seen in them.",
+        duration_s=seconds(model.duration_s),
+        what=what,
+    )
     if what == "squat":
-        return model.problem or f"{read} A squat bends the knee by 20° or more, and comes back."
+        return model.problem or Message(
+            "{read} A squat bends the knee by 20° or more, and comes back.", read=read
+        )
     asked = "Is a sensor on each foot, and is it the one the mapping says?"
     return model.problem or " ".join([read, *(causes or [asked])])
 
@@ -383,7 +392,9 @@ def _not_compared(session: Session, model: ReportModel) -> str | None:
         return None
     if session.feedback:
         return "Walked with feedback: shown, not compared with other visits."
-    return f"No earlier visit in this condition to compare with: {model.condition}."
+    return Message(
+        "No earlier visit in this condition to compare with: {condition}.", condition=model.condition
+    )
 
 
 def _identity(patient: Patient, session: Session, condition: str) -> list[tuple[str, str]]:

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from sagittal.core.errors import Notice
 from sagittal.core.frames import SEGMENTS
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.server.report.view.quality_box import CALIBRATION_METHODS
 from sagittal.server.report.words.wording import format_number, place_words, speak_places
@@ -105,16 +106,22 @@ def say_verdict(verdict: str, checks: Sequence[Mapping[str, Any]]) -> str:
         return plural(
             len(judged),
             "The calibration passes the one check that could be judged.",
-            f"The calibration passes all {len(judged)} checks that could be judged.",
+            Message("The calibration passes all {judged} checks that could be judged.", judged=len(judged)),
         )
     if verdict == "not_judged":
         return "This take allows no check of its calibration."
     failed = [c for c in checks if c["verdict"] == "redo"]
     places = list(dict.fromkeys(place_words(c["segment"]) if c["segment"] else "walk" for c in failed))
-    shown = places if len(places) <= 3 else [*places[:2], f"{len(places) - 2} more"]
+    shown = places if len(places) <= 3 else [*places[:2], Message("{len} more", len=len(places) - 2)]
     listed = " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))
     which = plural(len(failed), "checks fails", "checks fail")
-    return f"Calibrate again: {len(failed)} of {len(judged)} {which}, at the {listed}."
+    return Message(
+        "Calibrate again: {failed} of {judged} {which}, at the {listed}.",
+        failed=len(failed),
+        judged=len(judged),
+        which=which,
+        listed=listed,
+    )
 
 
 def _view_segment(

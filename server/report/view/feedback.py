@@ -11,6 +11,7 @@ from sagittal.core.feedback import AnalysedStride, FeedbackSplit, GuardState, Pr
 from sagittal.core.feedback.cue import Summary
 from sagittal.core.feedback.guard import FIRST, LAST
 from sagittal.core.feedback.summary import Kind
+from sagittal.core.message import Message
 from sagittal.core.parameters.rows import Column
 from sagittal.core.plurals import plural
 from sagittal.server.report.charts.feedback_chart import feedback_svg
@@ -165,15 +166,25 @@ def feedback_view(
 
 def _notes(split: FeedbackSplit, term: Term) -> tuple[str, ...]:
     """Explanations, and data that could not be used."""
-    said = [_HOW_TO_READ, f"Side effects: the last {LAST} strides against the first {FIRST} of the take."]
+    said = [
+        _HOW_TO_READ,
+        Message(
+            "Side effects: the last {LAST} strides against the first {FIRST} of the take.",
+            LAST=LAST,
+            FIRST=FIRST,
+        ),
+    ]
     live = split.live_difference
     if live.mean is not None and live.sd is not None:
         said.append(
-            f"What was fed back differed from the analysis by {format_number(live.mean, term.digits + 1)} ± "
-            f"{format_quantity(live.sd, term, term.digits + 1)}."
+            Message(
+                "What was fed back differed from the analysis by {mean} ± {sd}.",
+                mean=format_number(live.mean, term.digits + 1),
+                sd=format_quantity(live.sd, term, term.digits + 1),
+            )
         )
     for n, what in ((split.unmatched, "no stride"), (split.left_out, "a stride that does not count")):
         if n:
-            cues = plural(n, "1 cue, left out, has", f"{n} cues, left out, have")
-            said.append(f"{cues} {what} in the analysis.")
+            cues = plural(n, "1 cue, left out, has", Message("{value} cues, left out, have", value=n))
+            said.append(Message("{cues} {what} in the analysis.", cues=cues, what=what))
     return tuple(said)

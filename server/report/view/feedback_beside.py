@@ -20,13 +20,16 @@ from sagittal.core.feedback import (
     SideEffect,
 )
 from sagittal.core.feedback.guard import FIRST, GuardWatch
+from sagittal.core.message import Message
 from sagittal.core.parameters.result import CycleCurves
 from sagittal.server.report.view.feedback_rows import NO_STRIDES, FeedbackRow, describe_summary, format_signed
 from sagittal.server.report.words.feedback_words import digits_of, format_quantity
 from sagittal.server.report.words.wording import Term
 
 EFFECT_REASONS: Final = {
-    "too_few_strides": f"needs {FIRST} strides at the start and {FIRST} after them, on this side",
+    "too_few_strides": Message(
+        "needs {FIRST} strides at the start and {FIRST2} after them, on this side", FIRST=FIRST, FIRST2=FIRST
+    ),
     "joint_missing": "needs the joint angles of both legs",
     "both_sides_trained": "both sides are trained",
     "no_limit": "no limit is prescribed",
@@ -110,14 +113,18 @@ def describe_effects(content: Prescription, guard: GuardState, term: Term) -> tu
 def _effect(name: str, label: str, effect: SideEffect, term: Term) -> SideEffectRow:
     if effect.change is None:
         why = EFFECT_REASONS.get(effect.reason or "", effect.reason or "")
-        return SideEffectRow(name, label, "none", None, None, None, NO_STRIDES, f"not judged: {why}")
+        return SideEffectRow(
+            name, label, "none", None, None, None, NO_STRIDES, Message("not judged: {why}", why=why)
+        )
     text = format_signed(effect.change, term)
     if effect.limit is None:
         return SideEffectRow(
             name, label, "none", effect.change, None, None, text, EFFECT_REASONS[effect.reason or "no_limit"]
         )
     limit = f"{format_quantity(effect.limit, term, max(term.digits, 1))} ({effect.source})"
-    words = f"more than {limit}" if effect.beyond else f"within {limit}"
+    words = (
+        Message("more than {limit}", limit=limit) if effect.beyond else Message("within {limit}", limit=limit)
+    )
     kind = "warn" if effect.beyond else "ok"
     return SideEffectRow(name, label, kind, effect.change, effect.limit, effect.source, text, words)
 
@@ -134,9 +141,15 @@ def compare_retention(
     if limit is None:
         verdict = "no measurement error of this parameter is known"
     elif abs(difference) <= limit.value:
-        verdict = f"within the measurement error of {format_quantity(limit.value, term, term.digits + 1)}"
+        verdict = Message(
+            "within the measurement error of {value}",
+            value=format_quantity(limit.value, term, term.digits + 1),
+        )
     else:
-        verdict = f"more than the measurement error of {format_quantity(limit.value, term, term.digits + 1)}"
+        verdict = Message(
+            "more than the measurement error of {value}",
+            value=format_quantity(limit.value, term, term.digits + 1),
+        )
     return Retention(
         before.session_id,
         before.performed_on,

@@ -155,17 +155,31 @@ def _headline(spreads: Mapping[str, Any], ran: int, sensors: int) -> str:
         found = _sides(spreads, name, ending)
         if found and ran > 1:
             values = " and ".join(f"{format_number(s['rms'], 1)}° {side or ''}" for side, s in found.items())
-            return f"{filters} on {worn}: their {words} differs by {values.strip()} (standard deviation)."
+            return Message(
+                "{filters} on {worn}: their {words} differs by {strip} (standard deviation).",
+                filters=filters,
+                worn=worn,
+                words=words,
+                strip=values.strip(),
+            )
     if ran == 1:
-        return f"{filters} on {worn}: it has no other to differ from. It is held against Sagittal's own."
-    return f"{filters} on {worn}."
+        return Message(
+            "{filters} on {worn}: it has no other to differ from. It is held against Sagittal's own.",
+            filters=filters,
+            worn=worn,
+        )
+    return Message("{filters} on {worn}.", filters=filters, worn=worn)
 
 
 def _notes(found: Mapping[str, Any], has_cycles: bool) -> list[str]:
     used = "used where a filter can" if found["magnetometer"] else "not used"
     counted = " and ".join(f"{found['strides'].get(side, 0)} {side}" for side in SIDES)
-    cycles = f"Over the gait cycle: {counted} strides." if has_cycles else "No stride counts: over time only."
-    return [f"Magnetometer: {used}. {cycles}"]
+    cycles = (
+        Message("Over the gait cycle: {counted} strides.", counted=counted)
+        if has_cycles
+        else "No stride counts: over time only."
+    )
+    return [Message("Magnetometer: {used}. {cycles}", used=used, cycles=cycles)]
 
 
 def _sides(spreads: Mapping[str, Any], name: str, ending: str) -> dict[Side | None, Any]:
@@ -263,7 +277,12 @@ def _reference(found: Mapping[str, Any], of: str | None, filter_name: str | None
             if not is_segment:
                 errors.append("" if b is None else _text(b["rmse"]))
             errors += (
-                ["", ""] if b is None else [_text(b["bias"]), f"{_text(b['low'])} to {_text(b['high'])}"]
+                ["", ""]
+                if b is None
+                else [
+                    _text(b["bias"]),
+                    Message("{text} to {text2}", text=_text(b["low"]), text2=_text(b["high"])),
+                ]
             )
         if any(errors):
             rows.append(ReferenceRow(name, label, tuple(errors), name == shown))

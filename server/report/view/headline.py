@@ -15,6 +15,7 @@ from typing import Final, Literal
 from sagittal.core.change import Change, ChangedFact, SortedChanges, name_fact
 from sagittal.core.events.result import COMPARED, Strides
 from sagittal.core.frames import SIDES, Side
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import find_entry
 from sagittal.core.parameters.flats import OTHER
 from sagittal.core.plurals import plural
@@ -118,8 +119,8 @@ class Headline:
     def compared_with(self) -> str:
         """Reference groups of the displayed sentences; empty without any."""
         *before, last = dict.fromkeys(s.against for s in self.shown) or ("",)
-        said = f"{', '.join(before)} and {last}" if before else last
-        return f"against {said}" if said else ""
+        said = Message("{before} and {last}", before=", ".join(before), last=last) if before else last
+        return Message("against {said}", said=said) if said else ""
 
     @property
     def ranks(self) -> dict[str, int]:
@@ -178,9 +179,18 @@ def say_badge(kind: str, strides: Strides) -> str:
         return ""
     left, right = (len(strides.select_used(side)) for side in SIDES)
     count = left + right
-    counted = f"{count} {plural(count, 'stride', 'strides')} used, {left} left and {right} right"
+    counted = Message(
+        f"{{count}} {plural(count, 'stride', 'strides')} used, {{left}} left and {{right}} right",
+        count=count,
+        left=left,
+        right=right,
+    )
     if min(left, right) < COMPARED and strides.strides:
-        return f"{counted}: fewer than {COMPARED} of a side are compared with nobody."
+        return Message(
+            "{counted}: fewer than {COMPARED} of a side are compared with nobody.",
+            counted=counted,
+            COMPARED=COMPARED,
+        )
     if not strides.strides:
         return "Steps are told by the trunk; sides are not compared."
     return f"{counted}."

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from sagittal.core.message import Message
 from sagittal.core.norms.at_speed import ASKED, SOURCE
 from sagittal.core.norms.controls import ControlGroup
 from sagittal.core.norms.lookup import Norms
@@ -40,8 +41,13 @@ def norm_note(
     if band is not None and angles:
         who = GROUPS.get(band.group, band.group)
         sentences.append(
-            f"{'Comfortable' if matched else 'Norm'}: {band.n} {who}, overground at their comfortable "
-            f"1.25 ± 0.16 m/s, mean ± 1 SD ({band.source})."
+            Message(
+                f"{'Comfortable' if matched else 'Norm'}: {{band}} {{who}}, overground at their "
+                "comfortable 1.25 ± 0.16 m/s, mean ± 1 SD ({source}).",
+                band=band.n,
+                who=who,
+                source=band.source,
+            )
         )
     if norms.timing_reason is not None and norms.timing_reason != norms.reason:
         sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
@@ -54,12 +60,24 @@ def norm_note(
         and not is_angle(r.name)
         and r.unit != "°"
     ]:
-        sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
+        sentences.append(
+            Message(
+                "Timing: {group} ({norm_source}).",
+                group=norms.values[shown[0].name].group,
+                norm_source=shown[0].norm_source,
+            )
+        )
     if any(r.norm_note == FEW_NOTE for r in rows):
         sentences.append(FEW_NOTE)
     if any(r.name == SPEED and r.norm is not None for r in rows):
         usual = norms.values[SPEED]
-        sentences.append(f"Gait speed: {GROUPS.get(usual.group, usual.group)} ({usual.source}).")
+        sentences.append(
+            Message(
+                "Gait speed: {group} ({source}).",
+                group=GROUPS.get(usual.group, usual.group),
+                source=usual.source,
+            )
+        )
     if controls is not None:
         sentences.append(_own_note(controls))
     return " ".join(sentences)
@@ -68,18 +86,28 @@ def norm_note(
 def _matched_note(norms: Norms) -> str:
     """Reference group that was asked to walk at this speed, and its limitations."""
     at = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
-    return (
-        f"Norm: {ASKED}{at}, overground, mean ± 1 SD ({SOURCE}). They are not people who are slow from habit "
-        "or age."
+    return Message(
+        "Norm: {ASKED}{at}, overground, mean ± 1 SD ({SOURCE}). They are not people who are "
+        "slow from habit or age.",
+        ASKED=ASKED,
+        at=at,
+        SOURCE=SOURCE,
     )
 
 
 def _own_note(controls: ControlGroup) -> str:
     """Description of the clinic's own controls, or that there are too few."""
     if controls.reason is not None:
-        return f"Own controls who walk as fast: {controls.n}, too few to compare with."
+        return Message(
+            "Own controls who walk as fast: {controls}, too few to compare with.", controls=controls.n
+        )
     small = ", a small group" if controls.note == "small_group" else ""
-    return f"Where no published norm compares: {controls.group}, {controls.n} people{small}."
+    return Message(
+        "Where no published norm compares: {group}, {controls} people{small}.",
+        group=controls.group,
+        controls=controls.n,
+        small=small,
+    )
 
 
 def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]:
@@ -96,11 +124,14 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
         label = labels.get(base if side else name)
         if label is not None:
             offsets.append(f"{label}{side or ''} {format_number(float(np.degrees(value)))}°")
-    about_zero = []
+    about_zero: list[str] = []
     if any(p.zero == "standing" and p.reason is None for p in panels):
         about_zero.append(
-            "Curves named from standing have the posture of the standing part at 0°. "
-            f"Subtracted: {', '.join(offsets)}. A person who stands bent gets curves shifted by that much."
+            Message(
+                "Curves named from standing have the posture of the standing part at 0°. Subtracted: "
+                "{offsets}. A person who stands bent gets curves shifted by that much.",
+                offsets=", ".join(offsets),
+            )
         )
     if any(p.zero == "walking" and p.reason is None for p in panels):
         about_zero.append(
@@ -122,7 +153,10 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
     most = max((c.n for p in panels for c in p.sides.values()), default=0)
     if most > drawn:
         notes.append(
-            f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the take; means are of all."
+            Message(
+                "Thin lines show {DRAWN_STRIDES} strides per side, spread over the take; means are of all.",
+                DRAWN_STRIDES=DRAWN_STRIDES,
+            )
         )
     return tuple(notes)
 
@@ -135,7 +169,11 @@ def _interrupted(panels: Sequence[CurvePanel]) -> list[str]:
         if any(c.mean_deg is not None and np.isnan(c.mean_deg).any() for c in p.sides.values())
     ]
     why = "interrupted where the leg model's knee rests on its limit in most strides"
-    return [f"{', '.join(broken).capitalize()}: {why}; nothing is measured there."] if broken else []
+    return (
+        [Message("{join}: {why}; nothing is measured there.", join=", ".join(broken).capitalize(), why=why)]
+        if broken
+        else []
+    )
 
 
 def _norm_notes(panels: Sequence[CurvePanel]) -> list[str]:

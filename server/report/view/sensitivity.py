@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sagittal.core.message import Message
 from sagittal.core.squat.joints import JOINTS
 from sagittal.server.report.files.columns import SCHEMA, reduce_to_plain, write_csv
 from sagittal.server.report.words.wording import format_number
@@ -175,18 +176,27 @@ def tell_sensitivity(found: Mapping[str, Any]) -> list[str]:
     against = found["reference"]
     share, steps = f"± {found['relative_pct']:g} %", _say_steps(found)
     for leg in found["legs"]:
-        lines.append(f"{leg['side'].capitalize()} leg")
+        lines.append(Message("{capitalize} leg", capitalize=leg["side"].capitalize()))
         if against is not None:
             errors = (f"{n} {e:.2f}" for n, e in zip(COLUMNS, leg["error_deg"], strict=True))
-            lines += [f"RMS error with nominal values, °: {', '.join(errors)}.", ""]
+            lines += [Message("RMS error with nominal values, °: {errors}.", errors=", ".join(errors)), ""]
             for title, columns, averaged, name in TABLES:
-                lines.append(f"{title}: sensitivity in %, mean of {share} of the nominal value")
+                lines.append(
+                    Message(
+                        "{title}: sensitivity in %, mean of {share} of the nominal value",
+                        title=title,
+                        share=share,
+                    )
+                )
                 rows = [(r["name"], _texts(r["sensitivity_pct"], columns, averaged, 1)) for r in leg["rows"]]
                 rows.append(("Average", _texts(leg["average_pct"], columns, averaged, 1)))
                 lines += _layout((*(COLUMNS[i] for i in columns), name), rows)
         what = "Change of the RMS error in °" if against is not None else "RMS change of the angles in °"
         every = tuple(range(len(COLUMNS)))
-        for title, member in ((f"{what}, {share}", SHOWN["share"]), (f"{what}, by {steps}", SHOWN["step"])):
+        for title, member in (
+            (f"{what}, {share}", SHOWN["share"]),
+            (Message("{what}, by {steps}", what=what, steps=steps), SHOWN["step"]),
+        ):
             lines.append(title)
             lines += _layout(COLUMNS, [(r["name"], _texts(r[member], every, (), 3)) for r in leg["rows"]])
     if any(row["reason"] for leg in found["legs"] for row in leg["rows"]):
@@ -196,7 +206,9 @@ def tell_sensitivity(found: Mapping[str, Any]) -> list[str]:
 
 
 def _say_steps(found: Mapping[str, Any]) -> str:
-    return f"steps of {found['step_mm']:g} mm and {found['step_deg']:g}°"
+    return Message(
+        "steps of {step_mm:g} mm and {step_deg:g}°", step_mm=found["step_mm"], step_deg=found["step_deg"]
+    )
 
 
 def _texts(
@@ -280,7 +292,12 @@ REASONS: Final[Mapping[str | None, str]] = {
 def view_sensitivity(content: bytes, shown: str) -> SensitivityView:
     """View of a {stem}.json; an unavailable `shown` is replaced by "step"."""
     found = json.loads(content)
-    choices = [("step", f"{found['step_mm']:g} mm and {found['step_deg']:g}°")]
+    choices: list[tuple[str, str]] = [
+        (
+            "step",
+            Message("{step_mm:g} mm and {step_deg:g}°", step_mm=found["step_mm"], step_deg=found["step_deg"]),
+        )
+    ]
     choices.append(("share", f"± {found['relative_pct']:g} %"))
     if found["reference"] is not None:
         choices.append(("quotient", "Sensitivity in %"))
@@ -300,13 +317,20 @@ def _speak(found: Mapping[str, Any]) -> Iterator[str]:
     largest = {title: _find_largest(found, names) for title, names in GROUPS}
     what = "error changes" if found["reference"] is not None else "angle changes"
     turn, place, body = (largest[title] for title, _ in GROUPS)
-    yield (
-        f"A sensor turned by {found['step_deg']:g}° matters most: an {what} by up to "
-        f"{format_number(turn[0], 1)}° ({turn[1]})."
+    yield Message(
+        "A sensor turned by {step_deg:g}° matters most: an {what} by up to {format_number}° ({turn}).",
+        step_deg=found["step_deg"],
+        what=what,
+        format_number=format_number(turn[0], 1),
+        turn=turn[1],
     )
-    yield (
-        f"A sensor {found['step_mm']:g} mm off its place: up to {format_number(place[0], 2)}°. A measure of "
-        f"the body {found['step_mm']:g} mm off: up to {format_number(body[0], 2)}°."
+    yield Message(
+        "A sensor {step_mm:g} mm off its place: up to {format_number}°. A measure of the "
+        "body {step_mm2:g} mm off: up to {format_number2}°.",
+        step_mm=found["step_mm"],
+        format_number=format_number(place[0], 2),
+        step_mm2=found["step_mm"],
+        format_number2=format_number(body[0], 2),
     )
 
 

@@ -9,6 +9,7 @@ from typing import Final
 
 from sagittal.core.events.result import COMPARED
 from sagittal.core.frames import Side
+from sagittal.core.message import Message
 from sagittal.core.norms.kinematics import Zero
 from sagittal.core.norms.lookup import Norms
 from sagittal.core.norms.values import NormValue
@@ -36,7 +37,9 @@ NOBODY: Final = Norms(None, None)
 """No reference people at all."""
 
 
-FEW_NOTE: Final = f"No norm: fewer than {COMPARED} strides of a side are compared with nothing."
+FEW_NOTE: Final = Message(
+    "No norm: fewer than {COMPARED} strides of a side are compared with nothing.", COMPARED=COMPARED
+)
 """What stands in place of a norm where no side has enough strides."""
 
 
@@ -296,10 +299,25 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
     spread = "" if p.sd is None else f" ± {format_number(p.sd, _sd_digits(term))}"
     what = name_counted(p.name)
     counted = plural(p.n, what.removesuffix("s"), what)
-    told = [f"{format_number(p.mean, digits)}{spread}\u202f{term.unit}, mean ± SD of {p.n} {counted}"]
+    told: list[str] = [
+        Message(
+            "{mean}{spread}\u202f{unit}, mean ± SD of {value} {counted}",
+            mean=format_number(p.mean, digits),
+            spread=spread,
+            unit=term.unit,
+            value=p.n,
+            counted=counted,
+        )
+    ]
     ci = None if p.ci_low is None or p.ci_high is None else (p.ci_low, p.ci_high)
     if ci is not None:
-        told.append(f"95 % CI {format_number(ci[0], digits)} to {format_number(ci[1], digits)}")
+        told.append(
+            Message(
+                "95 % CI {format_number} to {format_number2}",
+                format_number=format_number(ci[0], digits),
+                format_number2=format_number(ci[1], digits),
+            )
+        )
     if p.cv_pct is not None:
         told.append(
             f"CV {format_number(p.cv_pct, 1)} %{f' of few {what}' if p.note == 'few_strides' else ''}"
@@ -308,7 +326,11 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
     place = norms.place(p.name, p.mean if enough else None, p.uncertainty)
     if place.z is not None and place.percentile is not None:
         told.append(
-            f"z {format_number(place.z, 1)}, percentile {format_number(place.percentile)} of the norm"
+            Message(
+                "z {place}, percentile {percentile} of the norm",
+                place=format_number(place.z, 1),
+                percentile=format_number(place.percentile),
+            )
         )
     return TableCell(
         p.mean,
@@ -335,9 +357,14 @@ def _known_by(p: Parameter, term: Term) -> str:
     measured = NORMAL_95 * hypot(p.u_own, p.u_common)
     digits = max(term.digits, 1)
     if p.uncertainty is None:
-        return (
-            f"± not known: {p.n} of {name_counted(p.name)} does not say how they differ; "
-            f"{entry.errors.source} ± {format_number(measured, digits)}\u202f{term.unit} (95 %)"
+        return Message(
+            "± not known: {value} of {name} does not say how they differ; {source} ± {measured}\u202f"
+            "{unit} (95 %)",
+            value=p.n,
+            name=name_counted(p.name),
+            source=entry.errors.source,
+            measured=format_number(measured, digits),
+            unit=term.unit,
         )
     strides = sqrt(max(p.uncertainty**2 - measured**2, 0.0))
     return (

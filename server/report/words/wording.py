@@ -268,10 +268,16 @@ def symmetry_words(s: Symmetry) -> str:
     if s.ratio is None or s.index_pct is None or s.angle_pct is None:
         return "a side is too near zero for a ratio" if s.reason == "near_zero" else ""
     first, other = s.reference.split("/")
-    return (
-        f"{first} / {other} {format_number(s.ratio, 2)}, "
-        f"symmetry index {_signed(s.index_pct)} % (positive: {first} "
-        f"larger), symmetry angle {_signed(s.angle_pct)} % (negative: {first} larger)"
+    return Message(
+        "{first} / {other} {ratio}, symmetry index {index_pct} % (positive: {first2} larger), "
+        "symmetry angle {angle_pct} % (negative: {first3} larger)",
+        first=first,
+        other=other,
+        ratio=format_number(s.ratio, 2),
+        index_pct=_signed(s.index_pct),
+        first2=first,
+        angle_pct=_signed(s.angle_pct),
+        first3=first,
     )
 
 
