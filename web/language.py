@@ -33,13 +33,14 @@ SOURCE: Final = "en"
 TEXTS: Final = Path(__file__).parent / "texts"
 
 
-def _name_language(code: str) -> str:
+def name_language(code: str) -> str:
+    """Name of a language in the language itself."""
     name = Locale.parse(code).get_display_name() or code
     return name[0].upper() + name[1:]
 
 
 LANGUAGES: Final[Mapping[str, str]] = {
-    code: _name_language(code) for code in (SOURCE, *sorted(path.stem for path in TEXTS.glob("*.po")))
+    code: name_language(code) for code in (SOURCE, *sorted(path.stem for path in TEXTS.glob("*.po")))
 }
 """Code of a language → its own name; the first is that of the sources, every catalogue is another."""
 
