@@ -24,9 +24,9 @@ class UserText(str):
         """Escape the text; the result is plain markup, which templates can join with their own text."""
         return escape(str(self)).replace("&quot;", "&#34;").replace("&#x27;", "&#39;")
 
-    def __radd__(self, before: str) -> UserText:
+    def __radd__(self, prefix: str) -> UserText:
         """Return user text after concatenation with a preceding text."""
-        return UserText(before + str(self))
+        return UserText(prefix + str(self))
 
 
 def _keep_type(name: str) -> Callable[..., Any]:

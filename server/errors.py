@@ -21,10 +21,10 @@ class NotFound(ServiceError):  # noqa: N818 - the name of the HTTP status
 
     status = 404
 
-    def __init__(self, what: str, identity: str) -> None:
+    def __init__(self, kind: str, identity: str) -> None:
         super().__init__(
             "not_found",
-            Message("There is no {what} '{identity}', or it has been deleted.", what=what, identity=identity),
+            Message("There is no {kind} '{identity}', or it has been deleted.", kind=kind, identity=identity),
         )
 
 

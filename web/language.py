@@ -51,16 +51,17 @@ def choose_language(accepted: str | None) -> str:
     >>> choose_language("fr-CH, de-CH;q=0.9, en;q=0.8"), choose_language("de;q=0.2, en")
     ('de', 'en')
     """
-    asked: list[tuple[float, str]] = []
+    preferences: list[tuple[float, str]] = []
     for part in (accepted or "").split(","):
         tag, _, quality = part.strip().partition(";q=")
         try:
             weight = float(quality or 1)
         except ValueError:
             continue
-        asked.append((-weight, tag.split("-")[0].strip().lower()))
+        preferences.append((-weight, tag.split("-")[0].strip().lower()))
     return next(
-        (tag for weight, tag in sorted(asked, key=lambda a: a[0]) if weight and tag in LANGUAGES), SOURCE
+        (tag for weight, tag in sorted(preferences, key=lambda a: a[0]) if weight and tag in LANGUAGES),
+        SOURCE,
     )
 
 
@@ -93,8 +94,8 @@ class Catalogue:
 
     def translate(self, text: str) -> str:
         """Translation of a text, English if it matches no message."""
-        known = self.find(text)
-        return text if known is None else known
+        translation = self.find(text)
+        return text if translation is None else translation
 
     def fill(self, message: str, values: Mapping[str, str]) -> str:
         """Translation of a message with translated values; English if the catalogue has none."""
@@ -174,12 +175,12 @@ SCRIPT_PLACES: Final = (
 @functools.cache
 def script_texts(language: str) -> tuple[str, bytes]:
     """Translations used by scripts as JSON, and their hash for the URL."""
-    said = {
+    texts = {
         text: words
         for text, words, files in read_messages(catalogue_path(language))
         if any(name.startswith(SCRIPT_PLACES) for name in files)
     }
-    content = json.dumps(said, ensure_ascii=False, separators=(",", ":")).encode()
+    content = json.dumps(texts, ensure_ascii=False, separators=(",", ":")).encode()
     return hashlib.sha256(content).hexdigest()[:16], content
 
 
@@ -189,8 +190,8 @@ def load_catalogue(language: str) -> Catalogue:
     return Catalogue(
         language,
         {
-            text: said
-            for text, said, files in read_messages(catalogue_path(language))
+            text: translation
+            for text, translation, files in read_messages(catalogue_path(language))
             # the sentences of scripts are made in the browser
             if not (PLACEHOLDER.search(text) and all(name.startswith(SCRIPTS) for name in files))
         },

@@ -1,4 +1,5 @@
-"""Units and signs that make every later number wrong: found by physics, said before anything is computed.
+"""Implausible units and signs, which would invalidate all results: detected by physics before any
+computation.
 
 Thresholds: docs/science/quality.md, "Units and signs" (rest norm 9.81 m/s² or 1 g ± 10 %, gyroscope at rest
 below 0.2 rad/s, largest rate above 10 °/s) unless marked as our choice.
@@ -37,7 +38,7 @@ _FIX_GYR = 'declare the unit in the manifest (sources[].gyr_unit: "deg/s" or "ra
 
 
 def list_suspicions(device: str, f: Facts, acc: Floats, quat: Floats | None) -> list[Notice]:
-    """All suspicions about one sensor, the grave ones as errors; acc (n, 3) m/s², quat (n, 4)."""
+    """All suspicions about one sensor, severe ones as errors; acc (n, 3) m/s², quat (n, 4)."""
     found = [*_acceleration(device, f), *_rate(device, f)]
     if quat is not None:
         found += _sign(device, acc, quat)
@@ -88,7 +89,7 @@ def _acceleration(device: str, f: Facts) -> list[Notice]:
 
 
 def _moving_acceleration(device: str, f: Facts) -> list[Notice]:
-    """Without a still second only the median over the take can be judged: walking keeps it near gravity."""
+    """Check of the median over the recording, used without a still second: walking keeps it near gravity."""
     m = f.median_norm
     if 0.5 * GRAVITY <= m <= 2 * GRAVITY:
         return []
@@ -191,7 +192,7 @@ def _rate(device: str, f: Facts) -> list[Notice]:
 
 
 def _sign(device: str, acc: Floats, quat: Floats) -> list[Notice]:
-    """With the vendor's orientation (sensor → z up) specific force must point up on average."""
+    """Check with the vendor's orientation (sensor → z up) that specific force points up on average."""
     good = is_complete(acc) & is_complete(quat)
     if np.count_nonzero(good) < 10:
         return []

@@ -149,13 +149,13 @@ def check_code(
         raise second_factor.CodeNeeded
     with count_wrong_codes(throttle, user_id):
         with db.write() as c:
-            before = second_factor.count_recovery(c, user_id)
+            remaining_before = second_factor.count_recovery(c, user_id)
             is_right = second_factor.use(c, key_file, user_id, code or "")
-            after = second_factor.count_recovery(c, user_id)
+            remaining_after = second_factor.count_recovery(c, user_id)
         if not is_right:
             trail.record_refused("sign_in.failed", "user", user_id, address)
             raise second_factor.CodeWrong(401)
-    return Factor.RECOVERY_CODE if after < before else Factor.CODE
+    return Factor.RECOVERY_CODE if remaining_after < remaining_before else Factor.CODE
 
 
 @contextlib.contextmanager

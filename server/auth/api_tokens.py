@@ -91,15 +91,15 @@ def issue(
                 MOST_TOKENS=MOST_TOKENS,
             ),
         )
-    token, at = PREFIX + new_token(), now()
+    token, issued_at = PREFIX + new_token(), now()
     values = {
         "id": new_id(),
         "user_id": user_id,
         "name": name,
         "token_sha256": token_hash(token),
         "scopes": sorted(scopes),
-        "created_at": at,
-        "expires_at": at + dt.timedelta(days=days),
+        "created_at": issued_at,
+        "expires_at": issued_at + dt.timedelta(days=days),
     }
     c.execute(insert(api_token).values(values))
     return c.execute(select(api_token).where(api_token.c.id == values["id"])).one(), token
@@ -133,7 +133,7 @@ def read_bearer(connection: HTTPConnection) -> str | None:
 
 def find_bearer(db: Database, token: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
     """Identity for a token; None if it is unknown, expired or revoked, or its account is closed."""
-    at = now()
+    time = now()
     query = (
         select(
             user,
@@ -143,14 +143,14 @@ def find_bearer(db: Database, token: str, parts: Mapping[str, str] = NOTHING) ->
             opens_parts(parts).label("opens"),
         )
         .join(api_token, api_token.c.user_id == user.c.id)
-        .where(api_token.c.token_sha256 == token_hash(token), api_token.c.expires_at > at, user.c.active)
+        .where(api_token.c.token_sha256 == token_hash(token), api_token.c.expires_at > time, user.c.active)
     )
-    found = db.ask(query)
-    if not found:
+    rows = db.ask(query)
+    if not rows:
         return None
-    [row] = found
-    if row.used_at is None or row.used_at <= at - _TOUCH_EVERY:
-        _write_used(db, row.token_id, at)
+    [row] = rows
+    if row.used_at is None or row.used_at <= time - _TOUCH_EVERY:
+        _write_used(db, row.token_id, time)
     allowed = frozenset[Action]().union(*(SCOPES[Scope(scope)] for scope in row.scopes))
     login_id = f"token:{row.token_id}"
     return Identity(
@@ -158,10 +158,10 @@ def find_bearer(db: Database, token: str, parts: Mapping[str, str] = NOTHING) ->
     )
 
 
-def _write_used(db: Database, token_id: str, at: dt.datetime) -> None:
+def _write_used(db: Database, token_id: str, time: dt.datetime) -> None:
     try:
         with db.write() as c:
-            c.execute(update(api_token).where(api_token.c.id == token_id).values(used_at=at))
+            c.execute(update(api_token).where(api_token.c.id == token_id).values(used_at=time))
     except OperationalError as error:
         if refusal_of(error) is None:
             raise

@@ -176,12 +176,12 @@ def _take_code(c: Connection, key_file: Path, user_id: str, code: str, at_s: flo
 
 
 def _take_recovery(c: Connection, user_id: str, code: str) -> bool:
-    found = token_hash(code.strip().upper())
+    digest = token_hash(code.strip().upper())
     mine = second_factor.c.user_id == user_id
     left = list(c.execute(select(second_factor.c.recovery).where(mine)).scalar() or ())
-    if found not in left:
+    if digest not in left:
         return False
-    left.remove(found)
+    left.remove(digest)
     c.execute(update(second_factor).where(mine).values(recovery=left))
     return True
 
@@ -199,13 +199,13 @@ def find_problems(c: Connection, key_file: Path) -> list[str]:
         key = _read_key(key_file)
     except KeyOfFactorsUnusable as error:
         return [f"{key_file}: {error.detail}"]
-    found = []
+    problems = []
     for row in rows:
         try:
             _open(key, row.secret)
         except KeyOfFactorsUnusable:
-            found.append(f"the second factor of account {row.user_id} needs another key than {key_file}")
-    return found
+            problems.append(f"the second factor of account {row.user_id} needs another key than {key_file}")
+    return problems
 
 
 def _make_missing_key(c: Connection, path: Path) -> None:

@@ -112,8 +112,8 @@ def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> di
             "second_factor_off",
             "Set up the authenticator first: its recovery codes help when a key is lost.",
         )
-    known = list_keys(c, user_id)
-    if len(known) >= MOST_KEYS:
+    keys = list_keys(c, user_id)
+    if len(keys) >= MOST_KEYS:
         raise Problem(
             409,
             "too_many_keys",
@@ -125,7 +125,7 @@ def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> di
         user_name=name,
         user_id=bytes.fromhex(user_id),
         challenge=_new_challenge(c, user_id, "register"),
-        exclude_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in known],
+        exclude_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in keys],
     )
     return _as_tree(options_to_json(options))
 
@@ -135,19 +135,19 @@ def take_challenge(c: Connection, user_id: str, purpose: Purpose, answer: Mappin
     from webauthn import base64url_to_bytes
 
     try:
-        said = json.loads(base64url_to_bytes(str(answer["response"]["clientDataJSON"])))
-        challenge = base64url_to_bytes(str(said["challenge"]))
+        client_data = json.loads(base64url_to_bytes(str(answer["response"]["clientDataJSON"])))
+        challenge = base64url_to_bytes(str(client_data["challenge"]))
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
     table = security_key_challenge
-    given = (
+    expected = (
         table.c.challenge_sha256 == token_hash(challenge.hex()),
         table.c.user_id == user_id,
         table.c.purpose == purpose,
         table.c.expires_at > now(),
     )
     # of two that come at once one deletes the row
-    return challenge if c.execute(delete(table).where(*given)).rowcount else None
+    return challenge if c.execute(delete(table).where(*expected)).rowcount else None
 
 
 def register(
@@ -167,13 +167,13 @@ def register(
     if challenge is None or not site.has_keys or not second_factor.is_on(c, user_id):
         raise KeyRefused(403)
     with _refusals(403):
-        made = verify_registration_response(
+        verified = verify_registration_response(
             credential=dict(answer),
             expected_challenge=challenge,
             expected_rp_id=site.host,
             expected_origin=site.origin,
         )
-    same = select(security_key.c.id).where(security_key.c.credential_id == made.credential_id)
+    same = select(security_key.c.id).where(security_key.c.credential_id == verified.credential_id)
     if c.execute(same).first() is not None:
         raise KeyRefused(403)
     if len(list_keys(c, user_id)) >= MOST_KEYS:
@@ -187,9 +187,9 @@ def register(
         "user_id": user_id,
         "name": name,
         "host": site.address,
-        "credential_id": made.credential_id,
-        "public_key": made.credential_public_key,
-        "sign_count": made.sign_count,
+        "credential_id": verified.credential_id,
+        "public_key": verified.credential_public_key,
+        "sign_count": verified.sign_count,
         "created_at": now(),
     }
     c.execute(insert(security_key).values(row))
@@ -201,13 +201,13 @@ def begin_sign_in(c: Connection, site: Site, user_id: str) -> dict[str, Any] | N
     from webauthn import generate_authentication_options, options_to_json
     from webauthn.helpers.structs import PublicKeyCredentialDescriptor, UserVerificationRequirement
 
-    known = list_usable(c, site, user_id)
-    if not known or not second_factor.is_on(c, user_id):
+    keys = list_usable(c, site, user_id)
+    if not keys or not second_factor.is_on(c, user_id):
         return None
     options = generate_authentication_options(
         rp_id=site.host,
         challenge=_new_challenge(c, user_id, "sign_in"),
-        allow_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in known],
+        allow_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in keys],
         # the password is what one knows; the key is what one has
         user_verification=UserVerificationRequirement.DISCOURAGED,
     )
@@ -257,15 +257,15 @@ def remove(c: Connection, site: Site, user_id: str, key_id: str) -> None:
 
 def _new_challenge(c: Connection, user_id: str, purpose: Purpose) -> bytes:
     """Create a challenge and delete expired or surplus ones of this account."""
-    at, made = now(), secrets.token_bytes(32)
+    time, challenge = now(), secrets.token_bytes(32)
     table = security_key_challenge
-    c.execute(delete(table).where(table.c.expires_at <= at))
+    c.execute(delete(table).where(table.c.expires_at <= time))
     mine = select(table.c.challenge_sha256).where(table.c.user_id == user_id)
     waiting = c.execute(mine.order_by(table.c.expires_at.desc()).offset(_MOST_WAITING - 1)).scalars().all()
     c.execute(delete(table).where(table.c.challenge_sha256.in_(waiting)))
-    row = {"challenge_sha256": token_hash(made.hex()), "user_id": user_id, "purpose": purpose}
-    c.execute(insert(table).values(**row, expires_at=at + CHALLENGE_LIFE))
-    return made
+    row = {"challenge_sha256": token_hash(challenge.hex()), "user_id": user_id, "purpose": purpose}
+    c.execute(insert(table).values(**row, expires_at=time + CHALLENGE_LIFE))
+    return challenge
 
 
 @contextlib.contextmanager

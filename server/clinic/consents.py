@@ -94,12 +94,12 @@ def give(
 
 def withdraw(c: Connection, actor: audit.Actor | None, consent_id: str) -> Consent:
     """Record a withdrawal as of today; raises NotFound, Conflict withdrawn_already."""
-    found = get(c, consent_id)
-    if found.withdrawn_on is not None:
+    current = get(c, consent_id)
+    if current.withdrawn_on is not None:
         raise Conflict("withdrawn_already", "That it was withdrawn is written down already.")
     c.execute(update(consent).where(consent.c.id == consent_id).values(withdrawn_on=now().date()))
-    detail = {"consent_id": consent_id, "purpose": found.purpose}
-    audit.record(c, actor, "consent.withdrawn", "patient", found.patient_id, detail)
+    detail = {"consent_id": consent_id, "purpose": current.purpose}
+    audit.record(c, actor, "consent.withdrawn", "patient", current.patient_id, detail)
     return get(c, consent_id)
 
 

@@ -90,16 +90,16 @@ def change(
 
     The key is read in the writing transaction, so that it cannot be changed in between.
     """
-    before = get(c, key_file, patient_id)
+    previous = get(c, key_file, patient_id)
     checked = {name: _check(name, value) for name, value in values.items()}
-    changed = sorted(name for name, value in checked.items() if getattr(before, name) != value)
+    changed = sorted(name for name, value in checked.items() if getattr(previous, name) != value)
     if not changed:
-        return before
-    after = {name: checked.get(name, getattr(before, name)) for name in FIELDS}
+        return previous
+    updated = {name: checked.get(name, getattr(previous, name)) for name in FIELDS}
     mine = patient_identity.c.patient_id == patient_id
     c.execute(delete(patient_identity).where(mine))
-    if any(value is not None for value in after.values()):
-        sealed = _seal(_read_sealing(c, key_file), patient_id, after)
+    if any(value is not None for value in updated.values()):
+        sealed = _seal(_read_sealing(c, key_file), patient_id, updated)
         c.execute(insert(patient_identity).values(patient_id=patient_id, changed_at=now(), **sealed))
     audit.record(c, actor, "identity.changed", "patient", patient_id, {"fields": changed})
     return get(c, key_file, patient_id)
@@ -213,13 +213,13 @@ def find_problems(c: Connection, key_file: Path) -> list[str]:
         keys = _read_keys(c, key_file)
     except KeyUnusable as error:
         return [f"{key_file}: {error.message}"]
-    found = []
+    problems = []
     for row in c.execute(select(patient_identity).order_by(patient_identity.c.patient_id)):
         try:
             _open(keys, row._asdict())
         except SagittalError as error:
-            found.append(f"patient {row.patient_id}: {error.message}")
-    return found
+            problems.append(f"patient {row.patient_id}: {error.message}")
+    return problems
 
 
 def _open_all(c: Connection, keys: FieldKeys) -> None:

@@ -58,13 +58,13 @@ class StudyChoice:
     visits: frozenset[str] | None = None
 
 
-def list_visits(c: Connection, who: Identity, choice: StudyChoice) -> list[Session]:
+def list_visits(c: Connection, user: Identity, choice: StudyChoice) -> list[Session]:
     """Selected visits that a user may open, by patient and date."""
     if choice.visits is not None and not choice.visits:
         return []
     return sessions.search(
         c,
-        who,
+        user,
         search=choice.search,
         protocol=choice.protocol,
         since=choice.since,
@@ -90,7 +90,7 @@ def check_size(chosen: Sequence[Session]) -> None:
 
 
 def make_study(
-    db: Database, reviewed: ReviewedAnalyses, who: Identity, choice: StudyChoice
+    db: Database, reviewed: ReviewedAnalyses, user: Identity, choice: StudyChoice
 ) -> tuple[StudyTables, list[str]]:
     """Write the tables of a selection and list the visits they contain.
 
@@ -100,25 +100,25 @@ def make_study(
         no_visits, too_many_visits.
     """
     with db.read() as c:
-        chosen = list_visits(c, who, choice)
+        chosen = list_visits(c, user, choice)
         check_size(chosen)
         people = {p: patients.get(c, p) for p in dict.fromkeys(s.patient_id for s in chosen)}
-        shown = analyses.latest_of(c, [s.id for s in chosen])
-        edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
-        recorded = {s: recordings.get(c, found.recording_id) for s, found in shown.items()}
+        records = analyses.latest_of(c, [s.id for s in chosen])
+        edits = edit_log.edits_of_all(c, [record.id for record in records.values()])
+        recorded = {s: recordings.get(c, record.recording_id) for s, record in records.items()}
     first: dict[str, dt.date] = {}
     for s in chosen:
         first[s.patient_id] = min(s.performed_on, first.get(s.patient_id, s.performed_on))
     takes = []
     for s in chosen:
         person, name = people[s.patient_id], _name(s)
-        found = shown.get(s.id)
+        record = records.get(s.id)
         labels = _label(person, s, first[s.patient_id])
-        if found is None:
+        if record is None:
             lacking = SagittalError("no_analysis", "This visit has no analysis. Analyse it, or leave it out.")
             takes.append(StudyTake(name, labels, 0, {}, lacking, dict, lambda: None))
         else:
-            done = AnalysedSession(s, found, edits[found.id])
+            done = AnalysedSession(s, record, edits[record.id])
             labels |= {"condition": done.condition.words, "edits": len(done.edits.made)}
             files = {f.name: f.sha256 for f in recorded[s.id].files}
             takes.append(_open_take(reviewed, name, labels, files, done))
@@ -126,9 +126,9 @@ def make_study(
         "written_by": CODE_VERSION,
         "written_at": now().isoformat(timespec="seconds"),
         "analyses": {
-            _name(s): {"analysed_by": found.code_version, "config": dict(found.config)}
+            _name(s): {"analysed_by": record.code_version, "config": dict(record.config)}
             for s in chosen
-            if (found := shown.get(s.id)) is not None
+            if (record := records.get(s.id)) is not None
         },
     }
     return write_study(takes, about), [s.id for s in chosen]
@@ -142,17 +142,17 @@ def _open_take(
     done: AnalysedSession,
 ) -> StudyTake:
     """Current result of a visit; an unreadable one is reported, without affecting the others."""
-    found, edits = done.found, done.edits
+    record, edits = done.found, done.edits
     error, strides, analysis = None, None, {}
     try:
-        analysis = json.loads(analyses.file_bytes(reviewed.blobs, found, "analysis.json"))
-        result = reviewed.measure(found, edits)
+        analysis = json.loads(analyses.file_bytes(reviewed.blobs, record, "analysis.json"))
+        result = reviewed.measure(record, edits)
         if result is not None:
             strides = strides_csv(result.strides, result.columns)
-            bundle = reviewed.read_bundle(found, edits)
+            bundle = reviewed.read_bundle(record, edits)
             analysis["parameters"] = [parameter_row(p) for p in bundle.parameters]
-        elif "strides.csv" in found.files:
-            strides = analyses.file_bytes(reviewed.blobs, found, "strides.csv")
+        elif "strides.csv" in record.files:
+            strides = analyses.file_bytes(reviewed.blobs, record, "strides.csv")
     except StoreAway:
         raise  # it is not this visit that cannot be read
     except SagittalError as refused:

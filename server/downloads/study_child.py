@@ -45,9 +45,9 @@ def main() -> None:
     line.send(msgspec.msgpack.encode(reply, enc_hook=encode_user_text))
 
 
-def _make(settings: Settings, who: Identity, choice: StudyChoice) -> StudyReply:
+def _make(settings: Settings, user: Identity, choice: StudyChoice) -> StudyReply:
     with closing(Database(settings.database_source)) as db:
-        tables, visits = make_study(db, ReviewedAnalyses(open_blobs(settings)), who, choice)
+        tables, visits = make_study(db, ReviewedAnalyses(open_blobs(settings)), user, choice)
     return StudyReply(zip_files(tables.files), tuple(visits))
 
 

@@ -95,10 +95,10 @@ def as_problem(error: Exception) -> Problem:
         )
     if isinstance(error, AnyHttpException):
         code = CODE_OF_STATUS.get(error.status_code, "http_error")
-        said = str(error.detail)
-        is_bare = said == HTTPStatus(error.status_code).phrase
+        text = str(error.detail)
+        is_bare = text == HTTPStatus(error.status_code).phrase
         return Problem(
-            error.status_code, code, SENTENCES.get(code, said) if is_bare else said, headers=error.headers
+            error.status_code, code, SENTENCES.get(code, text) if is_bare else text, headers=error.headers
         )
     refusal = refusal_of(error)
     if refusal is not None:
@@ -173,9 +173,9 @@ def install(app: FastAPI) -> None:
         response = problem_response(problem, connection)
         # Starlette answers 500 outside of all middleware
         add_security_headers(response.headers)
-        asked = request_id.get()
-        if asked is not None:
-            response.headers["X-Request-ID"] = asked
+        current_id = request_id.get()
+        if current_id is not None:
+            response.headers["X-Request-ID"] = current_id
         return response
 
     async def handle_disk(connection: HTTPConnection, error: Exception) -> Response | None:

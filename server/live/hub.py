@@ -263,10 +263,10 @@ class Hub:
         if take is not None:
             return take.standing()
         row = self.rows.current(session_id)
-        found = describe_unjoined(row)
+        state = describe_unjoined(row)
         if row is not None and row.is_open and not self.owner.has(row):
-            found["problem"] = NODE_AWAY
-        return found
+            state["problem"] = NODE_AWAY
+        return state
 
     def tell_state(self, take: ActiveTake) -> None:
         """Send the state of a trial to browsers, unless it has ended (see `_tell_over`)."""
@@ -346,11 +346,11 @@ class Hub:
         self.leave(row.session_id)
 
     async def _tick(self) -> None:
-        told = 0.0
+        sent_at = 0.0
         while True:
             await asyncio.sleep(TICK_S)
             now = time.monotonic()
-            tell = now - told >= STATE_S
+            tell = now - sent_at >= STATE_S
             for take in tuple(self._takes.values()):
                 take.look(now)
                 if take.tablet is None and now - take.grown_at > ABANDONED_S and not take.over.is_set():
@@ -358,7 +358,7 @@ class Hub:
                     take.recorder.finish()
                 if tell and take.state == "streaming":
                     self.tell_state(take)
-            told = now if tell else told
+            sent_at = now if tell else sent_at
 
     async def _mind_rows(self) -> None:
         """Release trials that were erased or taken over elsewhere, and end those ended there."""

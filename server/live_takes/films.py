@@ -234,14 +234,14 @@ def settle(db: Database, blobs: BlobStore, settings: Settings, path: Path) -> bo
     if take.is_open or (not stored and live_recordings.log_path(path.parent, take_id).exists()):
         raise Conflict("take_open", "The take is not over and stored yet; ask again in a moment.")
     try:
-        kept = stored and _keep(db, blobs, settings, opener, take, path)
-        if not kept:
+        attached = stored and _keep(db, blobs, settings, opener, take, path)
+        if not attached:
             with db.write() as c:
                 audit.record(c, None, "video.discarded", "session", take.session_id, {"take_id": take_id})
     except NotFound:
-        kept = False  # erased meanwhile
+        attached = False  # erased meanwhile
     fs.remove_file(path)
-    return kept
+    return attached
 
 
 def settle_abandoned(db: Database, blobs: BlobStore, settings: Settings) -> None:
@@ -315,8 +315,8 @@ def _read_pieces(path: Path) -> Iterator[bytes]:
 
 def _read_head(path: Path) -> _FilmHead | None:
     for _, one in segments.read_records(path):
-        said: Any = read_json(one.body) if one.kind == "H" else None
+        head: Any = read_json(one.body) if one.kind == "H" else None
         with contextlib.suppress(TypeError, KeyError, ValueError):
-            return _FilmHead(int(said["began_us"]), dt.datetime.fromisoformat(said["consent_at"]))
+            return _FilmHead(int(head["began_us"]), dt.datetime.fromisoformat(head["consent_at"]))
         break
     return None

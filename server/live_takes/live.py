@@ -155,14 +155,14 @@ class CodeNotValid(ServiceError):  # noqa: N818 - what the person reads
 def pair(c: Connection, code: str) -> TabletAccess:
     """Consume a code; raises CodeNotValid. The caller counts failures (server/auth/throttle.py)."""
     plain = "".join(code.split()).replace("-", "").upper()
-    token, at = new_token(), now()
+    token, issued_at = new_token(), now()
     row = c.execute(
         select(live_take.c.id, live_take.c.session_id, live_take.c.state, session.c.title, patient.c.code)
         .join(session, session.c.id == live_take.c.session_id)
         .join(patient, patient.c.id == session.c.patient_id)
         .where(
             live_take.c.code_sha256 == token_hash(plain),
-            live_take.c.code_expires_at > at,
+            live_take.c.code_expires_at > issued_at,
             live_take.c.state.in_(OPEN_TAKE_STATES),
         )
     ).first()
@@ -173,7 +173,7 @@ def pair(c: Connection, code: str) -> TabletAccess:
         "code_sha256": None,
         "code_expires_at": None,
         "token_sha256": token_hash(token),
-        "token_expires_at": at + TOKEN_LIFE,
+        "token_expires_at": issued_at + TOKEN_LIFE,
     }
     c.execute(update(live_take).where(live_take.c.id == row.id).values(values))
     audit.record(c, None, "live.paired", "session", row.session_id, {"take_id": row.id})

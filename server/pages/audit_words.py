@@ -199,22 +199,30 @@ def describe_rows(c: Connection, rows: Sequence[Row[Any]]) -> list[AuditSentence
     query = select(session.c.id, session.c.performed_on, patient.c.code).join(patient)
     visits = {r.id: r for r in c.execute(query.where(session.c.id.in_(ids)))}
     accesses = [row.detail.get("access") for row in rows if row.action == "emergency.opened"]
-    given = select(emergency_access.c.id, emergency_access.c.reason).where(
+    reasons_query = select(emergency_access.c.id, emergency_access.c.reason).where(
         emergency_access.c.id.in_(accesses)
     )
-    reasons = {r.id: r.reason for r in c.execute(given)} if accesses else {}
-    found = []
+    reasons = {r.id: r.reason for r in c.execute(reasons_query)} if accesses else {}
+    sentences = []
     for row in rows:
-        why = reasons.get(row.detail.get("access"))
+        stated_reason = reasons.get(row.detail.get("access"))
         visit = visits.get(row.resource_id)
         code = codes.get(row.resource_id)
-        whom, of, href = code, None, None if code is None else f"/patients/{row.resource_id}"
+        patient_code, date, href = code, None, None if code is None else f"/patients/{row.resource_id}"
         if visit is not None:
-            whom, of, href = visit.code, day(visit.performed_on), f"/sessions/{visit.id}"
-        found.append(
-            AuditSentence(_name(row), describe_deed(row.action, row.detail), whom, of, href, why, row)
+            patient_code, date, href = visit.code, day(visit.performed_on), f"/sessions/{visit.id}"
+        sentences.append(
+            AuditSentence(
+                _name(row),
+                describe_deed(row.action, row.detail),
+                patient_code,
+                date,
+                href,
+                stated_reason,
+                row,
+            )
         )
-    return found
+    return sentences
 
 
 def describe_deed(action: str, detail: Mapping[str, Any] | None = None) -> str:

@@ -138,8 +138,8 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
         attempt.keep(content)
         attempt.progress("searching", share, message)
 
-    found = search(tuner, keep, swarm).to_json()
-    return {RESULT: json.dumps(found, ensure_ascii=False, allow_nan=False).encode()}
+    result = search(tuner, keep, swarm).to_json()
+    return {RESULT: json.dumps(result, ensure_ascii=False, allow_nan=False).encode()}
 
 
 def submit(

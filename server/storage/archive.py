@@ -85,8 +85,8 @@ def read_key(path: Path) -> ClinicKey:
     try:
         lines = [line.strip() for line in path.read_text("utf-8").splitlines()]
     except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise BackupFileError(f"The key {path} cannot be read ({why}).") from error
+        reason = getattr(error, "strerror", None) or error
+        raise BackupFileError(f"The key {path} cannot be read ({reason}).") from error
     text = next((line for line in lines if line and not line.startswith("#")), "")
     try:
         if text.startswith(_SECRET):

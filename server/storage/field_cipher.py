@@ -60,8 +60,8 @@ class FieldKeys:
 
     def only(self, name: str) -> FieldKeys:
         """A single key of the set."""
-        wanted = bytes.fromhex(name)
-        return FieldKeys({wanted: self.keys[wanted]})
+        key_name = bytes.fromhex(name)
+        return FieldKeys({key_name: self.keys[key_name]})
 
     def seal(self, text: str, row_id: str, name: str) -> bytes:
         """Encrypt a text without NUL for one field of one row."""
@@ -138,9 +138,9 @@ def read_keys(path: Path) -> FieldKeys:
         raise KeyUnusable(
             "identity_key_missing", "The key of patients' names cannot be read. The operator puts it right."
         ) from error
-    found = [_LINE.fullmatch(line) for line in lines if line and not line.startswith("#")]
-    keys = [bytes.fromhex(one[1]) for one in found if one is not None]
-    if not keys or len(keys) != len(found):
+    matches = [_LINE.fullmatch(line) for line in lines if line and not line.startswith("#")]
+    keys = [bytes.fromhex(one[1]) for one in matches if one is not None]
+    if not keys or len(keys) != len(matches):
         raise KeyUnusable(
             "identity_key_wrong",
             "The file of the key of patients' names holds no such key. The operator puts the right one back.",

@@ -31,16 +31,16 @@ def list_files(c: Connection, session_id: str) -> list[RecordedFile]:
 
 def get(c: Connection, session_id: str, name: str) -> RecordedFile:
     """One reference; raises NotFound."""
-    found = next((f for f in list_files(c, session_id) if f.name == name), None)
-    if found is None:
+    file = next((f for f in list_files(c, session_id) if f.name == name), None)
+    if file is None:
         raise NotFound("reference", name)
-    return found
+    return file
 
 
 def file_bytes(c: Connection, blobs: BlobStore, session_id: str, name: str) -> bytes:
     """Read and verify a reference as uploaded; raises NotFound, IntegrityError."""
-    found = get(c, session_id, name)
-    return blobs.read(sessions.get(c, session_id).patient_id, found.sha256)
+    file = get(c, session_id, name)
+    return blobs.read(sessions.get(c, session_id).patient_id, file.sha256)
 
 
 def remove(c: Connection, actor: audit.Actor | None, session_id: str, name: str) -> None:

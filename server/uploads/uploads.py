@@ -69,18 +69,18 @@ def begin(
         raise receiving.make_too_large(name, settings.max_file_bytes)
     with db.write() as c:
         recordings.patient_of(c, session_id)
-        others = 0
+        reserved = 0
         coming = list_coming(c, blobs, session_id)
         for one in coming:
             if (one.name, one.size) == (name, size):
                 return one
-            others += one.size
+            reserved += one.size
         if len(coming) >= settings.max_files:
             raise TooLarge(
                 "too_many_files",
                 Message("At most {max_files} files come at a time.", max_files=settings.max_files),
             )
-        receiving.check_set(c, settings, session_id, name, size + others)
+        receiving.check_set(c, settings, session_id, name, size + reserved)
         receiving.require_room(blobs, settings, size)
         fresh = new_id()
         row = {"id": fresh, "session_id": session_id, "name": name, "size": size, "created_at": now()}
@@ -277,8 +277,8 @@ def _find(c: Connection, session_id: str, upload_id: str) -> Any:
 
 def _describe(blobs: BlobStore, row: Any) -> FileUpload:
     path = blobs.part(row.id)
-    there = path.stat().st_size if path.exists() else 0
-    return FileUpload(row.id, row.name, row.size, row.size if row.finished_sha256 else min(there, row.size))
+    length = path.stat().st_size if path.exists() else 0
+    return FileUpload(row.id, row.name, row.size, row.size if row.finished_sha256 else min(length, row.size))
 
 
 def _hash(path: Path) -> str:

@@ -57,18 +57,18 @@ def find(c: Connection, session_id: str) -> SessionVideo | None:
 def get(c: Connection, session_id: str) -> SessionVideo:
     """Video of a session; raises NotFound for the session and for its video."""
     sessions.get(c, session_id)
-    found = find(c, session_id)
-    if found is None:
+    video = find(c, session_id)
+    if video is None:
         raise NotFound("video of session", session_id)
-    return found
+    return video
 
 
 def find_stored(c: Connection, blobs: BlobStore, session_id: str) -> tuple[SessionVideo, str]:
     """A video and the space of its blob; raises NotFound, IntegrityError if missing."""
-    found = get(c, session_id)
+    video = get(c, session_id)
     space = sessions.get(c, session_id).patient_id
-    blobs.require(space, found.sha256)
-    return found, space
+    blobs.require(space, video.sha256)
+    return video, space
 
 
 def align(c: Connection, actor: audit.Actor | None, session_id: str, offset_s: float | None) -> SessionVideo:

@@ -1,4 +1,4 @@
-"""Every filter that can be asked for by name: the published ones and the project's own."""
+"""All selectable filters: the published ones and those of this project."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from sagittal.core.message import Message
 
 @dataclass(frozen=True)
 class OwnFilter:
-    """The project's own self-calibrating filter beside the published ones; `both_ways`: after the take."""
+    """The project's self-calibrating filter, in addition to the published ones; `both_ways`: smoothed,
+    offline only.
+    """
 
     name: str
     label: str
@@ -30,7 +32,7 @@ LABELS: Final[dict[str, str]] = {a.name: a.shown for a in ALGORITHMS} | {o.name:
 
 
 def require_filters(names: Sequence[str]) -> None:
-    """Refuse a choice of filters that names none, or one that is not listed.
+    """Reject an empty selection of filters, or an unknown filter.
 
     Raises
     ------
@@ -46,7 +48,7 @@ def require_filters(names: Sequence[str]) -> None:
 
 
 def require_tunable(name: str) -> None:
-    """Refuse a filter that is not listed, or has no gains to fit: the project's own estimates its own.
+    """Reject an unknown filter, or one without gains to fit: the project's own estimates its parameters.
 
     Raises
     ------

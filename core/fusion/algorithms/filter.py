@@ -22,7 +22,7 @@ UPRIGHT: Final = 0.9
 
 @dataclass(frozen=True, eq=False)
 class RestMeans:
-    """Means over a rest, from which a filter starts: tilt and heading by TRIAD, norms, gyroscope bias.
+    """Means over a rest to initialise a filter: tilt and heading by TRIAD, norms, gyroscope bias.
 
     Parameters
     ----------
@@ -35,11 +35,11 @@ class RestMeans:
 
     @classmethod
     def over(cls, acc: Floats, gyr: Floats, mag: Floats | None = None) -> RestMeans:
-        """Means of the samples (n, S, 3) of a rest; samples that are not numbers are left out.
+        """Means of the samples (n, S, 3) of a rest; non-finite samples are ignored.
 
         Raises
         ------
-        SignalError `bad_signal` where a sensor has none.
+        SignalError `bad_signal` if a sensor has none.
         """
         means = [None if x is None else _mean(x) for x in (acc, gyr, mag)]
         return cls(*means)  # type: ignore[arg-type]
@@ -51,7 +51,7 @@ class RestMeans:
 
         Raises
         ------
-        SignalError `bad_signal` where there is no gravity, or the field is vertical.
+        SignalError `bad_signal` without gravity, or if the field is vertical.
         """
         q, field = np.empty((len(self.acc), 4)), np.tile([0.0, 1.0, 0.0], (len(self.acc), 1))
         R = np.empty((3, 3))
@@ -85,14 +85,14 @@ class FusionFilter:
 
     Parameters
     ----------
-    name : of `ALGORITHMS`. rate_hz : of the samples. rest : what it starts from. params : gains, of the
-    algorithm's own class; None = its defaults. magnetometer : whether to use one; None = where `rest` has it
-    and the algorithm can.
+    name : of `ALGORITHMS`. rate_hz : of the samples. rest : initial conditions. params : gains, of the
+        algorithm's class; None = its defaults. magnetometer : whether to use one; None = if `rest` has it and
+        the algorithm supports it.
 
     Raises
     ------
-    ParameterError `no_such_algorithm`, `gain_out_of_range`.
-    EstimationError `no_magnetometer` where the algorithm needs one.
+    ParameterError `no_such_algorithm`, `gain_out_of_range`. EstimationError `no_magnetometer` if the
+    algorithm needs one.
     """
 
     def __init__(
@@ -152,12 +152,12 @@ class FusionFilter:
 
     @property
     def bias(self) -> Floats | None:
-        """Gyroscope bias (S, 3) in rad/s on top of that of the rest; None where a filter has none."""
+        """Gyroscope bias (S, 3) in rad/s relative to that of the rest; None if the filter has none."""
         at = self._prepared.bias
         return None if at is None else self._prepared.state[:, at : at + 3].copy()
 
     def reset(self, q: Floats) -> None:
-        """Start again at orientations q (S, 4) sensor to world, in the frame of the rest's field."""
+        """Restart at orientations q (S, 4) sensor to world, in the frame of the rest's field."""
         q = np.ascontiguousarray(q, np.float64)
         if q.shape != (len(self._rest.acc), 4) or not (np.linalg.norm(q, axis=1) > 0.0).all():
             raise ParameterError(
@@ -173,17 +173,17 @@ class FusionFilter:
     def advance(self, gyr: Floats, acc: Floats, mag: Floats | None = None) -> Floats:
         """Orientations (n, S, 4) sensor to world after each sample of a block.
 
-        One run over n samples equals any split of it into blocks, bit for bit. A sample that is not a number,
-        or shorter than a tenth of the norm at rest, corrects nothing.
+        Results are bit-identical for any division into blocks. Samples that are non-finite, or shorter than a
+        tenth of the norm at rest, give no correction.
 
         Parameters
         ----------
-        gyr, acc, mag : (n, S, 3) in the units of the rest; gyr in rad/s with its bias still in.
+        gyr, acc, mag : (n, S, 3) in the units of the rest; gyr in rad/s including its bias.
 
         Raises
         ------
-        ParameterError `shape_mismatch`.
-        EstimationError `no_magnetometer` where mag is used and not given; `filter_diverged`.
+        ParameterError `shape_mismatch`. EstimationError `no_magnetometer` if mag is used but not given;
+        `filter_diverged`.
         """
         shape = (len(gyr), len(self._rest.acc), 3)
         if not self._uses_mag:
@@ -214,7 +214,7 @@ class FusionFilter:
 
 
 def find_algorithm(name: str) -> Algorithm:
-    """The algorithm of a name.
+    """The algorithm with this name.
 
     Raises
     ------

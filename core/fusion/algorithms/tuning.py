@@ -1,8 +1,8 @@
-"""Gains of one algorithm fitted to recordings with a reference, and shown on others it was not fitted to.
+"""Gains of one algorithm fitted to recordings with a reference, and validated on others.
 
-Nazarahari 2021, section 4.2.3: a particle swarm makes the mean RMS error over the training trials small. The
+Nazarahari 2021, section 4.2.3: a particle swarm minimises the mean RMS error over the training trials. The
 error is the total one with a magnetometer and the inclination without, where the heading is arbitrary: both
-are free of the order of Euler angles, whose sum the thesis takes.
+are independent of the order of Euler angles, whose sum is used in the thesis.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ LEAST_GAIN: Final = 0.01
 
 @dataclass(frozen=True, eq=False)
 class TrialSplit:
-    """Trials to fit to, and others that only judge."""
+    """Training trials, and validation trials."""
 
     train: tuple[ReferenceTrial, ...]
     validate: tuple[ReferenceTrial, ...]
@@ -71,7 +71,7 @@ class TrialSplit:
 
     @classmethod
     def by_name(cls, trials: Sequence[ReferenceTrial], validate: Collection[str]) -> TrialSplit:
-        """Split trials by the names of those that judge.
+        """Split trials by the names of the validation trials.
 
         Raises
         ------
@@ -93,14 +93,15 @@ class TrialSplit:
 
 @dataclass(frozen=True)
 class TuningResult:
-    """What a tuning found.
+    """Result of a tuning.
 
     Parameters
     ----------
     start, gains : by name, before and after. trained, validated : trial → RMS error in ° with the gains
-    before and after, None where the filter diverged. data : trial → sha256 of its samples. data_sha256 : of
-    all of them and which half each is in. rules : constants of the swarm.
-    improved : the mean over the validating trials fell by more than a hundredth. verdict : that in words.
+    before and after, None if the filter diverged. data : trial → sha256 of its samples. data_sha256 : of all
+        of them and of the split. rules : constants of the swarm.
+    improved : the mean over the validation trials decreased by more than one percent. verdict : that in
+        words.
     """
 
     algorithm: str
@@ -123,13 +124,13 @@ class TuningResult:
 
 
 class GainTuner:
-    """One search, ready to run; the same arguments give the same gains, bit for bit, on any number of cores.
+    """One search, ready to run; equal arguments give bit-identical gains on any number of cores.
 
     Parameters
     ----------
-    algorithm : of `ALGORITHMS`. split : see `TrialSplit`. start : gains to begin with, None = the defaults.
-    scheme : of the gains that may follow the motion, None = that of `start`. magnetometer : None = where the
-    algorithm can and every trial has one. code_version : goes into the result and the checkpoint.
+    algorithm : of `ALGORITHMS`. split : see `TrialSplit`. start : initial gains, None = the defaults.
+        scheme : of the adaptive gains, None = that of `start`. magnetometer : None = if the algorithm
+        supports it and every trial has one. code_version : recorded in the result and the checkpoint.
 
     Raises
     ------
@@ -181,16 +182,16 @@ class GainTuner:
         self._problem = _digest((*searched, seed, astuple(self._rules), code_version))
 
     def read_checkpoint(self, content: bytes) -> Swarm:
-        """The swarm of a checkpoint of this very search; raises ParameterError, see `read_swarm`."""
+        """The swarm from a checkpoint of this same search; raises ParameterError, see `read_swarm`."""
         return read_swarm(content, self._problem)
 
     def run(self, keep: Keep, swarm: Swarm | None = None, each: ForEach = map) -> TuningResult:
-        """Search to the end.
+        """Run the search to its end.
 
         Parameters
         ----------
-        swarm : one that was kept, None = from the start. each : `map`, or that of a pool of threads: the
-        filters let go of the interpreter while they run.
+        swarm : a stored one to resume, None = from the start. each : `map`, or that of a thread pool: the
+            filters release the GIL while they run.
         """
 
         def score(gains: Sequence[AlgorithmGains], trials: Sequence[ReferenceTrial]) -> Floats:
@@ -212,7 +213,7 @@ class GainTuner:
         return self._report(after, score(both, self._split.train), score(both, self._split.validate))
 
     def _score(self, task: tuple[AlgorithmGains, ReferenceTrial]) -> float:
-        """RMS error in rad; inf where the filter diverges."""
+        """RMS error in rad; inf if the filter diverges."""
         gains, trial = task
         try:
             q = run_trial(self._name, trial, gains, magnetometer=self._uses_mag)
@@ -262,7 +263,7 @@ class GainTuner:
 
 
 def _say_error(error: float, digits: int) -> str:
-    """An RMS error in rad in words; a filter that diverged has none."""
+    """An RMS error in rad as text; a filter that diverged has none."""
     return f"{math.degrees(error):.{digits}f}°" if math.isfinite(error) else "diverged"
 
 

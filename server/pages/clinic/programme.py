@@ -37,7 +37,7 @@ STATE_WORDS: Final[Mapping[str, tuple[str, str]]] = {
 
 @router.get("/patients/{pid}/programme")
 def show_programme(
-    request: Request, db: Db, pid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+    request: Request, db: Db, pid: Id, user: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> Response:
     """Latest programme of a patient: planned visits and their sessions."""
     today = now().date()
@@ -46,9 +46,9 @@ def show_programme(
         plans = programmes.of_patient(c, pid)
         linked = {v.session_id for plan in plans for v in plan.visits}
         free = [s for s in sessions.of_patient(c, pid) if s.id not in linked]
-    record_opening(request, who, "patient", pid)
+    record_opening(request, user, "patient", pid)
     return render_page(
-        request, db, who, "programme.html", "patients",
+        request, db, user, "programme.html", "patients",
         patient=patient,
         programme=view_programme(plans[0], today) if plans else None,
         course=SIX_WEEKS,
@@ -63,7 +63,7 @@ def view_programme(programme: Programme, today: dt.date) -> dict[str, Any]:
     weeks = range(min(v.week for v in programme.visits), max(v.week for v in programme.visits) + 1)
     upcoming = programme.next
     visits = len(programme.visits)
-    said = [
+    parts = [
         Message(
             f"{{count}} of {{visits}} {plural(visits, 'visit', 'visits')} done",
             count=programme.count("done"),
@@ -71,16 +71,16 @@ def view_programme(programme: Programme, today: dt.date) -> dict[str, Any]:
         )
     ]
     if missing := programme.count("missing"):
-        said.append(Message("{missing} missing", missing=missing))
+        parts.append(Message("{missing} missing", missing=missing))
     if upcoming is not None:
-        said.append(
+        parts.append(
             Message("next {label} on {planned_on}", label=upcoming.label, planned_on=day(upcoming.planned_on))
         )
     return {
         "id": programme.id,
         "starts_on": programme.starts_on,
         "words": programme.words,
-        "summary": ", ".join(said),
+        "summary": ", ".join(parts),
         "weeks": [_week(programme, week, now=week == now_week) for week in weeks],
         "visits": [_planned(v) for v in programme.visits],
     }
@@ -91,13 +91,13 @@ def _week(programme: Programme, week: int, *, now: bool) -> dict[str, Any]:
     trainings = [v for v in mine if v.kind == "training"]
     done = sum(v.state == "done" for v in trainings)
     missing = sum(v.state == "missing" for v in trainings)
-    said: str = Message(
+    text: str = Message(
         f"{{done}} of {{trainings}} {plural(len(trainings), 'training', 'trainings')} done",
         done=done,
         trainings=len(trainings),
     )
     if missing:
-        said = join_messages(said, Message(", {missing} missing", missing=missing), between="")
+        text = join_messages(text, Message(", {missing} missing", missing=missing), between="")
     # the course counts weeks without a week 0: the one before the first training is −1
     return {
         "name": "now"
@@ -107,7 +107,7 @@ def _week(programme: Programme, week: int, *, now: bool) -> dict[str, Any]:
         "gap": not mine,
         "assessments": [v for v in mine if v.kind == "assessment"],
         "trainings": trainings,
-        "words": said,
+        "words": text,
     }
 
 

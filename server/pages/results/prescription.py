@@ -102,15 +102,15 @@ class TrainableParameter:
 
 @router.get("/patients/{pid}/prescription")
 def show_prescription(
-    request: Request, db: Db, pid: Id, who: Annotated[Identity, require(Action.RUN_LIVE)]
+    request: Request, db: Db, pid: Id, user: Annotated[Identity, require(Action.RUN_LIVE)]
 ) -> Response:
     """Form for a prescription, filled with the one in force."""
     with db.read() as c:
         patient = patients.get(c, pid)
         now = prescriptions.in_force(c, pid)
-    record_opening(request, who, "patient", pid)
+    record_opening(request, user, "patient", pid)
     return render_page(
-        request, db, who, "prescription.html", "patients",
+        request, db, user, "prescription.html", "patients",
         patient=patient, now=now, f=fill_form(now, patient.affected_side),
         groups=group_trainable(), modes=MODES, sources=SOURCES, presets=PRESETS,
     )  # fmt: skip

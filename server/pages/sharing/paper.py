@@ -61,8 +61,8 @@ def show_document(content: bytes, *, is_shared: bool = False) -> Response:
     ----------
     is_shared : for a reader without an account; sends no referrer to linked pages.
     """
-    found = _STYLE.search(content.decode())
-    digest = hashlib.sha256((found[1] if found else "").encode()).digest()
+    match = _STYLE.search(content.decode())
+    digest = hashlib.sha256((match[1] if match else "").encode()).digest()
     headers = {
         "Content-Security-Policy": lock_document(base64.b64encode(digest).decode()),
         "Permissions-Policy": allow_camera("()"),

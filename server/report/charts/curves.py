@@ -99,16 +99,10 @@ def cycle_svg(
     plot.words(v.up, v.down)
     n = ", ".join(f"{side} mean of {c.n}" for side, c in panel.sides.items())
     last = [c.n for c in panel.sides.values()][-1:] or [0]
-    counted = plural(last[0], over.counted.removesuffix("s"), over.counted)
+    noun = plural(last[0], over.counted.removesuffix("s"), over.counted)
     return plot.draw(
         "chart cycle x-unit" if x_unit else "chart cycle",
-        Message(
-            "{title} over {over}: {value} {counted}",
-            title=panel.title,
-            over=over.over,
-            value=n,
-            counted=counted,
-        ),
+        Message("{title} over {over}: {value} {noun}", title=panel.title, over=over.over, value=n, noun=noun),
         f' data-variable="{v.name}"',
     )
 
@@ -154,7 +148,7 @@ def _stride_mark(s: Stride, duration_s: float) -> str:
     k, top, out = KEY[s.side], 40 if s.side == "left" else 540, s.excluded_reason is not None
     start, end = round(1000 * s.start_s / duration_s), round(1000 * s.end_s / duration_s)
     off = end if s.tc_s is None else round(1000 * s.tc_s / duration_s)
-    said, cross = "", ""
+    title_element, cross = "", ""
     if s.excluded_reason is not None:
         title = Message(
             "{side} stride, {start_s:.2f} to {end_s:.2f} s, left out: ",
@@ -162,12 +156,12 @@ def _stride_mark(s: Stride, duration_s: float) -> str:
             start_s=s.start_s,
             end_s=s.end_s,
         )
-        said = f"<title>{escape(title + quote(explain_exclusion(s.excluded_reason)))}</title>"
-        across = end - start
-        cross = f'<path class="xx" d="M{start} {top + 60}l{across} 300M{start} {top + 360}l{across}-300"/>'
+        title_element = f"<title>{escape(title + quote(explain_exclusion(s.excluded_reason)))}</title>"
+        width = end - start
+        cross = f'<path class="xx" d="M{start} {top + 60}l{width} 300M{start} {top + 360}l{width}-300"/>'
     faded = " x" if out else ""
     return (
-        f"<g>{said}"
+        f"<g>{title_element}"
         f'<path class="st{k}{faded}" d="M{start} {top}H{off}v420H{start}"/>'
         f'<path class="sw{k}{faded}" d="M{off} {top}H{end}v420H{off}"/>'
         f"{cross}</g>"
@@ -203,13 +197,13 @@ class _CyclePlot(PlotArea):
         self.add(f'<path class="{css}" d="{self._path(angle[::step], step)}"/>')
 
     def foot_offs(self, sides: Mapping[Side, SideCurve]) -> None:
-        found = {s: c.foot_off_pct for s, c in sides.items() if c.foot_off_pct is not None}
+        pct_by_side = {s: c.foot_off_pct for s, c in sides.items() if c.foot_off_pct is not None}
         # labels stand on their lines, the earlier one to the left; close ones make room for each other
-        earlier = min(found, key=lambda side: found[side], default=None)
-        close = len(found) == 2 and max(found.values()) - min(found.values()) < _CLOSE_PCT
-        for side, x in found.items():
+        earlier = min(pct_by_side, key=lambda side: pct_by_side[side], default=None)
+        close = len(pct_by_side) == 2 and max(pct_by_side.values()) - min(pct_by_side.values()) < _CLOSE_PCT
+        for side, x in pct_by_side.items():
             self.add_upright(f"fo{KEY[side]}", 10 * x)
-            anchor, out = ("end", -1) if side == earlier and len(found) == 2 else ("start", 1)
+            anchor, out = ("end", -1) if side == earlier and len(pct_by_side) == 2 else ("start", 1)
             label = f"{side[0].upper()}\u2009{x:.0f}"
             self.add_text(
                 f"{format_coordinate(x)}%", -5, label, f"t{KEY[side]}", anchor, dx=out * (3 if close else -4)
@@ -238,12 +232,12 @@ class _CyclePlot(PlotArea):
 
     def _path(self, angle: Floats, step: int) -> str:
         """Path of a curve in % of the plot, interrupted where it has no value."""
-        known = find_runs(np.isfinite(angle))
-        return "".join(self._run(angle[a:b], step, a) for a, b in known)
+        runs = find_runs(np.isfinite(angle))
+        return "".join(self._run(angle[a:b], step, a) for a, b in runs)
 
     def _run(self, angle: Floats, step: int, first: int) -> str:
         """One continuous part of a curve: its first point, then relative moves."""
         y = self._heights(angle)
-        across = 10 * step
-        moves = " ".join([f"{across}{b - a:+d}" for a, b in pairwise(y)])
+        step_x = 10 * step
+        moves = " ".join([f"{step_x}{b - a:+d}" for a, b in pairwise(y)])
         return f"M{10 * step * first} {y[0]}" + (f"l{moves}" if moves else "")

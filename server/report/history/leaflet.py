@@ -80,25 +80,25 @@ def list_figures(
     ----------
     changes : since the previous visit, empty if not comparable.
     """
-    found = []
+    figures = []
     for figure in FIGURES:
         mine = {p.side: (p.mean, p) for p in parameters if p.name == figure.name and p.mean is not None}
         if not mine:
             continue
         side = affected if affected in mine else min(mine, key=lambda s: mine[s][0])
-        value, told = mine[side]
+        value, change_text = mine[side]
         change = next((c for c in changes if (c.name, c.side) == (figure.name, side)), None)
-        before = None if change is None or change.difference is None else change.before
-        found.append(
+        previous = None if change is None or change.difference is None else change.before
+        figures.append(
             LeafletFigure(
                 figure.title.format(side=side),
                 _say(figure, value),
-                None if before is None else _say(figure, before),
+                None if previous is None else _say(figure, previous),
                 _judge(figure, change),
-                told.estimated,
+                change_text.estimated,
             )
         )
-    return tuple(found)
+    return tuple(figures)
 
 
 def _say(figure: PlainFigure, value: float) -> str:

@@ -123,15 +123,15 @@ class _TrendPlot(PlotArea):
 
     def days(self) -> None:
         """Hairlines of planned visits, and labels below the axis: assessments first, then trainings."""
-        wanted = [(v.performed_on, v.label or _day(v.performed_on), "words") for v in self._visits
+        labels = [(v.performed_on, v.label or _day(v.performed_on), "words") for v in self._visits
                   if v.kind == "assessment"]  # fmt: skip
-        wanted += [(a.day, a.label, "") for a in self._ahead]
-        wanted.sort(key=lambda w: (w[0] != self._visits[0].performed_on, w[0]))
-        taken: list[float] = []
-        for day, label, css in wanted:
+        labels += [(a.day, a.label, "") for a in self._ahead]
+        labels.sort(key=lambda w: (w[0] != self._visits[0].performed_on, w[0]))
+        placed: list[float] = []
+        for day, label, css in labels:
             x = self._x(day)
-            if all(abs(x - other) * self._width / 1000 >= LABEL_PX for other in taken):
-                taken.append(x)
+            if all(abs(x - position) * self._width / 1000 >= LABEL_PX for position in placed):
+                placed.append(x)
                 self.add_text(_pct(x), self.height, label, css, "middle", dy=15)
         for planned in self._ahead:
             self.add_upright("ax", self._x(planned.day))

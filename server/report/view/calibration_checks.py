@@ -78,16 +78,16 @@ def view_calibration_checks(
     """View of `calibration_score`, `calibration` and notices of analysis.json; None without a score."""
     if score is None:
         return None
-    told: dict[str | None, list[str]] = {}
+    notices_by_sensor: dict[str | None, list[str]] = {}
     for notice in warnings:
         if notice.severity != "info":
-            told.setdefault(notice.sensor, []).append(speak_places(notice.message))
+            notices_by_sensor.setdefault(notice.sensor, []).append(speak_places(notice.message))
     checks: Sequence[Mapping[str, Any]] = score["checks"]
-    worn = [s for s in SEGMENTS if s in score["segments"]]
+    present = [s for s in SEGMENTS if s in score["segments"]]
     mounted = {} if calibration is None else calibration["segments"]
     whole = [c for c in checks if c["segment"] is None]
-    segments = [_view_segment(s, score["segments"][s], checks, mounted.get(s, {})) for s in worn]
-    segments = [replace(s, told=tuple(told.get(s.id, ()))) for s in segments]
+    segments = [_view_segment(s, score["segments"][s], checks, mounted.get(s, {})) for s in present]
+    segments = [replace(s, told=tuple(notices_by_sensor.get(s.id, ()))) for s in segments]
     if whole:
         kinds = {c["verdict"] for c in whole}
         verdict = next((v for v in ("redo", "pass") if v in kinds), "not_judged")
@@ -101,24 +101,26 @@ def view_calibration_checks(
 
 def say_verdict(verdict: str, checks: Sequence[Mapping[str, Any]]) -> str:
     """Overall result in one sentence."""
-    judged = [c for c in checks if c["verdict"] != "not_judged"]
+    checked = [c for c in checks if c["verdict"] != "not_judged"]
     if verdict == "pass":
         return plural(
-            len(judged),
+            len(checked),
             "The calibration passes the one check that could be judged.",
-            Message("The calibration passes all {judged} checks that could be judged.", judged=len(judged)),
+            Message(
+                "The calibration passes all {checked} checks that could be judged.", checked=len(checked)
+            ),
         )
     if verdict == "not_judged":
         return "This take allows no check of its calibration."
     failed = [c for c in checks if c["verdict"] == "redo"]
     places = list(dict.fromkeys(place_words(c["segment"]) if c["segment"] else "walk" for c in failed))
-    shown = places if len(places) <= 3 else [*places[:2], Message("{len} more", len=len(places) - 2)]
-    listed = " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))
+    shortened = places if len(places) <= 3 else [*places[:2], Message("{len} more", len=len(places) - 2)]
+    listed = " and ".join(filter(None, (", ".join(shortened[:-1]), shortened[-1])))
     which = plural(len(failed), "checks fails", "checks fail")
     return Message(
-        "Calibrate again: {failed} of {judged} {which}, at the {listed}.",
+        "Calibrate again: {failed} of {checked} {which}, at the {listed}.",
         failed=len(failed),
-        judged=len(judged),
+        checked=len(checked),
         which=which,
         listed=listed,
     )

@@ -90,7 +90,7 @@ class FeedbackView:
 
     def to_json(self) -> dict[str, object]:
         """JSON types with all strides."""
-        shown = reduce_to_plain(
+        plain = reduce_to_plain(
             {
                 "prescription": self.content.to_json(),
                 "words": [f"{label}: {text}" for label, text in self.words],
@@ -110,7 +110,7 @@ class FeedbackView:
                 ],
             }
         )
-        return shown if isinstance(shown, dict) else {}
+        return plain if isinstance(plain, dict) else {}
 
 
 def list_analysed_strides(strides: Strides, column: Column) -> tuple[AnalysedStride, ...]:
@@ -125,14 +125,14 @@ def feedback_view(
     content: Prescription,
     split: FeedbackSplit,
     guard: GuardState,
-    before: PreviousTraining | None = None,
+    previous: PreviousTraining | None = None,
     limb: Limb | None = None,
 ) -> FeedbackView:
     """View of the result of a trial.
 
     Parameters
     ----------
-    before : visit whose end is compared with the retention block. limb : of the trained side.
+    previous : visit whose end is compared with the retention block. limb : of the trained side.
     """
     term = parameter_term(content.parameter)
     rows = tuple(
@@ -157,7 +157,7 @@ def feedback_view(
         ),
         levels=tuple((s.n, s.t_s, s.level) for s in split.levels),
         effects=describe_effects(content, guard, term),
-        retention=None if before is None else compare_retention(content, split, before, term, limb),
+        retention=None if previous is None else compare_retention(content, split, previous, term, limb),
         notes=_notes(split, term),
         svg=feedback_svg(split, content, term) if split.strides else "",
         split=split,
@@ -166,7 +166,7 @@ def feedback_view(
 
 def _notes(split: FeedbackSplit, term: Term) -> tuple[str, ...]:
     """Explanations, and data that could not be used."""
-    said = [
+    notes = [
         _HOW_TO_READ,
         Message(
             "Side effects: the last {LAST} strides against the first {FIRST} of the take.",
@@ -176,15 +176,15 @@ def _notes(split: FeedbackSplit, term: Term) -> tuple[str, ...]:
     ]
     live = split.live_difference
     if live.mean is not None and live.sd is not None:
-        said.append(
+        notes.append(
             Message(
                 "What was fed back differed from the analysis by {mean} ± {sd}.",
                 mean=format_number(live.mean, term.digits + 1),
                 sd=format_quantity(live.sd, term, term.digits + 1),
             )
         )
-    for n, what in ((split.unmatched, "no stride"), (split.left_out, "a stride that does not count")):
+    for n, outcome in ((split.unmatched, "no stride"), (split.left_out, "a stride that does not count")):
         if n:
             cues = plural(n, "1 cue, left out, has", Message("{value} cues, left out, have", value=n))
-            said.append(Message("{cues} {what} in the analysis.", cues=cues, what=what))
-    return tuple(said)
+            notes.append(Message("{cues} {outcome} in the analysis.", cues=cues, outcome=outcome))
+    return tuple(notes)

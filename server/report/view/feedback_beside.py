@@ -90,31 +90,38 @@ def side_effects(
         s = strides[i]
         if not s.counted or s.value is None:
             continue
-        found = {}
+        values = {}
         if curves is not None:
             for variable, sides in curves.curves.items():
                 row = sides[s.side][rows[s.side, i]] if s.side in sides else None
                 if row is not None and np.isfinite(row).all():
-                    found[variable] = row
-        watch.add_stride(s.side, s.value, found)
+                    values[variable] = row
+        watch.add_stride(s.side, s.value, values)
     return watch.state
 
 
 def describe_effects(content: Prescription, guard: GuardState, term: Term) -> tuple[SideEffectRow, ...]:
     """Side effects on the other side and the sagittal profile, in words."""
-    other = "other side" if content.side is None else "right" if content.side == "left" else "left"
+    opposite = "other side" if content.side is None else "right" if content.side == "left" else "left"
     gps = Term("Sagittal profile score", "°", "", 1, (0, 20), ("larger", "smaller"))
     return (
-        _effect("other_side", f"{term.label}, {other}", guard.other, term),
+        _effect("other_side", f"{term.label}, {opposite}", guard.other, term),
         _effect("gps_sagittal_deg", "Sagittal profile score, both sides", guard.gps, gps),
     )
 
 
 def _effect(name: str, label: str, effect: SideEffect, term: Term) -> SideEffectRow:
     if effect.change is None:
-        why = EFFECT_REASONS.get(effect.reason or "", effect.reason or "")
+        explanation = EFFECT_REASONS.get(effect.reason or "", effect.reason or "")
         return SideEffectRow(
-            name, label, "none", None, None, None, NO_STRIDES, Message("not judged: {why}", why=why)
+            name,
+            label,
+            "none",
+            None,
+            None,
+            None,
+            NO_STRIDES,
+            Message("not judged: {explanation}", explanation=explanation),
         )
     text = format_signed(effect.change, term)
     if effect.limit is None:
@@ -130,10 +137,10 @@ def _effect(name: str, label: str, effect: SideEffect, term: Term) -> SideEffect
 
 
 def compare_retention(
-    content: Prescription, split: FeedbackSplit, before: PreviousTraining, term: Term, limb: Limb | None
+    content: Prescription, split: FeedbackSplit, previous: PreviousTraining, term: Term, limb: Limb | None
 ) -> Retention | None:
     """Compare the retention block with the end of the previous training; None if either is missing."""
-    now, end = split.kinds.get("retention"), before.split.end
+    now, end = split.kinds.get("retention"), previous.split.end
     if now is None or now.mean is None or end.mean is None:
         return None
     difference = now.mean - end.mean
@@ -151,8 +158,8 @@ def compare_retention(
             value=format_quantity(limit.value, term, term.digits + 1),
         )
     return Retention(
-        before.session_id,
-        before.performed_on,
+        previous.session_id,
+        previous.performed_on,
         describe_summary("end", "End of the last training", False, end, digits_of(content)),
         describe_summary(
             "retention", "Start of this visit, without feedback", False, now, digits_of(content)

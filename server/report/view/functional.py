@@ -114,22 +114,22 @@ class FunctionalView:
         total = sum(s.length_s for s in self.segments)
         if total <= 0.0 or len(self.segments) < 2:
             return ""
-        at, shapes = 0.0, []
+        x, shapes = 0.0, []
         for i, segment in enumerate(self.segments):
             width = 1000.0 * segment.length_s / total
             wide = format_coordinate(max(width - 3.0, 1.0))
-            box = f'x="{format_coordinate(at)}" y="0" width="{wide}" height="1000"'
+            box = f'x="{format_coordinate(x)}" y="0" width="{wide}" height="1000"'
             shapes.append(f'<rect class="seg1" {box}/>' if i % 2 else f'<rect class="seg0" {box}/>')
-            at += width
-        said = ", ".join(f"{s.label} {s.duration} s" for s in self.segments)
+            x += width
+        labels = ", ".join(f"{s.label} {s.duration} s" for s in self.segments)
         return (
-            f'<svg class="chart segbar" width="100%" height="28" role="img" aria-label="{said}">'
+            f'<svg class="chart segbar" width="100%" height="28" role="img" aria-label="{labels}">'
             f"{stretch(''.join(shapes))}</svg>"
         )
 
-    def compare_with(self, before: Sequence[Parameter]) -> FunctionalView:
+    def compare_with(self, earlier: Sequence[Parameter]) -> FunctionalView:
         """The view with the value of an earlier visit."""
-        value = next((p.mean for p in before if p.name == self.name), None)
+        value = next((p.mean for p in earlier if p.name == self.name), None)
         if value is None:
             return self
         return replace(self, previous=format_number(value, parameter_term(self.name).digits))
@@ -141,8 +141,8 @@ def functional_view(
     """The functional test of a finished analysis; None for other trials."""
     if bundle.functional is None:
         return None
-    found = {p.name: p for p in bundle.parameters}
-    total = next((found[name] for name in TOTALS if name in found), None)
+    by_name = {p.name: p for p in bundle.parameters}
+    total = next((by_name[name] for name in TOTALS if name in by_name), None)
     if total is None:
         return None
     term, test = parameter_term(total.name), bundle.functional

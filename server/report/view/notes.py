@@ -39,19 +39,19 @@ def norm_note(
     bands = norms.comfortable_bands if matched else norms.bands
     band = next(iter(bands.values()), None)
     if band is not None and angles:
-        who = GROUPS.get(band.group, band.group)
+        group = GROUPS.get(band.group, band.group)
         sentences.append(
             Message(
-                f"{'Comfortable' if matched else 'Norm'}: {{band}} {{who}}, overground at their "
+                f"{'Comfortable' if matched else 'Norm'}: {{band}} {{group}}, overground at their "
                 "comfortable 1.25 ± 0.16 m/s, mean ± 1 SD ({source}).",
                 band=band.n,
-                who=who,
+                group=group,
                 source=band.source,
             )
         )
     if norms.timing_reason is not None and norms.timing_reason != norms.reason:
         sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
-    elif shown := [
+    elif displayed := [
         r
         for r in rows
         if r.norm is not None
@@ -63,8 +63,8 @@ def norm_note(
         sentences.append(
             Message(
                 "Timing: {group} ({norm_source}).",
-                group=norms.values[shown[0].name].group,
-                norm_source=shown[0].norm_source,
+                group=norms.values[displayed[0].name].group,
+                norm_source=displayed[0].norm_source,
             )
         )
     if any(r.norm_note == FEW_NOTE for r in rows):
@@ -85,12 +85,12 @@ def norm_note(
 
 def _matched_note(norms: Norms) -> str:
     """Reference group that was asked to walk at this speed, and its limitations."""
-    at = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
+    speed = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
     return Message(
-        "Norm: {ASKED}{at}, overground, mean ± 1 SD ({SOURCE}). They are not people who are "
-        "slow from habit or age.",
+        "Norm: {ASKED}{speed}, overground, mean ± 1 SD ({SOURCE}). They are not people who "
+        "are slow from habit or age.",
         ASKED=ASKED,
-        at=at,
+        speed=speed,
         SOURCE=SOURCE,
     )
 
@@ -168,9 +168,15 @@ def _interrupted(panels: Sequence[CurvePanel]) -> list[str]:
         for p in panels
         if any(c.mean_deg is not None and np.isnan(c.mean_deg).any() for c in p.sides.values())
     ]
-    why = "interrupted where the leg model's knee rests on its limit in most strides"
+    reason = "interrupted where the leg model's knee rests on its limit in most strides"
     return (
-        [Message("{join}: {why}; nothing is measured there.", join=", ".join(broken).capitalize(), why=why)]
+        [
+            Message(
+                "{join}: {reason}; nothing is measured there.",
+                join=", ".join(broken).capitalize(),
+                reason=reason,
+            )
+        ]
         if broken
         else []
     )

@@ -84,7 +84,7 @@ def quality_box(bundle: Bundle) -> QualityBox:
     )
     items = [
         *_counted(bundle),
-        *_signals(bundle.quality, rest=bundle.activity is None),
+        *_signals(bundle.quality, with_rest=bundle.activity is None),
         *_calibration(
             bundle.calibration,
             bundle.calibration_score,
@@ -111,14 +111,14 @@ def explain_verdict(kind: str, bundle: Bundle) -> tuple[str, int]:
     daily = _daily_steps(bundle.parameters)
     if kind == "warn" and daily is not None and not daily.n:
         return NO_WHOLE_DAY, sum(n.severity == "warning" for n in bundle.warnings)
-    told = [n for n in bundle.warnings if n.severity in ("error", "warning")]
-    told.sort(key=lambda n: (n.severity != "error", n.code != "sensor_failed"))
+    problems = [n for n in bundle.warnings if n.severity in ("error", "warning")]
+    problems.sort(key=lambda n: (n.severity != "error", n.code != "sensor_failed"))
     health = None if bundle.estimator is None else bundle.estimator["verdict"]
     reasons = tuple(bundle.quality.get("reasons", ()))
-    if kind == "bad" and health == "bad" and reasons and not (told and told[0].severity == "error"):
-        return speak_places(reasons[-1]), len(told)
-    if told:
-        return speak_places(told[0].message), len(told) - 1
+    if kind == "bad" and health == "bad" and reasons and not (problems and problems[0].severity == "error"):
+        return speak_places(reasons[-1]), len(problems)
+    if problems:
+        return speak_places(problems[0].message), len(problems) - 1
     if reasons:
         return speak_places(reasons[0]), 0
     return (IN_DOUBT if kind == "bad" else ""), 0
@@ -196,10 +196,10 @@ def _counted(bundle: Bundle) -> list[QualityItem]:
     For daily life the hours of wear, and the number of days with sufficient wear time.
     """
     if bundle.activity is not None:
-        worn = sum(day.worn_h for day in bundle.activity.days)
+        hours = sum(day.worn_h for day in bundle.activity.days)
         whole, days = _daily_steps(bundle.parameters), len(bundle.activity.days)
         return [
-            QualityItem("Worn", f"{format_number(worn, 1)}\u202fh"),
+            QualityItem("Worn", f"{format_number(hours, 1)}\u202fh"),
             QualityItem(
                 "Days that count", f"{0 if whole is None else whole.n} of {days}", "worn 10 h or longer"
             ),
@@ -243,7 +243,7 @@ def _strides(bundle: Bundle) -> QualityItem:
     )
 
 
-def _signals(quality: Mapping[str, Any], *, rest: bool) -> list[QualityItem]:
+def _signals(quality: Mapping[str, Any], *, with_rest: bool) -> list[QualityItem]:
     """Lost samples of the worst sensor, magnetic field, and still periods if required by the analysis."""
     items = []
     sensors = [s for s in quality.get("sensors", ()) if isinstance(s, Mapping)]
@@ -252,7 +252,7 @@ def _signals(quality: Mapping[str, Any], *, rest: bool) -> list[QualityItem]:
         worst, name = max(lost)
         extra = "" if worst == 0 else Message("at most, {name}", name=name)
         items.append(QualityItem("Lost samples", f"{format_number(worst, 1)} %", extra))
-    still = quality.get("rest_s") if rest else None
+    still = quality.get("rest_s") if with_rest else None
     if still is not None:
         total = sum(end - start for start, end in still)
         times = Message("in {still} parts", still=len(still)) if len(still) > 1 else ""
@@ -278,14 +278,14 @@ def _calibration(
     method = CALIBRATION_METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
     if calibration.get("posture") == "walking" and calibration["method"] == "walking_direction":
         method = "from walking alone"
-    judged = [c["verdict"] for c in (score or {"checks": ()})["checks"] if c["verdict"] != "not_judged"]
-    if judged:
-        passed = judged.count("pass")
-        kind = None if passed == len(judged) else "warn"
+    verdicts = [c["verdict"] for c in (score or {"checks": ()})["checks"] if c["verdict"] != "not_judged"]
+    if verdicts:
+        passed = verdicts.count("pass")
+        kind = None if passed == len(verdicts) else "warn"
         value = Message(
-            f"{{passed}} of {{judged}} {plural(len(judged), 'check', 'checks')}",
+            f"{{passed}} of {{verdicts}} {plural(len(verdicts), 'check', 'checks')}",
             passed=passed,
-            judged=len(judged),
+            verdicts=len(verdicts),
         )
         items = [QualityItem("Calibration", value, method, kind=kind, page="calibration")]
     else:

@@ -37,16 +37,16 @@ class SensorChecks:
     notes: tuple[str, ...]
 
 
-def sensor_checks(found: Mapping[str, Any] | None) -> SensorChecks | None:
+def sensor_checks(checks: Mapping[str, Any] | None) -> SensorChecks | None:
     """View of `agreement` in analysis.json; None for older versions or a single sensor."""
-    if found is None or len(found["sensors"]) < 2:
+    if checks is None or len(checks["sensors"]) < 2:
         return None
-    rows = tuple(_row(s) for s in found["sensors"])
+    rows = tuple(_row(s) for s in checks["sensors"])
     pairs = [
         Message("{value} and {value2}", value=place_words(a), value2=place_words(b))
-        for a, b in found["exchanged"]
+        for a, b in checks["exchanged"]
     ]
-    unclear = [s for s in found["sensors"] if s.get("place_judged_s") is None]
+    unclear = [s for s in checks["sensors"] if s.get("place_judged_s") is None]
     notes = []
     if any(s["sensor"] == "pelvis" for s in unclear):
         notes.append(
@@ -58,9 +58,9 @@ def sensor_checks(found: Mapping[str, Any] | None) -> SensorChecks | None:
             "That a sensor stayed is said where a slip would have been seen for most of the walk. Stand "
             "still before and after it, or walk for longer."
         )
-    if not all(s["clock_judged"] for s in found["sensors"]):
+    if not all(s["clock_judged"] for s in checks["sensors"]):
         notes.append("A clock is judged where a neighbour across a hip, knee or ankle is worn, in walking.")
-    if len(unclear) < len(found["sensors"]):
+    if len(unclear) < len(checks["sensors"]):
         notes.append("Straps that loosen slowly, and a second slip of a sensor, are not found.")
     return SensorChecks(rows, "; ".join(pairs), tuple(notes))
 
@@ -110,7 +110,7 @@ def _place(s: Mapping[str, Any]) -> tuple[str, str]:
             "warn",
         )
     # an older version did not say from when to when it could judge
-    if (judged := s.get("place_judged_s")) is None:
+    if (duration_s := s.get("place_judged_s")) is None:
         return Message("Place {NOT_JUDGED}", NOT_JUDGED=NOT_JUDGED), ""
-    start, end = (format_number(x) for x in judged)
+    start, end = (format_number(x) for x in duration_s)
     return Message("Stayed from {start} to {end}\u202fs", start=start, end=end), "ok"

@@ -68,17 +68,17 @@ def find_term(name: str, unit: str = "") -> Term:
     if name in CATALOGUE:
         term = parameter_term(name)
         return replace(term, label=title_of(name, term.label))
-    known = SCORE_TERMS.get(name)
-    shown = "°" if unit == "deg" else unit
-    return known or Term(name, shown, "Other", 2, (0.0, 1.0), ("larger", "smaller"))
+    score_term = SCORE_TERMS.get(name)
+    printed_unit = "°" if unit == "deg" else unit
+    return score_term or Term(name, printed_unit, "Other", 2, (0.0, 1.0), ("larger", "smaller"))
 
 
 def change_words(change: Change) -> ChangeWords:
     """Describe a change in words."""
     term = find_term(change.name, change.unit)
     if change.difference is None:
-        said = NOT_ALIKE_WORDS if change.reason == NOT_MEASURED_ALIKE else "not measured in both"
-        return ChangeWords(change.side, "–", "none", said, limit_words(change))
+        text = NOT_ALIKE_WORDS if change.reason == NOT_MEASURED_ALIKE else "not measured in both"
+        return ChangeWords(change.side, "–", "none", text, limit_words(change))
     mark = "none" if change.verdict is None else ""
     if change.verdict in {"real_change", "clinically_relevant"}:
         mark = "up" if change.difference > 0 else "down"
@@ -97,10 +97,10 @@ def limit_words(change: Change) -> tuple[str, ...]:
     """Limits of a parameter with their sources, for any population."""
     term = find_term(change.name, change.unit)
     unit = "" if not term.unit else term.unit if term.unit in "°%" else f"\u202f{term.unit}"
-    said = []
+    sentences = []
     if change.limit is not None:
         people = f" ({change.people})" if change.people else ""
-        said.append(
+        sentences.append(
             Message(
                 "MDC {limit}{unit}: {limit_source}{people}.",
                 limit=format_limit(change.limit, term),
@@ -110,7 +110,7 @@ def limit_words(change: Change) -> tuple[str, ...]:
             )
         )
     if change.mcid is not None:
-        said.append(
+        sentences.append(
             Message(
                 "MCID {mcid}{unit}: {mcid_source}.",
                 mcid=format_limit(change.mcid, term),
@@ -118,7 +118,7 @@ def limit_words(change: Change) -> tuple[str, ...]:
                 mcid_source=change.mcid_source,
             )
         )
-    return tuple(said)
+    return tuple(sentences)
 
 
 def format_limit(limit: float, term: Term) -> str:
@@ -129,11 +129,11 @@ def format_limit(limit: float, term: Term) -> str:
 def _verdict(change: Change) -> str:
     if change.verdict is None:
         return {TOO_FEW: TOO_FEW_WORDS, UNLIKE: UNLIKE_WORDS}.get(change.reason or "", NO_LIMIT)
-    said = VERDICTS[change.verdict]
+    text = VERDICTS[change.verdict]
     if change.verdict == "real_change" and change.mcid is not None:
-        said += ", smaller than clinically relevant"
+        text += ", smaller than clinically relevant"
     if change.verdict != "within_measurement_error" and change.towards_norm is not None:
-        said += ", towards the norm" if change.towards_norm else ", away from the norm"
+        text += ", towards the norm" if change.towards_norm else ", away from the norm"
     if change.note == "from_standing":
-        said += "; includes how the person stood"
-    return said
+        text += "; includes how the person stood"
+    return text

@@ -53,19 +53,19 @@ def judge_device(
         return DeviceVerdict("none", "Not measured", (NOT_MEASURED[checks[-1].reason or "no_rest"],))
     late: tuple[str, ...] = ()
     if checks[-1].reason is not None:
-        said = NOT_MEASURED[checks[-1].reason]
+        cause = NOT_MEASURED[checks[-1].reason]
         late = (
             Message(
-                "Measured last on {day}, not in its newest take. {said}",
+                "Measured last on {day}, not in its newest take. {cause}",
                 day=day(days[course.newest]),
-                said=said,
+                cause=cause,
             ),
         )
     if course.findings:
-        told = [_tell(f, days) for f in course.findings]
-        others = ["" if what == told[0] else f"{what}. " for what in told]
-        reasons = [f"{what}{ADVICE[f.quantity]}" for what, f in zip(others, course.findings, strict=True)]
-        return DeviceVerdict("warn", told[0], (*reasons, *late))
+        texts = [_tell(f, days) for f in course.findings]
+        prefixes = ["" if text == texts[0] else f"{text}. " for text in texts]
+        reasons = [f"{text}{ADVICE[f.quantity]}" for text, f in zip(prefixes, course.findings, strict=True)]
+        return DeviceVerdict("warn", texts[0], (*reasons, *late))
     if course.compared == 0:
         return DeviceVerdict("none", "First check", ("There is nothing to compare with yet.", *late))
     return DeviceVerdict("ok", "Steady", late)
@@ -98,7 +98,10 @@ def _tell(f: DeviceFinding, days: Sequence[dt.date]) -> str:
             format_number=format_number(100 * abs(f.value), 1),
             way=way,
         )
-    what = "Gyroscope" if f.quantity == "gyro_noise" else "Accelerometer"
+    sensor_kind = "Gyroscope" if f.quantity == "gyro_noise" else "Accelerometer"
     return Message(
-        "{what} noise {value} times its usual{since}", what=what, value=format_number(f.value, 1), since=since
+        "{sensor_kind} noise {value} times its usual{since}",
+        sensor_kind=sensor_kind,
+        value=format_number(f.value, 1),
+        since=since,
     )

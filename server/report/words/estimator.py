@@ -98,20 +98,20 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
     """View of `estimator` in analysis.json; None if the analysis stopped before the poses."""
     if e is None:
         return None
-    name, verdict, asked = str(e["name"]), str(e["verdict"]), str(e["requested"])
+    name, verdict, requested = str(e["name"]), str(e["verdict"]), str(e["requested"])
     reduced = e["reduced"]
-    judged = any(f["warn"] is not None or f["bad"] is not None for f in e["health"])
+    is_judged = any(f["warn"] is not None or f["bad"] is not None for f in e["health"])
     return EstimatorView(
         name=method_label(name),
         meaning=_method_note(name),
         sensors=len(e["sensors"]),
         kind=KINDS[verdict],
-        verdict=VERDICTS[verdict] if judged else NOT_JUDGED,
+        verdict=VERDICTS[verdict] if is_judged else NOT_JUDGED,
         reduced=None if reduced is None else REDUCED.get(reduced, str(reduced)),
         health=_rows(e["health"]),
         choices=(
-            (AUTO, "Automatic: the best for what is worn", asked == AUTO),
-            *((x, choice_label(x), asked == x) for x in e["possible"]),
+            (AUTO, "Automatic: the best for what is worn", requested == AUTO),
+            *((x, choice_label(x), requested == x) for x in e["possible"]),
         ),
         estimated=_estimated(_told(list_estimated_angles(e), name)),
         paper=BY_METHOD[name].paper if name in BY_METHOD else None,
@@ -120,8 +120,8 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
 
 def method_label(method: str) -> str:
     """Label of `Poses.method`; unchanged if unknown to this version."""
-    known = BY_METHOD.get(method)
-    return known.label if known is not None else NO_FIGURE_LABEL if method == NO_FIGURE else method
+    estimator = BY_METHOD.get(method)
+    return estimator.label if estimator is not None else NO_FIGURE_LABEL if method == NO_FIGURE else method
 
 
 def choice_label(name: str) -> str:
@@ -130,8 +130,8 @@ def choice_label(name: str) -> str:
 
 
 def _method_note(method: str) -> str:
-    known = BY_METHOD.get(method)
-    return known.note if known is not None else NO_FIGURE_NOTE if method == NO_FIGURE else ""
+    estimator = BY_METHOD.get(method)
+    return estimator.note if estimator is not None else NO_FIGURE_NOTE if method == NO_FIGURE else ""
 
 
 def list_estimated_angles(e: Mapping[str, Any] | None) -> frozenset[str]:
@@ -156,11 +156,12 @@ def _estimated(angles: frozenset[str]) -> str:
     joints = sorted({a.split("_")[0] for a in angles})
     sides = {"l": "left", "r": "right"}
     on = sorted({sides[a[-1]] for a in angles if a[-2:] in ("_l", "_r")})
-    who = "both sides" if len(on) > 1 else Message("the {on} side", on=on[0]) if on else "the pelvis"
+    region = "both sides" if len(on) > 1 else Message("the {on} side", on=on[0]) if on else "the pelvis"
     return Message(
-        "{join} angles of {who} are estimated by the leg model, not measured by two sensors: low confidence.",
+        "{join} angles of {region} are estimated by the leg model, not measured by two "
+        "sensors: low confidence.",
         join=", ".join(joints).capitalize(),
-        who=who,
+        region=region,
     )
 
 
@@ -171,9 +172,9 @@ def _rows(health: list[Mapping[str, Any]]) -> tuple[HealthRow, ...]:
         was = worst.get(f["name"])
         if was is None or f["value"] is None or (was["value"] is not None and f["value"] > was["value"]):
             worst[f["name"]] = f
-    shown = [f for name, f in worst.items() if name not in HIDDEN]
-    shown.sort(key=lambda f: f["warn"] is None and f["bad"] is None)
-    return tuple(_row(f) for f in shown)
+    measures = [f for name, f in worst.items() if name not in HIDDEN]
+    measures.sort(key=lambda f: f["warn"] is None and f["bad"] is None)
+    return tuple(_row(f) for f in measures)
 
 
 def _row(f: Mapping[str, Any]) -> HealthRow:
@@ -181,10 +182,10 @@ def _row(f: Mapping[str, Any]) -> HealthRow:
     label, digits, unit = QUANTITIES.get(name, (name.replace("_", " ").capitalize(), 2, ""))
     gap = "" if unit == "°" else "\u202f"
     limit = f["bad"] if f["warn"] is None else f["warn"]
-    where = " and ".join(place_words(part) for part in str(f["of"] or "").split("-") if part)
+    location = " and ".join(place_words(part) for part in str(f["of"] or "").split("-") if part)
     return HealthRow(
         label=label,
-        where=where,
+        where=location,
         text="not measured"
         if f["value"] is None
         else f"{format_number(float(f['value']), digits)}{gap}{unit}",

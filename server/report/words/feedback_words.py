@@ -54,8 +54,8 @@ def target_words(content: Prescription) -> str:
     if t.mean is None or t.sd is None:
         return SOURCE_WORDS[t.source]
     digits = digits_of(content)
-    who = "entered" if t.source == "manual" else t.words or SOURCE_WORDS[t.source]
-    return f"{format_number(t.mean, digits)} ± {format_quantity(t.sd, term, digits)}, {who}"
+    origin = "entered" if t.source == "manual" else t.words or SOURCE_WORDS[t.source]
+    return f"{format_number(t.mean, digits)} ± {format_quantity(t.sd, term, digits)}, {origin}"
 
 
 def prescription_words(content: Prescription) -> list[tuple[str, str]]:
@@ -76,28 +76,28 @@ def schedule_words(content: Prescription) -> str:
     """Schedule of strides with feedback, in words."""
     s = content.schedule
     if s.kind == "every":
-        said = "every stride"
+        text = "every stride"
     else:
         shares = " → ".join(f"{p}{NBSP}%" for p in s.shares_pct)
-        said = Message("{shares} of the strides", shares=shares)
+        text = Message("{shares} of the strides", shares=shares)
         if len(s.shares_pct) > 1:
-            said = Message(
+            text = Message(
                 "{shares} of the strides, {strides_per_share} strides each",
                 shares=shares,
                 strides_per_share=s.strides_per_share,
             )
     if s.probe_every is not None:
-        said += Message(
+        text += Message(
             "; after every {probe_every}, {probe_strides} without",
             probe_every=s.probe_every,
             probe_strides=s.probe_strides,
         )
     if s.retention_strides:
-        said += Message(
+        text += Message(
             "; a visit after a training begins with {retention_strides} without",
             retention_strides=s.retention_strides,
         )
-    return said
+    return text
 
 
 def _zone(content: Prescription) -> str:
@@ -109,10 +109,10 @@ def _zone(content: Prescription) -> str:
 
 
 def _shown(content: Prescription) -> str:
-    said = ", ".join(MODE_WORDS[m] for m in content.modes)
+    text = ", ".join(MODE_WORDS[m] for m in content.modes)
     if content.positive_only:
-        return Message("{said}; only strides in the zone", said=said)
-    return Message("{said}; only strides outside the zone", said=said) if content.bandwidth else said
+        return Message("{text}; only strides in the zone", text=text)
+    return Message("{text}; only strides outside the zone", text=text) if content.bandwidth else text
 
 
 def _level(content: Prescription) -> str:
@@ -138,31 +138,31 @@ def _level(content: Prescription) -> str:
 
 def _ends(content: Prescription) -> str:
     r = content.stop_rule
-    said = []
+    conditions = []
     if r.max_minutes is not None:
-        said.append(Message("after {max_minutes:g} min", max_minutes=r.max_minutes))
+        conditions.append(Message("after {max_minutes:g} min", max_minutes=r.max_minutes))
     if r.max_strides is not None:
-        said.append(
+        conditions.append(
             Message(
                 f"after {{max_strides}} {plural(r.max_strides, 'stride', 'strides')}",
                 max_strides=r.max_strides,
             )
         )
     if r.gps_rise_deg is not None:
-        said.append(
+        conditions.append(
             Message("when the sagittal profile score rises by {gps_rise_deg:g}°", gps_rise_deg=r.gps_rise_deg)
         )
-    return ", ".join(said) or "when the therapist ends it"
+    return ", ".join(conditions) or "when the therapist ends it"
 
 
 def _watched(content: Prescription) -> str:
     g, term = content.guard, parameter_term(content.parameter)
-    said = []
+    parts = []
     if content.side is not None:
         limit = "its MDC" if g.other_change is None else format_quantity(g.other_change, term)
-        said.append(Message("a change of the other side by {limit}", limit=limit))
+        parts.append(Message("a change of the other side by {limit}", limit=limit))
     if g.gps_rise_deg is not None:
-        said.append(
+        parts.append(
             Message("a rise of the sagittal profile score by {gps_rise_deg:g}°", gps_rise_deg=g.gps_rise_deg)
         )
-    return ", ".join(said) or "nothing"
+    return ", ".join(parts) or "nothing"

@@ -219,6 +219,8 @@ def speak_places(text: str) -> str:
     """
     if isinstance(text, Message):
         return text.map_words(speak_places)
+    if isinstance(text, Message):
+        return text.map_words(speak_places)
     return _SIDED.sub(lambda found: place_words(found[0]), text)
 
 
@@ -257,8 +259,8 @@ def format_uncertainty(value: float, digits: int) -> str:
     >>> format_uncertainty(2.4, 0), format_uncertainty(0.08, 0)
     ('± 2', '± 0.1')
     """
-    shown = next((d for d in range(digits, digits + 3) if round(value, d)), digits)
-    return f"± {format_number(value, shown)}"
+    decimals = next((d for d in range(digits, digits + 3) if round(value, d)), digits)
+    return f"± {format_number(value, decimals)}"
 
 
 def symmetry_words(s: Symmetry) -> str:
@@ -267,12 +269,12 @@ def symmetry_words(s: Symmetry) -> str:
     """
     if s.ratio is None or s.index_pct is None or s.angle_pct is None:
         return "a side is too near zero for a ratio" if s.reason == "near_zero" else ""
-    first, other = s.reference.split("/")
+    first, second = s.reference.split("/")
     return Message(
-        "{first} / {other} {ratio}, symmetry index {index_pct} % (positive: {first2} larger), "
+        "{first} / {second} {ratio}, symmetry index {index_pct} % (positive: {first2} larger), "
         "symmetry angle {angle_pct} % (negative: {first3} larger)",
         first=first,
-        other=other,
+        second=second,
         ratio=format_number(s.ratio, 2),
         index_pct=_signed(s.index_pct),
         first2=first,
@@ -308,11 +310,11 @@ def _difference_digits(term: Term) -> int:
 def difference_words(left: float, right: float, term: Term) -> str:
     """Left against right in words: "left longer by 0.04 s", "no difference" where printed values agree."""
     digits = _difference_digits(term)
-    shown = round_difference(left, right, term)
-    if shown == 0:
+    difference = round_difference(left, right, term)
+    if difference == 0:
         return NO_DIFFERENCE
     unit = {"%": " points", "°": "°"}.get(term.unit, f"\u202f{term.unit}")
-    return f"left {term.comparison[0 if left > right else 1]} by {format_number(shown, digits)}{unit}"
+    return f"left {term.comparison[0 if left > right else 1]} by {format_number(difference, digits)}{unit}"
 
 
 JUDGED: Final[Mapping[str | None, str]] = {
