@@ -33,13 +33,14 @@ SOURCE: Final = "en"
 TEXTS: Final = Path(__file__).parent / "texts"
 
 
-def _name_language(code: str) -> str:
+def name_language(code: str) -> str:
+    """Name of a language in the language itself."""
     name = Locale.parse(code).get_display_name() or code
     return name[0].upper() + name[1:]
 
 
 LANGUAGES: Final[Mapping[str, str]] = {
-    code: _name_language(code) for code in (SOURCE, *sorted(path.stem for path in TEXTS.glob("*.po")))
+    code: name_language(code) for code in (SOURCE, *sorted(path.stem for path in TEXTS.glob("*.po")))
 }
 """Code of a language → its own name; the first is that of the sources, every catalogue is another."""
 
@@ -83,8 +84,13 @@ class Catalogue:
         return SentenceFinder({**earlier, **self.messages}, self._values)
 
     def find(self, text: str) -> str | None:
-        """A text in this language; None where no part of it is made from a message."""
-        said = self._render(text) if isinstance(text, Message) else self.messages.get(text)
+        """Translation of a text; None if the catalogue does not have it.
+
+        Only a sentence that carries no template is compared with the patterns of all messages.
+        """
+        if isinstance(text, Message):
+            return self._render(text)
+        said = self.messages.get(text)
         return self._sentences.find(text) if said is None else said
 
     def translate(self, text: str) -> str:
@@ -93,7 +99,7 @@ class Catalogue:
         return text if translation is None else translation
 
     def fill(self, message: str, values: Mapping[str, str]) -> str:
-        """The text of a message with values that are said already; English where the catalogue has none."""
+        """Translation of a message with translated values; English if the catalogue has none."""
         return fill_placeholders(self.messages.get(message, message), values)
 
     def day(self, value: dt.date | dt.datetime) -> str:
@@ -117,7 +123,7 @@ class Catalogue:
             return self.day(value)
         if isinstance(value, str):
             return str(value) if isinstance(value, UserText) else self.translate(value)
-        return self._values.localise(format(value, spec))
+        return format(value, spec).replace(".", self._values.decimal_mark)
 
 
 def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:
@@ -136,7 +142,7 @@ def read_earlier() -> Mapping[str, str]:
 
 
 def catalogue_path(language: str) -> Path:
-    """Where the texts of a language are."""
+    """Path of a language's catalogue."""
     return TEXTS / f"{language}.po"
 
 

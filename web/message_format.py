@@ -30,13 +30,13 @@ class ValueFormat:
     def __init__(self, language: str) -> None:
         self.quotation_marks = QUOTATION_MARKS.get(language, "“{}”")
         self._locale = Locale.parse(language)
-        self._mark = format_decimal(0.1, locale=self._locale)[1]
+        self.decimal_mark = format_decimal(0.1, locale=self._locale)[1]
 
     def localise(self, text: str) -> str:
         """Rewrite the numbers and dates inside a text."""
         if not any(map(str.isdigit, text)):
             return text
-        return _DECIMAL.sub(rf"\1{self._mark}\2", _DATE.sub(self._rewrite_date, text))
+        return _DECIMAL.sub(rf"\1{self.decimal_mark}\2", _DATE.sub(self._rewrite_date, text))
 
     def mark_quotations(self, text: str) -> str:
         """Put the quotation marks of the language around placeholders."""
@@ -61,12 +61,12 @@ class ValueFormat:
 
 @functools.cache
 def has_words(message: str) -> bool:
-    """Whether something of a message is to be translated."""
+    """Whether a message contains anything to translate."""
     return re.search(r"[^\W\d_]{2}", PLACEHOLDER.sub(" ", _ENTITY.sub(" ", message))) is not None
 
 
 def fill_placeholders(said: str, values: Mapping[str, str]) -> str:
-    """A text with values in the place of its `{placeholders}`; one without a value stays."""
+    """Replace `{placeholders}` by their values; those without a value remain."""
     return PLACEHOLDER.sub(lambda m: values.get(m[1], m[0]), said)
 
 

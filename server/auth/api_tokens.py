@@ -18,6 +18,7 @@ from sqlalchemy import Connection, Row, delete, insert, select, update
 from sqlalchemy.exc import OperationalError
 from starlette.requests import HTTPConnection
 
+from sagittal.core.message import Message
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action, Role
 from sagittal.server.auth.sight import NOTHING, opens_parts
@@ -85,7 +86,10 @@ def issue(
         raise Problem(
             409,
             "too_many_tokens",
-            f"An account has at most {MOST_TOKENS} tokens. Revoke one that is not used.",
+            Message(
+                "An account has at most {MOST_TOKENS} tokens. Revoke one that is not used.",
+                MOST_TOKENS=MOST_TOKENS,
+            ),
         )
     token, issued_at = PREFIX + new_token(), now()
     values = {

@@ -11,6 +11,7 @@ from pwdlib import PasswordHash
 from pwdlib.exceptions import PwdlibError
 from pwdlib.hashers.argon2 import Argon2Hasher
 
+from sagittal.core.message import Message
 from sagittal.server.http.problems import Problem
 
 MIN_LENGTH = 12  # OWASP ASVS 4.0.3, 2.1.1
@@ -30,8 +31,13 @@ def hash_password(password: str) -> str:
         raise Problem(
             422,
             "weak_password",
-            f"A password needs {MIN_LENGTH} to {MAX_LENGTH} characters; this one has {len(password)}. "
-            "A few unrelated words make a good one.",
+            Message(
+                "A password needs {MIN_LENGTH} to {MAX_LENGTH} characters; this one has {password}. "
+                "A few unrelated words make a good one.",
+                MIN_LENGTH=MIN_LENGTH,
+                MAX_LENGTH=MAX_LENGTH,
+                password=len(password),
+            ),
         )
     with _slot():
         return _HASHER.hash(password)

@@ -21,6 +21,7 @@ from typing import Any, Final, Literal
 from sqlalchemy import Connection, Row, delete, insert, select, update
 from starlette.requests import HTTPConnection
 
+from sagittal.core.message import Message
 from sagittal.server.auth import second_factor
 from sagittal.server.auth.tokens import token_hash
 from sagittal.server.http.hosts import host_name
@@ -113,7 +114,11 @@ def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> di
         )
     keys = list_keys(c, user_id)
     if len(keys) >= MOST_KEYS:
-        raise Problem(409, "too_many_keys", f"An account has at most {MOST_KEYS} keys. Remove one first.")
+        raise Problem(
+            409,
+            "too_many_keys",
+            Message("An account has at most {MOST_KEYS} keys. Remove one first.", MOST_KEYS=MOST_KEYS),
+        )
     options = generate_registration_options(
         rp_id=site.host,
         rp_name="Sagittal",
@@ -172,7 +177,11 @@ def register(
     if c.execute(same).first() is not None:
         raise KeyRefused(403)
     if len(list_keys(c, user_id)) >= MOST_KEYS:
-        raise Problem(409, "too_many_keys", f"An account has at most {MOST_KEYS} keys. Remove one first.")
+        raise Problem(
+            409,
+            "too_many_keys",
+            Message("An account has at most {MOST_KEYS} keys. Remove one first.", MOST_KEYS=MOST_KEYS),
+        )
     row = {
         "id": new_id(),
         "user_id": user_id,

@@ -15,6 +15,7 @@ from typing import Protocol, TypeVar
 from sqlalchemy import ColumnElement, Connection, and_, delete, insert, select
 from sqlalchemy.exc import OperationalError
 
+from sagittal.core.message import Message
 from sagittal.server.http.problems import Problem
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.refusal import refusal_of
@@ -130,7 +131,10 @@ class Throttle:
             raise Problem(
                 429,
                 "too_many_attempts",
-                f"Too many failed attempts. Wait {minutes} min and try again, or ask an administrator.",
+                Message(
+                    "Too many failed attempts. Wait {minutes} min and try again, or ask an administrator.",
+                    minutes=minutes,
+                ),
                 headers={"Retry-After": str(seconds)},
             )
 

@@ -10,6 +10,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, bindparam, case, exists, func, insert, select, update
 
 from sagittal.core.frames import PROTOCOLS, Protocol
+from sagittal.core.message import Message
 from sagittal.core.subject.condition import (
     CHOICES,
     Footwear,
@@ -263,18 +264,27 @@ _OF_PATIENT = _QUERY.where(session.c.patient_id == bindparam("of_patient")).orde
 def _checked(values: Mapping[str, object]) -> dict[str, Any]:
     unknown = values.keys() - CHANGEABLE
     if unknown:
-        raise ServiceError("bad_value", f"A visit has no {', '.join(sorted(unknown))}.")
+        raise ServiceError("bad_value", Message("A visit has no {join}.", join=", ".join(sorted(unknown))))
     checked = dict(values)
     if "title" in checked and not 1 <= len(str(checked["title"])) <= 200:
         raise ServiceError("bad_value", "A visit's title has 1 to 200 characters.")
     if checked.get("protocol", PROTOCOLS[0]) not in PROTOCOLS:
-        raise ServiceError("bad_value", f"The protocol is one of {', '.join(PROTOCOLS)}.")
+        raise ServiceError(
+            "bad_value", Message("The protocol is one of {PROTOCOLS}.", PROTOCOLS=", ".join(PROTOCOLS))
+        )
     for name, words in CHOICES.items():
         if checked.get(name) is not None and checked[name] not in words:
-            raise ServiceError("bad_value", f"{name} is one of {', '.join(words)}, or null where not stated.")
+            raise ServiceError(
+                "bad_value",
+                Message(
+                    "{name} is one of {words}, or null where not stated.", name=name, words=", ".join(words)
+                ),
+            )
     if not isinstance(checked.get("feedback", False), bool):
         raise ServiceError("bad_value", "feedback is true or false.")
     height = checked.get("height_m")
     if height is not None and not (isinstance(height, int | float) and 0.5 <= height <= 2.5):
-        raise ServiceError("bad_value", f"Body height is {height}, expected 0.5 to 2.5 m.")
+        raise ServiceError(
+            "bad_value", Message("Body height is {height}, expected 0.5 to 2.5 m.", height=height)
+        )
     return checked

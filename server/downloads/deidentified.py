@@ -24,6 +24,7 @@ from typing import Final
 from sqlalchemy import Connection
 
 from sagittal.core.errors import FormatError, InputError
+from sagittal.core.message import Message
 from sagittal.core.subject.condition import CHOICES
 from sagittal.server import audit
 from sagittal.server.clinic import consents, patients, sessions
@@ -90,7 +91,8 @@ def open_key(path: Path) -> ResearchKey:
     text = path.read_bytes().strip().decode("ascii", "replace")
     if not _KEY.fullmatch(text):
         raise InputError(
-            "bad_research_key", f"{path} is no key for research: expected 64 hex digits. Give another file."
+            "bad_research_key",
+            Message("{path} is no key for research: expected 64 hex digits. Give another file.", path=path),
         )
     return ResearchKey(bytes.fromhex(text))
 

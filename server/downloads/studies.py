@@ -17,6 +17,7 @@ from sqlalchemy import Connection
 
 from sagittal.core.errors import SagittalError
 from sagittal.core.frames import Protocol
+from sagittal.core.message import Message
 from sagittal.server.auth.identity import Identity
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.clinic.patients import Patient
@@ -79,8 +80,12 @@ def check_size(chosen: Sequence[Session]) -> None:
     if len(chosen) > MOST_VISITS:
         raise Conflict(
             "too_many_visits",
-            f"{len(chosen)} visits match; a study can have at most {MOST_VISITS}. Choose shorter periods "
-            "and merge the tables.",
+            Message(
+                "{chosen} visits match; a study can have at most {MOST_VISITS}. Choose shorter periods and "
+                "merge the tables.",
+                chosen=len(chosen),
+                MOST_VISITS=MOST_VISITS,
+            ),
         )
 
 

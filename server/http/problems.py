@@ -20,7 +20,8 @@ from starlette.routing import Match, Mount
 from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketState
 
-from sagittal.core.errors import SagittalError
+from sagittal.core.errors import SagittalError, title_of_code
+from sagittal.core.message import Message
 from sagittal.server.http.headers import add_security_headers
 from sagittal.server.http.templates import render
 from sagittal.server.log import request_id
@@ -60,7 +61,7 @@ class Problem(HTTPException):
         """Return the members of RFC 9457 §3.1 plus `code` and, for invalid fields, `errors`."""
         body: dict[str, Any] = {
             "type": f"urn:sagittal:problem:{self.code}",
-            "title": self.code.replace("_", " ").capitalize(),
+            "title": title_of_code(self.code),
             "status": self.status,
             "detail": self.detail,
             "code": self.code,
@@ -86,8 +87,10 @@ def as_problem(error: Exception) -> Problem:
         return Problem(
             422,
             "invalid_request",
-            "The request does not have the expected form: "
-            + "; ".join(f"{f['field']}: {f['message']}" for f in fields[:5]),
+            Message(
+                "The request does not have the expected form: {join}",
+                join="; ".join(f"{f['field']}: {f['message']}" for f in fields[:5]),
+            ),
             errors=fields,
         )
     if isinstance(error, AnyHttpException):

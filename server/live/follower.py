@@ -44,6 +44,7 @@ from sagittal.server.live.messages import (
     LogProcessed,
     Picture,
     Report,
+    encode_json,
 )
 from sagittal.server.report.words.guided_words import tell_person
 
@@ -243,7 +244,7 @@ class Follower:
         if state.guard.state != self._guard:
             self._guard = state.guard.state
             self._item("guard", None if self._last is None else self._last.t_s, wire.feedback(state))
-        body = wire.encode(wire.feedback(state))
+        body = encode_json(wire.feedback(state))
         if body != self._standing:
             self._standing = body
             self._say(FeedbackStatus(self.take, body))
@@ -251,7 +252,7 @@ class Follower:
     def _item(self, kind: Kind, t_s: float | None, content: dict[str, Any]) -> None:
         if self._late:
             content["late"] = True
-        self._say(FeedItem(self.take, kind, self._said[kind], t_s, wire.encode(content), self._late))
+        self._say(FeedItem(self.take, kind, self._said[kind], t_s, encode_json(content), self._late))
         self._said[kind] += 1
 
     def _note_arrival(self, batch: SampleBatch, end: int) -> None:

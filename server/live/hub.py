@@ -12,7 +12,6 @@ import time
 from collections.abc import Coroutine
 from typing import Any, Final
 
-import msgspec
 from sqlalchemy.exc import SQLAlchemyError
 
 from sagittal.core.formats.live_log import Hello
@@ -32,6 +31,7 @@ from sagittal.server.live.messages import (
     LogProcessed,
     Picture,
     Report,
+    encode_json,
 )
 from sagittal.server.live.pool import EstimatorPool
 from sagittal.server.live.protocol import CloseCode
@@ -275,14 +275,14 @@ class Hub:
     def tell_state(self, take: ActiveTake) -> None:
         """Send the state of a trial to browsers, unless it has ended (see `_tell_over`)."""
         if self._takes.get(take.id) is take:
-            take.room.say("state", msgspec.json.encode(take.standing()))
+            take.room.say("state", encode_json(take.standing()))
 
     def tell_row(self, row: live.LiveTakeRecord) -> None:
         """Send the state of a trial without a tablet to browsers."""
         take = self._takes.get(row.id)
         if take is None:
             self.room(row.session_id).clear()
-            self.room(row.session_id).say("state", msgspec.json.encode(describe_unjoined(row)))
+            self.room(row.session_id).say("state", encode_json(describe_unjoined(row)))
         else:
             self.tell_state(take)
 
@@ -346,7 +346,7 @@ class Hub:
         self._takes.pop(take.id, None)
 
     def _tell_over(self, row: live.LiveTakeRecord) -> None:
-        self.room(row.session_id).say("state", msgspec.json.encode(describe_unjoined(row)))
+        self.room(row.session_id).say("state", encode_json(describe_unjoined(row)))
         self.leave(row.session_id)
 
     async def _tick(self) -> None:
@@ -400,4 +400,4 @@ class Hub:
 
 
 def _notify(take: ActiveTake, severity: str, text: str) -> None:
-    take.room.say("notice", msgspec.json.encode({"type": "notice", "severity": severity, "text": text}))
+    take.room.say("notice", encode_json({"type": "notice", "severity": severity, "text": text}))

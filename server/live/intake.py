@@ -26,6 +26,8 @@ from sagittal.core.formats.live_log import (
     read_batch_header,
     view_samples,
 )
+from sagittal.core.message import Message
+from sagittal.core.plurals import plural
 from sagittal.server.live import protocol
 from sagittal.server.live.protocol import MOST_UNACKED, CloseCode, ProtocolError
 
@@ -126,13 +128,18 @@ class Intake:
         InputError `live_log_order` if it is not a log of ours.
         """
         if (self.hello is None) != (record.kind == "H") or self._said is not None:
-            raise InputError("live_log_order", f"The log has a record '{record.kind}' out of its order.")
+            raise InputError(
+                "live_log_order", Message("The log has a record '{kind}' out of its order.", kind=record.kind)
+            )
         if record.kind == "H":
             self.hello = parse_hello(record.body)
         elif record.kind == "B":
             header = read_batch_header(record.body)
             if header.seq != self.next_seq:
-                raise InputError("live_log_order", f"Batch {header.seq} follows {self.next_seq - 1}.")
+                raise InputError(
+                    "live_log_order",
+                    Message("Batch {seq} follows {next_seq}.", seq=header.seq, next_seq=self.next_seq - 1),
+                )
             self._take(record.body, header)
             self.durable = self._base = self.next_seq
         else:
@@ -225,8 +232,12 @@ class Intake:
             return IntakeAnswer(
                 protocol.error(
                     MISMATCH,
-                    f"The tablet counts {finish.count} batches, {self.next_seq} have come; send the rest and "
-                    "finish again.",
+                    Message(
+                        f"The tablet counts {{count}} {plural(finish.count, 'batch', 'batches')}, "
+                        "{next_seq} have come; send the rest and finish again.",
+                        count=finish.count,
+                        next_seq=self.next_seq,
+                    ),
                     next_seq=self.next_seq,
                 )
             )

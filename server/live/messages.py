@@ -145,5 +145,6 @@ Order = FollowTake | LogGrown | Command | Charge | ForgetTake
 Report = EstimatorReady | Picture | FeedItem | FeedbackStatus | LogProcessed | EstimateFailed
 
 encode = partial(msgspec.msgpack.encode, enc_hook=encode_user_text)
+encode_json = partial(msgspec.json.encode, enc_hook=encode_user_text)
 decode_order = msgspec.msgpack.Decoder(Order).decode
 decode_report = msgspec.msgpack.Decoder(Report).decode

@@ -22,6 +22,7 @@ from sagittal.core.formats.live_log import (
     finish_of,
     hello_of,
 )
+from sagittal.core.message import Message
 
 MAX_UNACKED: Final = 64
 """Batches a tablet may have sent beyond the last acknowledgement; then it waits."""
@@ -131,7 +132,14 @@ def _battery(root: Mapping[str, Any]) -> Battery:
         raise InputError("battery_bad", "A battery message has no `sensors`; expected {id: percent}.")
     for name, value in sensors.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 100:
-            raise InputError("battery_bad", f"The battery of {name:.40} is {value!r:.40}; expected 0 to 100.")
+            raise InputError(
+                "battery_bad",
+                Message(
+                    "The battery of {name:.40} is {value:.40}; expected 0 to 100.",
+                    name=name,
+                    value=repr(value),
+                ),
+            )
     return Battery({name: float(value) for name, value in sensors.items()})
 
 

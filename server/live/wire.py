@@ -6,7 +6,6 @@ Runs in the estimator process; the web process forwards the bytes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import partial
 from math import isfinite, pi
 from typing import Any, Final
 
@@ -18,11 +17,11 @@ from sagittal.core.errors import Notice
 from sagittal.core.feedback import Cue, FeedbackState
 from sagittal.core.frames import SIDES, SUFFIX, Floats, Side
 from sagittal.core.functional_tests.result import GuidedTestView, TimedSegment
+from sagittal.core.message import Message
 from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame, SensorHealth
 from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.core.parameters.result import Parameter
-from sagittal.core.user_text import encode_user_text
-from sagittal.server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
+from sagittal.server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose, encode_json
 from sagittal.server.report.view.calibration_checks import say_verdict
 from sagittal.server.report.view.functional import segment_label
 from sagittal.server.report.words.guided_words import tell_person
@@ -53,8 +52,6 @@ CURVE_POINTS: Final = 51
 _SEVERITY: Final = {"info": "info", "warning": "warn", "error": "bad"}
 _DEGREES: Final = 180.0 / pi
 
-encode = partial(msgspec.json.encode, enc_hook=encode_user_text)
-
 
 def frame(
     live_frame: LiveFrame,
@@ -80,7 +77,7 @@ def frame(
         "contact": {SUFFIX[side]: bool(live_frame.contact.get(side, False)) for side in SIDES},
         **slow,
     }
-    return encode(body)[:-1]
+    return encode_json(body)[:-1]
 
 
 def slow_part(
@@ -97,15 +94,15 @@ def slow_part(
     """
     health = [_health(row, battery.get(row.id)) for row in live_frame.health]
     return {
-        "test": msgspec.Raw(encode(None if guided is None else tell_test(guided))),
+        "test": msgspec.Raw(encode_json(None if guided is None else tell_test(guided))),
         "calibration": calibration or describe_calibration(live_frame.calibration),
-        "health": msgspec.Raw(encode(health)),
+        "health": msgspec.Raw(encode_json(health)),
     }
 
 
 def describe_calibration(view: CalibrationView | None) -> msgspec.Raw:
     """State of the calibration."""
-    return msgspec.Raw(encode(_calibration(view)))
+    return msgspec.Raw(encode_json(_calibration(view)))
 
 
 def tell_test(view: GuidedTestView) -> dict[str, Any]:
@@ -279,7 +276,9 @@ def _judged(row: SensorHealth, battery_pct: float | None) -> tuple[str, str]:
     if row.segment is None:
         return "none", "not used"
     if row.silent_s > STALE_S:
-        return "bad", f"silent for {row.silent_s:.0f} s" if row.silent_s >= 1.0 else "silent"
+        return "bad", Message(
+            "silent for {silent_s:.0f} s", silent_s=row.silent_s
+        ) if row.silent_s >= 1.0 else "silent"
     if row.stuck:
         return "bad", "no valid data"
     if row.lost_share > LOST_BAD:

@@ -22,6 +22,7 @@ from typing import Any, Final
 from sagittal.core.formats.json_tree import read_json
 from sagittal.core.formats.live_log import LATEST_US, MOST_FRAME_BYTES, LogRecord, record
 from sagittal.core.formats.live_reader import find_start_us
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.errors import Conflict, NotFound, ServiceError, TooLarge
 from sagittal.server.live_takes import live, live_recordings
@@ -124,7 +125,14 @@ class FilmIntake:
             if film is None:
                 raise NotFound("video of trial", take_id)
             if number > film.pieces:
-                raise Conflict("film_gap", f"Piece {number} came, expected {film.pieces}. Send that first.")
+                raise Conflict(
+                    "film_gap",
+                    Message(
+                        "Piece {number} came, expected {pieces}. Send that first.",
+                        number=number,
+                        pieces=film.pieces,
+                    ),
+                )
             if number == film.pieces and piece:
                 self._append(film, piece)
             return self._say(film)
@@ -181,7 +189,10 @@ class FilmIntake:
         if film.size + len(piece) > limit:
             raise TooLarge(
                 "file_too_large",
-                f"A video may have at most {limit / 1000000.0:g} MB here and is stopped before that.",
+                Message(
+                    "A video may have at most {limit:g} MB here and is stopped before that.",
+                    limit=limit / 1e6,
+                ),
             )
         receiving.require_room(self._blobs, self._settings, len(piece))
         try:

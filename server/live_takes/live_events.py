@@ -10,6 +10,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, bindparam, insert, select
 
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 from sagittal.core.signals.recording import GivenLimits
 from sagittal.server import audit
 from sagittal.server.errors import ServiceError
@@ -53,7 +54,10 @@ def check_value(name: str, value: object) -> None:
     else:
         ok, expected = value is None, "nothing"
     if not ok:
-        raise ServiceError("bad_value", f"The value of the command {name} is not {expected}.")
+        raise ServiceError(
+            "bad_value",
+            Message("The value of the command {name} is not {expected}.", name=name, expected=expected),
+        )
 
 
 def _are_limits(value: object) -> bool:

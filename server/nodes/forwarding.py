@@ -20,6 +20,7 @@ from starlette.websockets import WebSocket
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidStatus, WebSocketException
 
+from sagittal.core.message import Message
 from sagittal.server.http.carrying import carry_messages
 from sagittal.server.http.problems import Problem, send_problem
 from sagittal.server.nodes import passage
@@ -99,8 +100,11 @@ async def _pass_request(nodes: Nodes, node: WebNode, scope: Scope, receive: Rece
             problem = Problem(
                 503,
                 "node_lost",
-                f"The web server '{node.name}' did not respond. Check whether the request was carried out "
-                "before trying again.",
+                Message(
+                    "The web server '{name}' did not respond. Check whether the request was carried "
+                    "out before trying again.",
+                    name=node.name,
+                ),
                 headers={"Retry-After": "5"},
             )
             await send_problem(problem, scope, receive, send)

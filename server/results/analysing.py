@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
+from sagittal.core.message import Message
 from sagittal.core.signals.memory import give_memory_back
 from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.provenance import CODE_VERSION
@@ -127,7 +128,9 @@ def choose_config(files: Sequence[SourceFile], config: Mapping[str, Any] | None)
     try:
         settings = {} if archived is None else read_json(archived)
     except ValueError as error:
-        raise ArchiveError("zip_bad", f"The archive's settings are not valid JSON: {error}.") from error
+        raise ArchiveError(
+            "zip_bad", Message("The archive's settings are not valid JSON: {error}.", error=error)
+        ) from error
     return settings if isinstance(settings, dict) else {}
 
 

@@ -22,6 +22,7 @@ from sagittal.core.errors import ParameterError
 from sagittal.core.fusion.algorithms.choice import require_tunable
 from sagittal.core.fusion.algorithms.schemes import Scheme as Scheme
 from sagittal.core.fusion.algorithms.swarm import MOST_OF_SWARM as MOST_OF_SWARM
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import Conflict, NotFound
@@ -155,7 +156,8 @@ def submit(
     trials = {path.stem for f in this.files if (path := PurePosixPath(f.name)).suffix == TRIAL}
     if unknown := sorted(set(order.validation) - trials):
         raise Conflict(
-            "no_such_trial", f"There is no trial “{'”, “'.join(unknown)}” among the visit's files."
+            "no_such_trial",
+            Message("There is no trial “{unknown}” among the visit's files.", unknown="”, “".join(unknown)),
         )
     params = {**recordings.job_inputs(this), "order": asdict(order)}
     view = queue.submit(

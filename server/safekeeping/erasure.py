@@ -20,6 +20,7 @@ from sqlalchemy import Connection, delete, select, update
 from sqlalchemy.exc import SQLAlchemyError
 
 from sagittal.core.formats.json_tree import read_json
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.errors import Conflict
@@ -78,7 +79,8 @@ def erase_patient(
         target = patients.get(c, patient_id)
         if confirm.strip() != target.code:
             raise Conflict(
-                "not_confirmed", f"To delete this patient for good, repeat the code '{target.code}'."
+                "not_confirmed",
+                Message("To delete this patient for good, repeat the code '{code}'.", code=target.code),
             )
         mine = select(session.c.id).where(session.c.patient_id == patient_id)
         parts = list(c.execute(select(file_upload.c.id).where(file_upload.c.session_id.in_(mine))).scalars())

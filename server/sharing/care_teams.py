@@ -13,6 +13,7 @@ from unicodedata import normalize
 
 from sqlalchemy import Connection, Row, Select, case, delete, exists, insert, select, union, update
 
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.server import audit
 from sagittal.server.auth.identity import Identity
@@ -182,8 +183,13 @@ def open_in_emergency(c: Connection, user: Identity, code: str, reason: str) -> 
     if not REASON[0] <= len(text) <= REASON[1]:
         raise ServiceError(
             "bad_value",
-            f"The reason has {len(text)} {plural(len(text), 'character', 'characters')}. "
-            f"Expected {REASON[0]} to {REASON[1]}.",
+            Message(
+                f"The reason has {{text}} {plural(len(text), 'character', 'characters')}. Expected "
+                "{REASON} to {REASON2}.",
+                text=len(text),
+                REASON=REASON[0],
+                REASON2=REASON[1],
+            ),
         )
     normalized = normalize("NFKC", code).strip()
     patient_id = c.execute(select(patient.c.id).where(patient.c.code == normalized)).scalar()
@@ -221,7 +227,8 @@ def end_emergency(c: Connection, user: Identity, access_id: str) -> EmergencyAcc
     access = _get_access(c, access_id)
     if not may_end(access, user):
         raise NotAllowed(
-            "not_yours", f"{access.by} opened this patient. Ask that person or an administrator to end it."
+            "not_yours",
+            Message("{by} opened this patient. Ask that person or an administrator to end it.", by=access.by),
         )
     if access.is_open:
         mine = emergency_access.c.id == access_id

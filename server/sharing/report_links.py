@@ -15,6 +15,7 @@ from typing import Final
 
 from sqlalchemy import ColumnElement, Connection, insert, select, update
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import POLICY, Action
@@ -83,9 +84,17 @@ def make(
     """
     report = signed_reports.get(c, report_id)
     if not report.in_force:
-        raise Conflict("not_in_force", f"Version {report.number} was reopened. Share the signed version.")
+        raise Conflict(
+            "not_in_force",
+            Message("Version {number} was reopened. Share the signed version.", number=report.number),
+        )
     if not 1 <= days <= MOST_DAYS:
-        raise ServiceError("bad_value", f"A link is valid for {days} days; expected 1 to {MOST_DAYS}.")
+        raise ServiceError(
+            "bad_value",
+            Message(
+                "A link is valid for {days} days; expected 1 to {MOST_DAYS}.", days=days, MOST_DAYS=MOST_DAYS
+            ),
+        )
     token, link_id, time = new_token(), new_id(), now()
     expires_at = time + dt.timedelta(days=days)
     patient_id = sessions.get(c, report.session_id).patient_id

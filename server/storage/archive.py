@@ -25,6 +25,7 @@ from typing import IO, BinaryIO, Final, Protocol
 
 import pyrage
 
+from sagittal.core.message import Message
 from sagittal.server.storage import fs
 
 PIECE: Final = 1 << 20
@@ -66,7 +67,7 @@ def make_key(path: Path) -> str:
     exists.
     """
     if path.exists():
-        raise BackupFileError(f"{path} exists; an existing key is never overwritten.")
+        raise BackupFileError(Message("{path} exists; an existing key is never overwritten.", path=path))
     private = pyrage.x25519.Identity.generate()
     public = str(private.to_public())
     fs.write_file(path, f"# public key: {public}\n{private}\n".encode())

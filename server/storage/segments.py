@@ -25,6 +25,7 @@ from sagittal.core.formats.live_log import (
     record,
     scan_records,
 )
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.server.storage import fs
 
@@ -111,7 +112,10 @@ def create(path: Path, hello: bytes) -> TakeLog:
     if path.exists() and not content.startswith(_head(path, len(content))):
         raise InputError(
             "live_log_damaged",
-            f"{path.name} is there but is not a live log; it was left as it is. Begin a new take.",
+            Message(
+                "{name} is there but is not a live log; it was left as it is. Begin a new take.",
+                name=path.name,
+            ),
         )
     fs.write_file(path, content)
     return TakeLog(path, len(content))

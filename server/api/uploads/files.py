@@ -12,6 +12,7 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 
+from sagittal.core.message import Message
 from sagittal.server.api import schemas
 from sagittal.server.api.documents import refusals
 from sagittal.server.api.downloads.downloads import BINARY, attachment
@@ -165,8 +166,12 @@ def read_size(request: Request, limit: int) -> int:
         raise Problem(
             413,
             "file_too_large",
-            f"The body has {declared} bytes, at most {limit} are taken. "
-            "Split the recording or ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
+            Message(
+                "The body has {declared} bytes, at most {limit} are taken. Split the recording or "
+                "ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
+                declared=declared,
+                limit=limit,
+            ),
         )
     return int(declared)
 

@@ -12,6 +12,7 @@ from sqlalchemy import Connection
 from starlette.responses import Response
 
 from sagittal.core.change import parameter_changes
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.core.parameters.result import Parameter
 from sagittal.server.auth.access import require
@@ -231,7 +232,10 @@ def _view_speed(
     if own is not None and scale is not None and own.mean.mean is not None:
         text_speeds = ", ".join(text for text in view["speeds"] if text)
         view["figure"] = takes_svg(
-            own.takes, own.mean, scale, f"Takes {text_speeds}, mean {view['speed']} m/s"
+            own.takes,
+            own.mean,
+            scale,
+            Message("Trials {text_speeds}, mean {speed} m/s", text_speeds=text_speeds, speed=view["speed"]),
         )
     previous = visits.find_before(grouped, visit, planned)
     if previous is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import require_entries
 from sagittal.core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
 from sagittal.core.plurals import plural
@@ -79,8 +80,14 @@ def _count_beyond(rows: Sequence[ParameterRow]) -> str:
         any(c is not None and c.z is not None and abs(c.z) > BEYOND_SD for c in (r.both, r.left, r.right))
         for r in rows
     )
-    values = f"{len(rows)} {plural(len(rows), 'value', 'values')}"
-    return f"{values}, {beyond} beyond {BEYOND_SD:g} SD" if beyond else values
+    values = Message(f"{{rows}} {plural(len(rows), 'value', 'values')}", rows=len(rows))
+    return (
+        Message(
+            "{values}, {beyond} beyond {BEYOND_SD:g} SD", values=values, beyond=beyond, BEYOND_SD=BEYOND_SD
+        )
+        if beyond
+        else values
+    )
 
 
 def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[ParameterRow, ...]]]:

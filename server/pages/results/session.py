@@ -12,7 +12,8 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
-from sagittal.core.errors import FormatError
+from sagittal.core.errors import FormatError, title_of_code
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue.entry import SQUAT
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
@@ -348,7 +349,9 @@ def view_strides(model: ReportModel) -> dict[str, Any]:
         "used": model.used,
         "norm_source": model.norm_source,
         "at_speed": model.at_speed,
-        "stride_words": f"{sum(model.used.values())} of {len(model.strides)} included",
+        "stride_words": Message(
+            "{sum} of {strides} included", sum=sum(model.used.values()), strides=len(model.strides)
+        ),
         "empty_reason": explain_emptiness(model),
     }
 
@@ -357,9 +360,15 @@ def explain_emptiness(model: ReportModel) -> str:
     """Reason why an analysis has no strides or squats to show."""
     causes = [w.message for code in NO_STRIDE_CODES for w in model.warnings if w.code == code]
     cycle = "squat" if any(name == SQUAT for name, _ in model.groups) else "stride"
-    read = f"{seconds(model.duration_s)} of data were read, but no complete {cycle} was seen in them."
+    read = Message(
+        "{duration_s} of data were read but contain no complete {cycle}.",
+        duration_s=seconds(model.duration_s),
+        cycle=cycle,
+    )
     if cycle == "squat":
-        return model.problem or f"{read} A squat flexes the knee by at least 20° and returns."
+        return model.problem or Message(
+            "{read} A squat flexes the knee by at least 20° and returns.", read=read
+        )
     question = "Check that there is a sensor on each foot and that it is assigned correctly."
     return model.problem or " ".join([read, *(causes or [question])])
 
@@ -372,7 +381,7 @@ def _notices(model: ReportModel) -> list[dict[str, Any]]:
             continue
         box = boxes.setdefault((w.kind, w.code), {"kind": w.kind, "title": w.title, "messages": []})
         if box["messages"]:
-            box["title"] = w.code.replace("_", " ").capitalize()
+            box["title"] = title_of_code(w.code)
         box["messages"].append(w.message)
     return list(boxes.values())
 
@@ -383,7 +392,9 @@ def _not_compared(session: Session, model: ReportModel) -> str | None:
         return None
     if session.feedback:
         return "Walked with feedback: shown, not compared with other visits."
-    return f"No earlier visit in this condition to compare with: {model.condition}."
+    return Message(
+        "No earlier visit in this condition to compare with: {condition}.", condition=model.condition
+    )
 
 
 def _identity(patient: Patient, session: Session, condition: str) -> list[tuple[str, str]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from sagittal.core.events.result import COMPARED
 from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.message import Message
 from sagittal.core.norms import NormBand
 from sagittal.core.norms.kinematics import Zero
 from sagittal.core.norms.lookup import Norms
@@ -32,7 +33,9 @@ NO_BAND: Final[Mapping[Zero, str]] = {
 }
 """Zero of a curve → why none of the known bands may stand behind it."""
 
-FEW_BAND: Final = f"No norm band: at least {COMPARED} strides per side are needed for a comparison."
+FEW_BAND: Final = Message(
+    "No norm band: at least {COMPARED} strides per side are needed for a comparison.", COMPARED=COMPARED
+)
 """The same where no side has enough strides."""
 
 DRAWN_STRIDES: Final = 40

@@ -22,6 +22,7 @@ from sagittal.core.events.edits import Edit, EditKind
 from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents, Stride, StrideFlag, Strides
 from sagittal.core.events.strides import NOTICES
 from sagittal.core.frames import SEGMENTS, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.core.parameters.catalogue.entry import FUNCTIONAL
 from sagittal.core.parameters.measure import MeasuredGait
@@ -171,8 +172,11 @@ def apply_review(bundle: Bundle, measured: MeasuredGait, edits: Sequence[Edit]) 
     done = Counter(EDIT_WORDS[e.kind] for e in edits)
     notice = Notice(
         "edited",
-        f"Manual changes: {', '.join((f'{n} {words[n > 1]}' for words, n in done.items()))}. The stored "
-        "analysis is unchanged; its files are from before the changes.",
+        Message(
+            "Manual changes: {join}. The stored analysis is unchanged; its files are from before the "
+            "changes.",
+            join=", ".join(f"{n} {words[n > 1]}" for words, n in done.items()),
+        ),
         severity="info",
     )
     warnings = [n for n in bundle.warnings if n.code not in NOTICES]

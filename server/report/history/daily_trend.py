@@ -16,6 +16,7 @@ import numpy as np
 
 from sagittal.core.activity.parameters import WORN_H
 from sagittal.core.activity.result import ActivityResult
+from sagittal.core.message import Message
 from sagittal.core.parameters.result import Parameter
 from sagittal.server.report.charts.svg import PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.words.wording import format_number
@@ -179,4 +180,4 @@ class _TimePanel(PlotArea):
             day = self._first + dt.timedelta(days=days)
             label = f"{day.day} {MONTHS[day.month - 1]}"
             self.add_text(f"{format_coordinate(self.x(day) / 10)}%", self.height, label, "", "middle", dy=15)
-        return self.draw("chart trend-plot", f"{title} over time; values in the table")
+        return self.draw("chart trend-plot", Message("{title} over time; values in the table", title=title))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
+from sagittal.core.message import Message
 from sagittal.server.report.charts.svg import KEY, PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.history.trends import AnalysedVisit, Trend, TrendSeries
 from sagittal.server.report.words.wording import format_number
@@ -96,7 +97,7 @@ def trend_svg(
     title = f"{trend.term.label}{'' if line.side is None else f', {line.side}'}"
     return plot.draw(
         "chart trend-plot small" if small else "chart trend-plot",
-        f"{title} over the visits; values in the table",
+        Message("{title} over the visits; values in the table", title=title),
     )
 
 

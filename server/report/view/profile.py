@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Final, cast
 
 from sagittal.core.frames import SIDES, Side
+from sagittal.core.message import Message
 from sagittal.core.norms.profile import Mode
 from sagittal.core.norms.scores import Score, Scores
 from sagittal.server.report.charts.svg import draw_bar, format_coordinate
@@ -221,8 +222,10 @@ def _index(scores: Scores) -> str:
         if s.value is not None:
             parts.append(f"{side} {format_number(s.value)}")
     return (
-        f"GDI*, sagittal: {', '.join(parts)} (100: mean of healthy adults at their own speed; 10 points: "
-        "one SD)."
+        Message(
+            "GDI*, sagittal: {parts} (100: mean of healthy adults at their own speed; 10 points: one SD).",
+            parts=", ".join(parts),
+        )
         if parts
         else ""
     )
@@ -232,18 +235,25 @@ def _note(scores: Scores) -> str:
     gps = scores.find("gps_deg", MODE, "left")
     missing = [LABELS.get(v, v.replace("_", " ").capitalize()).lower() for v in gps.missing]
     without = (
-        f"GPS not available: {', '.join(missing)} ({reason_words(gps.reason)})."
+        Message(
+            "GPS not available: {missing} ({reason}).",
+            missing=", ".join(missing),
+            reason=reason_words(gps.reason),
+        )
         if gps.value is None and missing
         else ""
     )
     people = (
         "healthy adults asked to walk at this speed"
         if scores.speed_matched
-        else f"{scores.reference_n} healthy adults at their own comfortable speed"
+        else Message(
+            "{reference_n} healthy adults at their own comfortable speed", reference_n=scores.reference_n
+        )
     )
-    measured = (
-        f"Root-mean-square deviation of each mean curve from that of {people}. The level of each curve is "
+    measured = Message(
+        "Root-mean-square deviation of each mean curve from that of {people}. The level of each curve is "
         "removed because angles are relative to the person's standing. Dark: up to the 75th, light: up "
-        "to the 95th percentile of these adults; line: median."
+        "to the 95th percentile of these adults; line: median.",
+        people=people,
     )
     return " ".join(filter(None, (measured, without, f"{scores.source}.")))

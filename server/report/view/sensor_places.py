@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from sagittal.core.message import Message
 from sagittal.server.report.words.wording import format_number, place_words
 
 OFF_SD: Final = 2.0
@@ -71,7 +72,11 @@ def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
         ),
         joints=tuple(
             _view_place(
-                f"{JOINTS[x['side'], x['joint']]}, in the {place_words(x['segment'])}",
+                Message(
+                    "{joint}, in the {place_words}",
+                    joint=JOINTS[x["side"], x["joint"]],
+                    place_words=place_words(x["segment"]),
+                ),
                 x["side"] == "left",
                 x,
                 [x["measured"]] * len(AXES),
@@ -80,7 +85,7 @@ def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
         ),
         knees=tuple(
             KneeAxisRow(
-                f"{side} knee".capitalize(),
+                Message("{side} knee", side=side).capitalize(),
                 _write_turn(x["thigh_deg"], x["thigh_sd_deg"]),
                 _write_turn(x["shank_deg"], x["shank_sd_deg"]),
             )

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from sagittal.core.activity.result import ActivityKind, ActivityResult, TransitionKind, TransitionRefusal
+from sagittal.core.message import Message
 
 DAY_S: Final = 86400.0
 HOUR_S: Final = 3600.0
@@ -101,7 +102,7 @@ def find_day_label(activity: ActivityResult, at_s: float) -> str:
 
 def day_label(number: int, date: dt.date | None) -> str:
     """Name a day by its date, "Mon 16 Nov", or by its number."""
-    return f"Day {number + 1}" if date is None else f"{date:%a} {date.day} {date:%b}"
+    return Message("Day {number}", number=number + 1) if date is None else f"{date:%a} {date.day} {date:%b}"
 
 
 def _since_midnight(activity: ActivityResult) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
+from sagittal.core.message import Message
+
 TOTAL: Final[Mapping[str, str]] = {
     "tug": "tug_duration_s",
     "five_sit_to_stand": "five_sit_to_stand_s",
@@ -41,12 +43,12 @@ SAYS: Final[Mapping[str, Mapping[str, str]]] = {
     "standing_eyes_open": {
         "get_ready": "Stand still, arms at your sides, and look straight ahead.",
         "ready": "Stand still.",
-        "running": f"{_UPRIGHT} Eyes open.",
+        "running": Message("{UPRIGHT} Eyes open.", UPRIGHT=_UPRIGHT),
     },
     "standing_eyes_closed": {
         "get_ready": "Stand still, arms at your sides. Someone is next to you. Close your eyes.",
         "ready": "Stand still.",
-        "running": f"{_UPRIGHT} Eyes closed.",
+        "running": Message("{UPRIGHT} Eyes closed.", UPRIGHT=_UPRIGHT),
     },
 }
 """What the person is told: protocol → phase → words."""

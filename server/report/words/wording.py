@@ -220,6 +220,8 @@ def speak_places(text: str) -> str:
     """
     if isinstance(text, Message):
         return text.map_words(speak_places)
+    if isinstance(text, Message):
+        return text.map_words(speak_places)
     return _SIDED.sub(lambda found: place_words(found[0]), text)
 
 
@@ -269,10 +271,16 @@ def symmetry_words(s: Symmetry) -> str:
     if s.ratio is None or s.index_pct is None or s.angle_pct is None:
         return "a side is too near zero for a ratio" if s.reason == "near_zero" else ""
     first, second = s.reference.split("/")
-    return (
-        f"{first} / {second} {format_number(s.ratio, 2)}, "
-        f"symmetry index {_signed(s.index_pct)} % (positive: {first} "
-        f"larger), symmetry angle {_signed(s.angle_pct)} % (negative: {first} larger)"
+    return Message(
+        "{first} / {second} {ratio}, symmetry index {index_pct} % (positive: {first2} larger), "
+        "symmetry angle {angle_pct} % (negative: {first3} larger)",
+        first=first,
+        second=second,
+        ratio=format_number(s.ratio, 2),
+        index_pct=_signed(s.index_pct),
+        first2=first,
+        angle_pct=_signed(s.angle_pct),
+        first3=first,
     )
 
 
