@@ -1,7 +1,8 @@
-"""Contacts of the feet as samples come, told in the push in which they are known.
+"""Streaming contact detection, reported in the push in which contacts become known.
 
-The rules of core/events/foot_contact.py; they need neither heading nor the other sensors. A contact is told
-at once, and again when its refined time is known; a foot-off again where its landing shows that it was none.
+The rules of core/events/foot_contact.py; they need neither heading nor the other sensors. A contact is
+reported at once, and again when its refined time is available; a foot-off again if its landing shows that it
+was none.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ REMEMBERED: Final = 4
 
 
 class KnownContact(NamedTuple):
-    """A contact and the sample, counted from the start of the chain, at which it is told.
+    """A contact and the sample, relative to the start of the chain, at which it is reported.
 
-    Not `final`: its refined time is still to come. Then it is told again, its `first_s` the time it had. So
-    is a foot-off, though final, that the contact after it shows to have been the landing.
+    If not `final`, its refined time is still to come; it is then reported again, with the earlier time in
+    `first_s`. So is a foot-off, even if final, that the following contact shows to have been the landing.
     """
 
     at: int
@@ -34,7 +35,7 @@ class KnownContact(NamedTuple):
 
 
 class ContactDetector:
-    """Initial and terminal contacts of the feet that carry a sensor.
+    """Initial and terminal contacts of the feet with a sensor.
 
     Raises
     ------
@@ -62,12 +63,12 @@ class ContactDetector:
     def push(
         self, q: Floats, valid: Bools, motions: Sequence[FootMovement], first: int
     ) -> list[KnownContact]:
-        """Contacts that these samples make known, in the order in which they become known.
+        """Contacts that become known with these samples, in the order of detection.
 
         Parameters
         ----------
-        q : (T, feet, 4) foot to W. valid : (T, feet). motions : of each foot over the same samples.
-        first : the chain's first sample on the axis.
+        q : (T, feet, 4) foot to W. valid : (T, feet). motions : of each foot over the same samples. first :
+            first sample of the chain on the axis.
         """
         found = []
         for i, (side, foot) in enumerate(zip(self.sides, self._feet, strict=True)):

@@ -1,9 +1,10 @@
-"""Sagittal's own recording file: Parquet with one column per channel
-(docs/reference/formats.md, "Sagittal recording (Parquet)").
+"""Sagittal's own recording file: Parquet with one column per channel (docs/reference/formats.md, "Sagittal
+recording (Parquet)").
 
-int64 time in µs, float32 signals, zstd with byte-stream split, page checksums and no dictionary; what is not
-a signal (units, sensor → segment, subject, protocol, hashes of the originals) is JSON in the schema metadata.
-Rows are the union of the times of all streams; a row that a stream does not have is null, a missing one NaN.
+int64 time in µs, float32 signals, zstd with byte-stream split, page checksums and no dictionary; everything
+except the signals (units, sensor → segment, subject, protocol, hashes of the originals) is JSON in the schema
+metadata. Rows are the union of the times of all streams; a row that a stream does not have is null, a missing
+one NaN.
 """
 
 from __future__ import annotations
@@ -133,17 +134,16 @@ def _read_notice(n: Mapping[str, Any]) -> Notice:
 
 
 def looks_like(data: bytes) -> bool:
-    """Tell Parquet by its magic at both ends."""
+    """Whether the data have Parquet's magic at both ends."""
     return data[:4] == MAGIC
 
 
 def read_recording(data: bytes, source: str) -> Recording:
-    """Read what `write_recording` wrote.
+    """Read a file written by `write_recording`.
 
     Raises
     ------
-    FormatError
-        bad_parquet (damaged or too large), foreign_parquet (not written by Sagittal), newer_schema.
+    FormatError bad_parquet (damaged or too large), foreign_parquet (not written by Sagittal), newer_schema.
     """
     try:
         file = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=True, pre_buffer=False)
@@ -160,7 +160,7 @@ def read_recording(data: bytes, source: str) -> Recording:
 
 
 def count_rows_and_sensors(file: SourceFile) -> tuple[int, int]:
-    """Rows and sensors of a Parquet file; 0 where it is damaged."""
+    """Number of rows and sensors of a Parquet file; 0 if damaged."""
     try:
         with file.open() as opened:
             opened_file = pq.ParquetFile(opened)
@@ -171,7 +171,7 @@ def count_rows_and_sensors(file: SourceFile) -> tuple[int, int]:
 
 
 def open_long(file: SourceFile) -> Recording:
-    """A stored recording that is too long to hold: its sensors are read block by block.
+    """Open a stored recording too long for memory: its sensors are read block by block.
 
     Raises
     ------
@@ -214,7 +214,7 @@ def open_long(file: SourceFile) -> Recording:
 
 
 def _find_ends(reader: pq.ParquetFile, group: int) -> tuple[int, int]:
-    """First and last time of a group of rows, µs."""
+    """First and last time of a row group, µs."""
     ends: list[int] = []
     for batch in reader.iter_batches(LONG_BLOCK, row_groups=[group], columns=[_TIME], use_threads=False):
         if batch.num_rows:
@@ -223,7 +223,7 @@ def _find_ends(reader: pq.ParquetFile, group: int) -> tuple[int, int]:
 
 
 def _read_blocks(file: SourceFile, device: str, has_gyro: bool, first_us: int) -> Iterator[SampleBlock]:
-    """Rows of one sensor from the first one."""
+    """Iterate over the rows of one sensor from the first one."""
     kinds = ("acc", "gyr") if has_gyro else ("acc",)
     names = [f"{device}.{name}" for kind in kinds for name in _AXES[kind]]
     with file.open() as opened:
@@ -323,9 +323,9 @@ def _read_signals(
     there: frozenset[str],
     rooms: Mapping[str, Iterator[NDArray[np.float32]]],
 ) -> tuple[dict[str, Any], NDArray[np.int64] | slice]:
-    """Signals (n, axes) of a sensor as float32, None where the file has none, and which rows it has.
+    """Signals (n, axes) of a sensor as float32, None if not in the file, and the rows it has.
 
-    One signal after the other: beside all of them a whole table would be as much once more.
+    One signal at a time: reading the whole table would double the memory.
     """
     signals: dict[str, Any] = dict.fromkeys(_AXES)
     rows: NDArray[np.int64] | slice = slice(None)
@@ -350,10 +350,10 @@ def _read_signals(
 
 
 def _make_rooms(sensors: int, rows: int, axes: int) -> Iterator[NDArray[np.float32]]:
-    """Arrays (rows, axes) to be written, one per sensor, several in one piece of memory where they are small.
+    """Arrays (rows, axes) to be filled, one per sensor, small ones allocated together.
 
-    Memory that was never touched costs more than what is done with it, and a large piece of it, for which
-    NumPy asks for large pages, a fifth of many small ones.
+    First access to fresh memory costs more than the processing, and in one large allocation, for which NumPy
+    requests huge pages, a fifth of many small ones.
     """
     together = max(1, -(-LARGE // max(1, rows * axes * 4)))
     while sensors > 0:
@@ -363,7 +363,7 @@ def _make_rooms(sensors: int, rows: int, axes: int) -> Iterator[NDArray[np.float
 
 
 def _clear_infinite(device: str, signals: Mapping[str, Floats | None]) -> list[Notice]:
-    """Make infinite values missing ones, in place; a notice where there were any."""
+    """Replace infinite values by missing ones, in place; returns a notice if there were any."""
     count = 0
     for kind in ("acc", "gyr", "mag"):
         signal = signals[kind]

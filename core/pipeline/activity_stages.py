@@ -1,4 +1,4 @@
-"""The stages of a recording of daily life: one sensor of the trunk, read block by block."""
+"""Stages of a daily-life recording: one trunk sensor, read block by block."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ best [our choice]."""
 
 
 def find_trunk_stream(recording: Recording) -> tuple[Segment, LongStream]:
-    """The sensor of daily life; a single sensor that nobody assigned is taken to be on the chest.
+    """The sensor of a daily-life recording; a single unassigned sensor is assumed to be on the chest.
 
     Raises
     ------
@@ -46,14 +46,14 @@ def find_trunk_stream(recording: Recording) -> tuple[Segment, LongStream]:
 
 
 def watch_activity(analysis: TakeAnalysis, config: PipelineConfig, tell: Progress) -> TakeAnalysis:
-    """What the person did from hour to hour; `tell` hears how far it is."""
+    """Daily-life activities; `tell` reports progress."""
     segment, stream = find_trunk_stream(analysis.source)
     found = monitor_activity(stream, segment, analysis.source.subject.height_m, config.activity, tell)
     return replace(analysis, activity=found)
 
 
 def judge_activity(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """How much of the recording says something; an error of its signals has stopped it before."""
+    """Quality from the fraction of the recording with known posture; signal errors have stopped it before."""
     found = analysis.activity
     if found is None:
         level: Level = "poor"
@@ -67,7 +67,7 @@ def judge_activity(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
 
 
 def share_known(found: ActivityResult) -> float:
-    """Share of the worn time in which the posture is known, 0 to 1."""
+    """Fraction of the wear time with known posture, 0 to 1."""
     worn = sum(s.duration_s for s in found.spans if s.kind not in ("non_wear", "gap"))
     known = sum(s.duration_s for s in found.spans if s.kind not in ("non_wear", "gap", "unknown"))
     return known / worn if worn > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""The stages of squats, of one leg or of both (docs/science/squat.md)."""
+"""Stages of single-leg squats, of one leg or of both (docs/science/squat.md)."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ NO_HEIGHT: Final = Notice(
 
 
 def calibrate_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Mountings by the fixed offset or from the table, biases and zero from standing."""
+    """Alignment by the fixed offset or from the table, biases and zero from standing."""
     working = drop_stuck_sensors(analysis.recording)
     sides, rest = find_squat_sides(working), config.calibration.rest
     if config.squat.mounting == "table_top":
@@ -70,7 +70,7 @@ def calibrate_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
 
 
 def estimate_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Orientations of the legs, each from its foot that stands still, and the figure."""
+    """Orientations of the legs, each from its supporting foot up, and the poses."""
     calibrated = require_stage(analysis.calibrated, "calibration")
     height, stands = analysis.recording.subject.height_m, find_standing_legs(calibrated)
     legs = {
@@ -83,7 +83,7 @@ def estimate_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
 
 
 def compute_squat_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Joint angles of each leg by its own chain, from standing; a leg without sensors is not asked for."""
+    """Joint angles of each leg by its own chain, relative to standing; only for legs with sensors."""
     legs, posed = require_stage(analysis.legs, "poses"), require_stage(analysis.posed, "poses")
     zero = require_stage(analysis.calibrated, "calibration").calibration.zero
     standing = analysis.recording.subject.standing_angles_deg
@@ -103,7 +103,7 @@ def compute_squat_angles(analysis: TakeAnalysis, config: PipelineConfig) -> Take
 
 
 def measure_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Repetitions of each leg, depth, times, how the knee falls inward."""
+    """Repetitions of each leg with depth, times and knee valgus."""
     legs, angles = require_stage(analysis.legs, "poses"), require_stage(analysis.angles, "angles")
     recording = drop_stuck_sensors(analysis.recording)
     squats = tuple(

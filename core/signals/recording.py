@@ -1,7 +1,8 @@
-"""What was recorded: frozen objects, checked once at construction, SI units.
+"""Recordings: frozen objects, validated at construction, SI units.
 
-`Recording` is what the files say (each sensor on its own clock); `UniformRecording` is the same take on
-one time axis with a validity mask per sensor (made by core/timeline). All later stages work on the latter.
+`Recording` is the content of the files (each sensor on its own clock); `UniformRecording` is the same
+recording on one time axis with a validity mask per sensor (made by core/timeline). All later stages use the
+latter.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from sagittal.core.subject.standing_angles import check_standing
 
 
 def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], where: str) -> None:
-    """Check shape and type of an array once and lock it against writing."""
+    """Check shape and type of an array once and make it read-only."""
     if a is None:
         return
     if a.ndim != len(shape) or any(
@@ -38,7 +39,7 @@ BELT_MPS: Final = (0.05, 5.0)
 
 
 def check_belt(belt_speed_mps: float | None, protocol: Protocol) -> None:
-    """Refuse a belt speed that no treadmill has, or one without a treadmill.
+    """Reject an implausible belt speed, or one without a treadmill.
 
     Raises
     ------
@@ -62,15 +63,15 @@ def check_belt(belt_speed_mps: float | None, protocol: Protocol) -> None:
 
 @dataclass(frozen=True)
 class Subject:
-    """Who was measured; None where nobody said.
+    """The person measured; None for items not given.
 
     Parameters
     ----------
     height_m : body height, 0.5 to 2.5 m.
-    standing_width_m : between the middles of the ankles while standing at the beginning, 0 to 0.8 m.
-    standing_angles_deg : joint angles in that standing by goniometer, names as
+    standing_width_m : distance between the ankle centres in initial standing, 0 to 0.8 m.
+        standing_angles_deg : goniometer joint angles in that posture, names as
         `sagittal.core.subject.standing_angles.NAMES`.
-    shoe : the shape of its sole. measures : lengths of the body by tape.
+    shoe : the shape of its sole. measures : tape-measured body lengths.
     """
 
     height_m: float | None = None
@@ -95,7 +96,7 @@ class Subject:
         object.__setattr__(self, "standing_angles_deg", MappingProxyType(dict(self.standing_angles_deg)))
 
     def complete_from(self, other: Subject) -> Subject:
-        """What is known here, and from `other` what is not."""
+        """This subject, with missing items taken from `other`."""
         height, width = self.height_m, self.standing_width_m
         return Subject(
             other.height_m if height is None else height,
@@ -119,20 +120,20 @@ class Subject:
 @hold_samples("acc", "gyr", "mag", "quat")
 @dataclass(frozen=True, eq=False)
 class ImuStream(HoldsSamples):
-    """One sensor as its file gives it, in SI units, on its own clock; missing samples are NaN rows.
+    """One sensor as given in its file, in SI units, on its own clock; missing samples are NaN rows.
 
     Parameters
     ----------
     device_id : serial number or column label, unique in a recording.
-    source : name of the file it came from.
+    source : name of its file.
     t_s : (n,) seconds, strictly increasing. From a packet counter (unwrapped) or the device clock.
         Streams of one recording that share `clock` share the origin of `t_s`.
     acc : (n, 3) specific force, m/s². gyr : (n, 3) rad/s or None. mag : (n, 3) any unit or None.
-    quat : (n, 4) vendor orientation, scalar first, kept for comparison only, or None.
+    quat : (n, 4) vendor orientation, scalar first, for comparison only, or None.
     rate_hz : nominal sampling rate.
-    clock : what `t_s` was made from: "counter" (shared packet counter), "device" (own clock), "index".
-    digest : made of the signal values, to find the same stream under two ids.
-    notices : what the reader had to decide or could not read.
+    clock : source of `t_s`: "counter" (shared packet counter), "device" (own clock), "index".
+    digest : of the signal values, to detect the same stream under two ids. notices : assumptions and problems
+        of the reader.
     """
 
     device_id: str
@@ -167,11 +168,11 @@ class ImuStream(HoldsSamples):
 
 @dataclass(frozen=True)
 class GivenLimits:
-    """When a person says that a functional test began and ended, s; None = as it is found.
+    """Manually given start and end of a functional test, s; None = as detected.
 
     Raises
     ------
-    ParameterError `test_limits` where a time is below 0 or the end is not after the start.
+    ParameterError `test_limits` if a time is below 0 or the end is not after the start.
     """
 
     start_s: float | None = None
@@ -192,7 +193,7 @@ BLOCK_ROWS: Final = 1 << 16
 
 
 def as_long_stream(stream: ImuStream, rows: int = BLOCK_ROWS) -> LongStream:
-    """A stream that is in memory, read in blocks of so many rows."""
+    """A stream in memory, read in blocks of this many rows."""
 
     def open_blocks() -> Iterator[SampleBlock]:
         for i in range(0, len(stream.t_s), rows):
@@ -213,17 +214,17 @@ def as_long_stream(stream: ImuStream, rows: int = BLOCK_ROWS) -> LongStream:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One take: streams by device id and which segment each is worn on.
+    """One recording: streams by device id, and the segment of each.
 
     Parameters
     ----------
     streams : device id → stream.
     segments : device id → segment, None = not used. Ids without an entry are unassigned (see `unassigned`).
-    mounting : segment → declared mounting, free text ("sacrum, face backwards").
+    mounting : segment → declared placement, free text ("sacrum, face backwards").
     sha256 : file name → sha256 of the source bytes.
     belt_speed_mps : of a treadmill, None = not entered.
-    test_limits : of a functional test, as a person corrected them.
-    long : device id → sensor that is read block by block; such a sensor need not be among the streams.
+    test_limits : of a functional test, corrected manually.
+    long : device id → sensor read block by block, which may be missing among the streams.
     """
 
     streams: Mapping[str, ImuStream]
@@ -265,7 +266,7 @@ class Recording:
 
     @property
     def unassigned(self) -> tuple[str, ...]:
-        """Device ids that nobody has mapped or set aside."""
+        """Device ids neither assigned to a segment nor excluded."""
         return tuple(d for d in dict.fromkeys((*self.streams, *self.long)) if d not in self.segments)
 
 
@@ -307,7 +308,7 @@ class SensorSignals(HoldsSamples):
 
 @dataclass(frozen=True, eq=False)
 class UniformRecording:
-    """A take on one uniform time axis, by segment.
+    """A recording on one uniform time axis, by segment.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """The sensors of a file on one uniform axis.
 
-Every sensor is laid on the axis of the take by its own times: samples that fall on it are copied bit for bit,
-others are interpolated linearly. Holes of up to 0.1 s are interpolated and flagged, longer ones are invalid
-and hold the last value (docs/science/timeline.md, "Rule").
+Every sensor is resampled to the axis of the recording by its own times: samples that coincide with it are
+copied bit for bit, others are interpolated linearly. Gaps of up to 0.1 s are interpolated and flagged, longer
+ones are invalid and hold the last value (docs/science/timeline.md, "Rule").
 """
 
 from __future__ import annotations
@@ -20,16 +20,15 @@ from sagittal.core.timeline.params import TimelineParams
 
 
 def synchronise(recording: Recording, params: TimelineParams | None = None) -> UniformRecording:
-    """Lay all sensors that are worn on a segment on one uniform axis.
+    """Resample all sensors mapped to a segment onto one uniform axis.
 
-    The axis starts with the latest and ends with the earliest of the sensors that last, at the highest rate
+    The axis starts with the latest and ends with the earliest of the full-length sensors, at the highest rate
     among them; time 0 is its first sample.
 
     Raises
     ------
-    SignalError
-        recording_too_long, no_mapping, missing_gyro (no usable sensor), duplicate_stream, no_common_clock,
-        sample_rate_too_low, no_overlap, too_short, clock_jump.
+    SignalError recording_too_long, no_mapping, missing_gyro (no usable sensor), duplicate_stream,
+        no_common_clock, sample_rate_too_low, no_overlap, too_short, clock_jump.
     """
     params = params or TimelineParams()
     worn = _find_worn(recording)
@@ -63,7 +62,7 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
 
 
 def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
-    """The sensors that are worn on a segment."""
+    """The sensors mapped to a segment."""
     worn = {
         s: recording.streams[d]
         for d, s in recording.segments.items()
@@ -87,7 +86,7 @@ def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
 
 
 def _find_usable(worn: Mapping[Segment, ImuStream]) -> dict[Segment, ImuStream]:
-    """Those with a gyroscope."""
+    """The sensors with a gyroscope."""
     usable = {segment: s for segment, s in worn.items() if s.held("gyr") is not None}
     if not usable:
         raise SignalError(
@@ -99,7 +98,7 @@ def _find_usable(worn: Mapping[Segment, ImuStream]) -> dict[Segment, ImuStream]:
 
 
 def _refuse_copies(worn: dict[Segment, ImuStream]) -> None:
-    """Two segments cannot have moved identically: one of the files is a copy under another id."""
+    """Reject identical signals on two segments: one of the files is a copy under another id."""
     seen: dict[str, Segment] = {}
     for segment, s in worn.items():
         first = seen.setdefault(s.digest, segment)
@@ -126,7 +125,7 @@ def _check_clocks(usable: dict[Segment, ImuStream]) -> None:
 
 
 def _common_rate(usable: dict[Segment, ImuStream], params: TimelineParams) -> tuple[float, list[Notice]]:
-    """Highest rate among the sensors: nothing is thrown away and nothing can alias."""
+    """Highest rate among the sensors: no samples are discarded and no aliasing occurs."""
     rates = {segment: s.rate_hz for segment, s in usable.items()}
     rate = max(rates.values())
     slowest = min(usable.values(), key=lambda s: s.rate_hz)
@@ -199,7 +198,7 @@ def _common_range(
 def _lay_sensor(
     s: ImuStream, start_s: float, samples: int, rate: float, params: TimelineParams
 ) -> SensorSignals:
-    """One sensor on the axis of so many samples."""
+    """One sensor resampled onto an axis of this many samples."""
     good = is_complete(s.held("acc")) & is_complete(s.held("gyr"))
     if not good.any():
         raise SignalError(
@@ -228,9 +227,9 @@ def _lay_sensor(
 
 
 def _hold_once(laid: Floats, own: Floats) -> Floats:
-    """The stream's own memory from the first point on, where every point is a sample of it.
+    """The stream's own memory from the first point on, if every point is one of its samples.
 
-    Not where its rows do not lie one after the other: sums over them would round otherwise.
+    Not for non-contiguous rows, over which sums would round differently.
     """
     own = own[: len(laid)]
     return own if own.flags.c_contiguous and np.array_equal(laid, own) else laid
@@ -239,9 +238,9 @@ def _hold_once(laid: Floats, own: Floats) -> Floats:
 def _lies_on_axis(
     t_s: Floats, good: Bools, first: int, start_s: float, samples: int, rate: float, params: TimelineParams
 ) -> bool:
-    """Whether every point of the axis has one good sample on it, that of row `first` the first, and so on.
+    """Whether every point of the axis coincides with one good sample, starting with row `first`.
 
-    Told in the words of `lay_points`, so that rounding decides alike.
+    Expressed as in `lay_points`, so that rounding gives the same decision.
     """
     past, slack = first + samples, params.on_grid / rate
     if past > len(t_s) or not good[first:past].all():
@@ -254,7 +253,7 @@ def _lies_on_axis(
 def _lay_magnetometer(
     s: ImuStream, start_s: float, samples: int, rate: float, params: TimelineParams
 ) -> Floats | None:
-    """The magnetometer has its own holes and never makes a sample invalid; None when mostly missing."""
+    """The magnetometer has its own gaps and never makes a sample invalid; None if mostly missing."""
     mag = s.held("mag")
     if mag is None:
         return None

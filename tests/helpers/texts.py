@@ -87,6 +87,7 @@ WORDS: Final = frozenset(
     re.findall(
         r"\S+",
         """
+    reduced increased shortened prolonged
     above acceleration active admin affected after ago anatomical and ankle assessment assessments
     assistant away back bad bar barefoot bars baseline before below both bouts cane centimetres changed
     chest children clinician complementary consistent copies copy crutch days degrees directions down

@@ -1,7 +1,8 @@
-"""What parameters are known to, beside the spread of their strides (docs/science/uncertainty.md).
+"""Measurement uncertainty of parameters, in addition to the spread of their strides
+(docs/science/uncertainty.md).
 
-Declared here once, by kind of figure, and named by every entry of the catalogue that has one. All figures are
-standard uncertainties in the unit of the parameter, with where they were measured.
+Declared here once, by kind of value, and referenced by the entries of the catalogue. All values are standard
+uncertainties in the unit of the parameter, with the data they were measured on.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Final
 
 @dataclass(frozen=True)
 class ContactWeights:
-    """How the contacts of a stride enter a time: its derivative by each.
+    """Weights of the contacts of a stride in a time: its derivative with respect to each.
 
     Parameters
     ----------
@@ -30,14 +31,13 @@ class ContactWeights:
 
 @dataclass(frozen=True)
 class MeasurementErrors:
-    """What the value of a parameter is known to.
+    """Measurement uncertainty of a parameter.
 
     Parameters
     ----------
-    source : what enters, in words for people.
-    contacts : None where no contact's moment enters.
-    common : error that both sides and every take share: definitions, the body's model.
-    own : error of one side in one take, the same in all of its strides: mounting, calibration, path.
+    source : contributions, in words for users. contacts : None if independent of contact times.
+    common : error common to both sides and all recordings: definitions, body model.
+    own : error of one side in one recording, the same in all of its strides: alignment, calibration, path.
     random : error of a single stride.
     """
 
@@ -91,7 +91,7 @@ def _angle(source: str, common: float, own: float) -> MeasurementErrors:
 
 
 def _range(of: MeasurementErrors) -> MeasurementErrors:
-    """A range is a level less another one; their errors need not be alike."""
+    """Uncertainty of a range, the difference of two levels with possibly different errors."""
     return MeasurementErrors(of.source, None, sqrt(2.0) * of.common, sqrt(2.0) * of.own, of.random)
 
 

@@ -20,7 +20,16 @@ from sagittal.core.parameters.flats import OTHER
 from sagittal.core.plurals import plural
 from sagittal.server.report.view.level import from_standing
 from sagittal.server.report.words.change_words import change_words, find_term
-from sagittal.server.report.words.headline_phrases import BOTH_STEPS, PHRASES, Family
+from sagittal.server.report.words.headline_phrases import (
+    BOTH_LONGER,
+    BOTH_SHORTER,
+    CHANGED_DOWN,
+    CHANGED_UP,
+    PHRASES,
+    TRIAL_CHANGED_DOWN,
+    TRIAL_CHANGED_UP,
+    Family,
+)
 from sagittal.server.report.words.wording import format_number, parameter_term
 
 Kind = Literal["norm", "limit", "sides", "change"]
@@ -211,20 +220,19 @@ def _of_change(group: Sequence[tuple[Change, float]]) -> Iterator[HeadlineSenten
     sides = {c.side: c.difference or 0.0 for c, _ in group}
     if worst.name == "step_length_m" and set(sides) == set(SIDES) and sides["left"] * sides["right"] > 0.0:
         digits = parameter_term(worst.name).digits
-        words = {
-            "word": "longer" if change > 0 else "shorter",
-            "l": format_number(abs(sides["left"]), digits),
-            "r": format_number(abs(sides["right"]), digits),
-        }
-        yield make_sentence(worst.name, p.family, "change", size, BOTH_STEPS, words, None)
+        lengths = {side[0]: format_number(abs(sides[side]), digits) for side in SIDES}
+        both = BOTH_LONGER if change > 0 else BOTH_SHORTER
+        yield make_sentence(worst.name, p.family, "change", size, both, lengths, None)
         return
-    pattern = p.up if change > 0 else p.down
-    if pattern:
-        words = {
-            "d": format_number(abs(change), choose_digits(worst.name)),
-            "cm": format_number(100.0 * abs(change), 0),
-        }
-        yield make_sentence(worst.name, p.family, "change", size, pattern, words, worst.side)
+    words = {
+        "noun": p.noun,
+        "d": format_amount(worst.name, abs(change)),
+        "before": format_amount(worst.name, p.sign * (worst.before or 0.0)),
+        "after": format_amount(worst.name, p.sign * (worst.after or 0.0)),
+    }
+    patterns = (TRIAL_CHANGED_DOWN, TRIAL_CHANGED_UP) if worst.side is None else (CHANGED_DOWN, CHANGED_UP)
+    pattern = patterns[p.sign * change > 0.0]
+    yield make_sentence(worst.name, p.family, "change", size, pattern, words, worst.side)
 
 
 def make_sentence(
@@ -248,3 +256,17 @@ def choose_digits(name: str) -> int:
     """Decimals: none for degrees and steps/min, one for percentages, two for metres and seconds."""
     term = parameter_term(name)
     return {"°": 0, "steps/min": 0, "%": 1}.get(term.unit, 2)
+
+
+def format_amount(name: str, value: float, *, unit: bool = True) -> str:
+    """Format a value with its unit as findings print it; circumduction is in centimetres.
+
+    >>> format_amount("knee_flexion_rom_deg", -3.6), format_amount("circumduction_m", 0.124)
+    ('−4°', '12\u202fcm')
+    """
+    printed = parameter_term(from_standing(name) or name).unit
+    if name == "circumduction_m":
+        text, printed = format_number(100.0 * value, 0), "cm"
+    else:
+        text = format_number(value, choose_digits(from_standing(name) or name))
+    return text if not unit else f"{text}°" if printed == "°" else f"{text}\u202f{printed}"
