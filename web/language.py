@@ -22,7 +22,7 @@ from babel.messages.pofile import read_po
 from babel.numbers import format_decimal
 
 LANGUAGES: Final[Mapping[str, str]] = {"en": "English", "de": "Deutsch"}
-"""Code of a language → its own name; the first is that of the sources."""
+"""Language code → its own name; the first is that of the sources."""
 
 SOURCE: Final = next(iter(LANGUAGES))
 
@@ -31,27 +31,27 @@ MONTHS: Final = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", 
 PLACEHOLDER: Final = re.compile(r"\{(\w*)\}")
 
 QUOTED: Final = re.compile(r"“((?:[^“”]|“[^“”]*”)*)”")
-"""A quotation: nothing in it is translated, unless a message itself has these words in quotation marks."""
+"""Quotations are not translated unless a message contains them."""
 
 QUOTATION_MARKS: Final[Mapping[str, str]] = {"de": "„{}“"}
 
 IDENTIFIERS: Final = re.compile(r"(by|column|device|device_id|duplicate_of|file|file_name|ids)\d*")
-"""Placeholders of messages that hold what a person typed or uploaded, quoted or not."""
+"""Placeholders of messages for user text, quoted or not."""
 
 OWN_WORDS: Final = frozenset({"kind", "label", "protocol"})
-"""Placeholders that hold words of the product even in quotation marks."""
+"""Placeholders for words of the product, even in quotation marks."""
 
 LONGEST: Final = 500
-"""Characters up to which a text is looked for as a whole; a longer one by its sentences."""
+"""Maximum length of texts matched as a whole; longer ones are matched by sentence."""
 
 MOST_PARTS: Final = 12
 
 FIRST_MASK: Final = 0xE000
 MOST_MASKS: Final = 1000
-"""Signs of the private use area that stand for quotations and values while a sentence is translated."""
+"""Private-use characters that represent quotations and values during translation."""
 
 STRONG: Final = 12
-"""Letters of its own from which on a message is not mistaken for another."""
+"""Minimum number of literal letters for an unambiguous message."""
 
 _DECIMAL: Final = re.compile(r"(?<![\w.,])(?<!BY )(\d+)\.(\d+)(?![\d.])")
 _DATE: Final = re.compile(rf"\b(\d{{1,2}}) ({'|'.join(MONTHS)})(?: (\d{{4}}))?\b")
@@ -65,12 +65,12 @@ _NUMBERED: Final = re.compile(
 """A word with its number."""
 _SENTENCE: Final = re.compile(r"(?<=[.!?…])(?<!et al\.)\s+(?=[A-Z0-9“])")
 _JOINS: Final = ("; ", " · ", " → ", " | ", ": ", ", ", " – ", " and ")
-"""What pages put between parts that are messages of their own, the strongest first."""
+"""Separators that pages put between messages, the strongest first."""
 
 CITED: Final = re.compile(
     r"\b(19|20)\d\d\b.*(:|\d\(\d|Proc\.|Conf|Sens|IEEE)|^[A-Z][a-z]+(Martin)?(19|20)\d\d|et al\. (19|20)\d\d$"
 )
-"""References to papers stay as they are written."""
+"""References to papers are not translated."""
 
 
 def choose_language(accepted: str | None) -> str:
@@ -109,7 +109,7 @@ class Catalogue:
         self._patterns = [
             _Pattern(text, translation) for text, translation in messages.items() if PLACEHOLDER.search(text)
         ]
-        # of two that fit, the one with more words of its own
+        # of two matches, the one with more literal words
         self._patterns.sort(key=lambda p: -p.literal)
         self._own_quotations = {quoted for text in messages for quoted in QUOTED.findall(text)}
         self._known = functools.lru_cache(maxsize=20_000)(self._find)
@@ -201,7 +201,7 @@ class Catalogue:
         if match and match[3] in self.messages:
             return f"{self._localise(match[1])}{match[2]}{self.messages[match[3]]}"
         if not re.search(r"[a-zäöüß]", re.sub(r"(?<![^\W\d_])[^\W\d_](?![^\W\d_])", "", text)):
-            # numbers, single letters, names of capitals
+            # numbers, single letters, names in capitals
             translation = self._by_pattern(text, strong=False) if re.search(r"[^\W\d_]", text) else None
             return self._localise(text) if translation is None else translation
         return None
@@ -245,7 +245,7 @@ class Catalogue:
                 mask = chr(FIRST_MASK + MOST_MASKS + n)
                 replacements[name], settled[mask] = mask, translation
             else:
-                # a number may stand in two placeholders side by side
+                # two adjacent placeholders may share a number
                 replacements[name] = value if translation is None else translation
         filled = self._localise(fill_placeholders(pattern.said, replacements))
         return re.sub("|".join(settled) or "(?!)", lambda match: settled[match[0]], filled)
@@ -274,7 +274,7 @@ class Catalogue:
     def _join(self, first: str, join: str, second: str) -> str | None:
         if not first or not second:
             return None
-        # "; and so on" may be a message with what joins it
+        # "; and so on" may be a message including its separator
         tail = self.messages.get(f"{join}{second}".strip()) or self._by_pattern(
             f"{join}{second}".strip(), strong=True
         )
@@ -352,10 +352,10 @@ class _Pattern:
         self.is_strong = len(re.findall(r"[^\W\d_]", "".join(literals))) >= STRONG
         self._stops = not literals[-1] or literals[-1].endswith(".")
         if not literals[-1] and literals[-2] and not literals[-2].rstrip().endswith((".", ":")):
-            self._stops = False  # what stands last is no sentence
+            self._stops = False  # the last literal is not a sentence
         self._longest = max(literals, key=len).casefold()
         first, *literals_rest = map(re.escape, literals)
-        # of two values without a word between, the one before is a number and the other its unit
+        # of two values without a word in between, the first is a number and the second its unit
         forms = [
             first
             + "".join(
@@ -436,7 +436,7 @@ SCRIPT_PLACES: Final = (
     "server/pages/words.py",
     "tests/helpers/texts.py",
 )
-"""Where the messages come from that scripts say, or are sent to say."""
+"""Sources of messages that are used in scripts."""
 
 
 @functools.cache
@@ -459,7 +459,7 @@ def load_catalogue(language: str) -> Catalogue:
         {
             text: translation
             for text, translation, files in read_messages(catalogue_path(language))
-            # the sentences of scripts are made in the browser
+            # sentences of scripts are formatted in the browser
             if not (PLACEHOLDER.search(text) and all(name.startswith(SCRIPTS) for name in files))
         },
     )

@@ -51,7 +51,7 @@ CALIBRATIONS: Final = (
         "Who cannot stand still just walks. The walk itself calibrates; angles then have no level.",
     ),
 )
-"""Ways to calibrate: name of the drawing, title, what to do. The analysis finds by itself which was done."""
+"""Calibration methods: name of the drawing, title, instruction. The analysis detects which was used."""
 
 TEST_PROTOCOLS: Final = (
     (

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 RESULT: Final = "tuning.json"
 TRIAL: Final = ".npz"
 BEHIND: Final = 10
-"""Added to the niceness of each thread that searches (a thread's own on Linux)."""
+"""Increment of the nice value of each search thread (per thread on Linux)."""
 SWARM: Final = ("particles", "iterations", "rounds", "random_rounds")
 
 

@@ -31,7 +31,7 @@ STATE_WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "next": ("run", "Next"),
     "planned": ("none", "Planned"),
 }
-"""State of a planned visit → shape and word."""
+"""State of a planned visit → symbol and word."""
 
 
 @router.get("/patients/{pid}/programme")
@@ -85,7 +85,7 @@ def _week(programme: Programme, week: int, *, now: bool) -> dict[str, Any]:
     text = f"{done} of {len(trainings)} {plural(len(trainings), 'training', 'trainings')} done"
     if missing:
         text += f", {missing} missing"
-    # the course counts weeks without a week 0: the one before the first training is −1
+    # week numbers have no 0: the one before the first training is −1
     return {
         "name": "now" if now else f"wk {format_number(week if week > 0 else week - 1)}",
         "now": now,

@@ -53,7 +53,7 @@ BASIS_WORDS: Final = {
 }
 
 KINDS: Final = {"error": "bad", "warning": "warn", "info": ""}
-"""Severity of a notice → its look."""
+"""Severity of a notice → style."""
 
 GONIOMETER: Final = (
     ("pelvis_tilt", "Pelvic tilt forward"),
@@ -64,7 +64,7 @@ GONIOMETER: Final = (
     ("ankle_dorsiflexion_l", "Dorsiflexion, left"),
     ("ankle_dorsiflexion_r", "Dorsiflexion, right"),
 )
-"""Standing angles that the page asks for; the manifest takes all of `core.subject.standing_angles`."""
+"""Standing angles requested on the page; the manifest accepts all of `core.subject.standing_angles`."""
 
 TAPE: Final = (
     ("leg_m", "Leg", "Front upper iliac spine to inner ankle, standing."),
@@ -75,7 +75,7 @@ TAPE: Final = (
     ("pelvis_width_m", "Pelvis, width", "Between the front upper iliac spines."),
     ("pelvis_depth_m", "Pelvis, depth", "Their middle to that of the back ones; used with the width."),
 )
-"""Lengths of `subject.measures` that the page asks for, and how they are taken."""
+"""Lengths of `subject.measures` requested on the page, with instructions."""
 
 LENGTHS: Final = tuple((name, label, *LIMITS[name], how) for name, label, how in TAPE)
 

@@ -42,7 +42,7 @@ KINDS: Final[tuple[tuple[Kind, str, bool], ...]] = (
     ("off", "of these while off, paused or stale", True),
     ("stopped", "of these after the end", True),
 )
-"""Kind of stride, its words, and whether it is a part of the one above."""
+"""Kind of stride, its label, and whether it is part of the row above."""
 
 _HOW_TO_READ: Final = (
     "Values are those of the finished analysis, the zone is that of the level at that stride. Only strides "

@@ -33,7 +33,7 @@ TOTALS: Final = (
     "walk_6min_distance_m",
     "sway_rms_mps2",
 )
-"""The figure that stands for a test, by what was measured."""
+"""Main parameter of a test, by what was measured."""
 
 require_entries(TOTALS, "sagittal.server.report.view.functional")
 
@@ -49,7 +49,7 @@ SEGMENTS: Final[Mapping[str, str]] = {
     "slowing_down": "Slowing down",
     "standing": "Quiet standing",
 }
-"""Name of a segment → its words; minutes count themselves."""
+"""Name of a phase → label; minutes are numbered automatically."""
 
 MEANT: Final[Mapping[str, str]] = {
     "tug_duration_s": "From the first lean forward to the end of sitting down.",
@@ -58,10 +58,10 @@ MEANT: Final[Mapping[str, str]] = {
     "walk_6min_distance_m": "By the strides of the feet, turns included.",
     "sway_rms_mps2": "Of the horizontal acceleration below 3.5 Hz; which way is forward is not known.",
 }
-"""How the total of a test is meant."""
+"""Explanation of the total of a test."""
 
 TEST_NORM_NOTE: Final = "The norm of a test, where there is one, stands below its segments."
-"""Below the table of a test's parameters."""
+"""Shown below the table of a test's parameters."""
 
 NO_NORM: Final = "No norm: none whose source gives figures for this test."
 NO_AGE: Final = "No norm: enter the year of birth."

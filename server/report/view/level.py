@@ -20,10 +20,10 @@ from sagittal.server.report.words.wording import title_of
 GROUP = "Angles from the anatomical zero"
 
 STANDING: Final = "from the person's own standing"
-"""Words of definitions that do not hold for an anatomical angle."""
+"""Parts of definitions that do not apply to anatomical angles."""
 
 ANATOMICAL: Final = "from the anatomical zero"
-"""Words in their place."""
+"""Their replacements."""
 
 _SUFFIX: Final = "_anatomical_deg"
 

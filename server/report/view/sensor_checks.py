@@ -87,7 +87,7 @@ def _place(s: Mapping[str, Any]) -> tuple[str, str]:
             f"Slipped {format_number(abs(s['slip_deg']))}° about {format_number(s['slip_at_s'])}\u202fs",
             "warn",
         )
-    # an older version did not say from when to when it could judge
+    # older versions did not store the period of the check
     if (duration_s := s.get("place_judged_s")) is None:
         return f"Place {NOT_JUDGED}", ""
     start, end = (format_number(x) for x in duration_s)

@@ -27,7 +27,7 @@ ADVICE: Final = {
     "gyro_noise": "Check strap and case. A trembling wearer does this too.",
     "acc_noise": "Check strap and case. A trembling wearer does this too.",
 }
-"""Quantity of a finding → what to do."""
+"""Quantity of a finding → remedy."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from sagittal.server.report.words.wording import format_number, place_words
 KINDS: Final[Mapping[str, str]] = {"good": "ok", "warn": "warn", "bad": "bad"}
 VERDICTS: Final[Mapping[str, str]] = {"good": "consistent", "warn": "doubtful in part", "bad": "inconsistent"}
 NOT_JUDGED: Final = "does not check itself"
-"""Of an estimator that has no quantity with a limit."""
+"""For an estimator without health limits."""
 
 REDUCED: Final[Mapping[str, str]] = {
     "sensor_failed": "reduced: a sensor failed in this take",
@@ -55,7 +55,7 @@ QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
 """Name of a finding → label, decimals, unit."""
 
 HIDDEN: Final = ("min_eigenvalue",)
-"""For those who check numbers: in analysis.json, not on the page."""
+"""Measures for verification: in analysis.json, not on the page."""
 
 
 @dataclass(frozen=True)

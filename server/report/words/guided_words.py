@@ -13,7 +13,7 @@ TOTAL: Final[Mapping[str, str]] = {
     "standing_eyes_open": "sway_rms_mps2",
     "standing_eyes_closed": "sway_rms_mps2",
 }
-"""Guided protocol → the figure that stands for it."""
+"""Guided protocol → main parameter."""
 
 _UPRIGHT: Final = "The time has begun. Keep standing still."
 
@@ -49,7 +49,7 @@ SAYS: Final[Mapping[str, Mapping[str, str]]] = {
         "running": f"{_UPRIGHT} Eyes closed.",
     },
 }
-"""What the person is told: protocol → phase → words."""
+"""Instruction to the subject: protocol → phase → words."""
 
 HINTS: Final[Mapping[str, str]] = {
     "tug": "The clock starts with the first lean forward and stops when the person sits again.",
@@ -59,7 +59,7 @@ HINTS: Final[Mapping[str, str]] = {
     "standing_eyes_open": "Press Go. The clock starts after two quiet seconds and stops after 30 s.",
     "standing_eyes_closed": "Press Go. The clock starts after two quiet seconds and stops after 30 s.",
 }
-"""How a test begins and ends."""
+"""Start and end of a test."""
 
 OVER: Final = "The test is over. You may rest."
 

@@ -102,7 +102,7 @@ ZERO_WORDS: Final[Mapping[str, str]] = {
     "walking": "from the mean in walking",
     "stride_mean": "from its mean over the stride",
 }
-"""Zero of an angle → what is added to its title."""
+"""Zero of an angle → addition to its title."""
 
 
 def title_of(name: str, label: str, zero: str = "standing") -> str:
@@ -166,7 +166,7 @@ REASONS: Final[Mapping[str, str]] = {
     "tibia_not_vertical": "not measured: the shank does not pass the vertical in swing",
     "not_reached": "not measured: this analysis has no joint angles",
 }
-"""Reason code → words in place of a number."""
+"""Reason code → text instead of a number."""
 
 EXCLUDED: Final[Mapping[str, str]] = {
     "incomplete": "incomplete",
@@ -180,14 +180,14 @@ EXCLUDED: Final[Mapping[str, str]] = {
     "outlier": "unlike the others",
     "non_periodic": "not periodic",
 }
-"""Code of a stride left out → words."""
+"""Exclusion code of a stride → words."""
 
 GROUPS: Final[Mapping[str, str]] = {
     "adult_21_84": "adults 21–84 years",
     "adult_21_54": "adults 21–54 years",
     "adult_55_84": "adults 55–84 years",
 }
-"""Group of a reference → its people in words."""
+"""Reference group → its description."""
 
 NO_NORM: Final[Mapping[str, str]] = {
     "no_norm_for_age": "No norm for this age: the reference people are adults.",
@@ -195,7 +195,7 @@ NO_NORM: Final[Mapping[str, str]] = {
     "age_unknown": "No norm for timing: enter the year of birth.",
     "sex_unknown": "No norm for timing: enter the sex.",
 }
-"""Why there is no reference at all."""
+"""Why there is no reference."""
 
 
 def reason_words(code: str | None) -> str:
@@ -227,7 +227,7 @@ NOT_COUNTED: Final[Mapping[str, str]] = {
     "foot_moved": "the foot moved",
     "foot_lifted": "the foot was off the floor",
 }
-"""Why a squat does not count → words."""
+"""Why a squat is excluded → words."""
 
 
 def explain_repetition(code: str) -> str:
@@ -310,9 +310,9 @@ JUDGED: Final[Mapping[str | None, str]] = {
     "warn": "The pose estimator doubts part of its result.",
     "bad": "The sensors contradict each other: the pose estimator cannot stand behind its result.",
 }
-"""Verdict of the estimator → reason of the level."""
+"""Verdict of the estimator → reason for the quality level."""
 
 PATH_JUDGED: Final = (
     "The path of a foot does not fit its rests on the floor: the estimator cannot stand behind its distances."
 )
-"""The same where nothing but the path of a foot is bad."""
+"""Likewise if only the path of a foot is bad."""
