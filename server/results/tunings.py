@@ -53,7 +53,7 @@ class TuningOrder:
     ----------
     validation : names of validation trials. scheme : adaptation of gains to the motion, None = default.
     magnetometer : None = if the algorithm supports it. particles … random_rounds : of the swarm, None =
-    as in the thesis.
+        as in the thesis.
     """
 
     algorithm: str

@@ -171,8 +171,7 @@ def open_in_emergency(c: Connection, user: Identity, code: str, reason: str) -> 
     Raises
     ------
     NotFound : no patient has exactly this code. ServiceError bad_value : the reason is too short or too long.
-        Conflict
-    care_teams_off, seen_already.
+    Conflict : care_teams_off, seen_already.
     """
     if not are_on(c):
         raise Conflict("care_teams_off", "This clinic has no care teams: you see every patient in the list.")
