@@ -27,9 +27,7 @@ def run(
     config: Mapping[str, Any] | None,
     progress: Progress,
 ) -> dict[str, bytes]:
-    """Analyse the files of one trial to result files (server/report/files/exports.py); like
-    `analyse_files`.
-    """
+    """Analyse the files of one trial and return the result files (server/report/files/exports.py)."""
     from sagittal.core.formats.json_tree import read_json
     from sagittal.server.report.files.exports import analysis_files
 
