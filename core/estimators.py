@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Segment
+from sagittal.core.message import Message
 
 Estimator = Literal["erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
 Requested = Literal["auto", "erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
@@ -47,7 +48,11 @@ class PaperReference:
     @property
     def line(self) -> str:
         """Citation with its DOI, or a remark that there is none."""
-        return f"{self.citation}. doi:{self.doi}" if self.doi else f"{self.citation}. No DOI found."
+        return (
+            f"{self.citation}. doi:{self.doi}"
+            if self.doi
+            else Message("{citation}. No DOI found.", citation=self.citation)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

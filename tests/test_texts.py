@@ -10,13 +10,14 @@ import pytest
 from babel.messages.pofile import read_po
 
 from sagittal.core.frames import SIDES
+from sagittal.core.message import PLACEHOLDER
 from sagittal.core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES
+from sagittal.core.user_text import UserText, quote
 from sagittal.server.report.view.level import STANDING, define_parameter
 from sagittal.server.report.words.headline_phrases import PATTERNS, PHRASES
 from sagittal.server.report.words.wording import JUDGED, PATH_JUDGED, REASONS, reason_words
 from sagittal.web.language import (
     LANGUAGES,
-    PLACEHOLDER,
     SOURCE,
     Catalogue,
     catalogue_path,
@@ -26,7 +27,6 @@ from sagittal.web.language import (
 from sagittal.web.language import script_texts as script_catalogue
 from sagittal.web.shown import Shown
 from sagittal.web.template_texts import list_texts, speak_template
-from sagittal.web.user_text import UserText, quote
 from tests.data import ROOT
 from tests.helpers.texts import STAYS_ENGLISH, list_messages, python_texts, script_texts
 

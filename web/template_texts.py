@@ -13,7 +13,8 @@ from typing import Final
 
 from jinja2 import Environment, nodes
 
-from sagittal.web.language import PLACEHOLDER
+from sagittal.core.message import PLACEHOLDER
+from sagittal.web.message_format import has_words
 
 READ_ATTRIBUTES: Final = frozenset({"alt", "aria-label", "aria-description", "label", "placeholder", "title"})
 
@@ -23,7 +24,6 @@ _TOKEN: Final = re.compile(
 _ATTRIBUTE: Final = re.compile(r'(?<=\s)([\w-]+)="((?:[^"{]|\{\{.*?\}\}|\{%.*?%\}|\{)*)"', re.DOTALL)
 _EITHER: Final = re.compile(r"'([^']*)' if (.+?)(?: else '([^']*)')?", re.DOTALL)
 _PLURAL: Final = re.compile(r"plural\((.+), '([^']*)', '([^']*)'\)", re.DOTALL)
-_ENTITY: Final = re.compile(r"&\w+;")
 _PARSER: Final = Environment()  # noqa: S701 - only reads expressions
 
 
@@ -48,11 +48,6 @@ def list_texts(source: str) -> Iterator[str]:
     for node in tree.find_all((nodes.Const, nodes.Concat)):
         if id(node) not in plural_words:
             yield from _strings(node)
-
-
-def has_words(message: str) -> bool:
-    """Whether a message contains anything to translate."""
-    return re.search(r"[^\W\d_]{2}", PLACEHOLDER.sub(" ", _ENTITY.sub(" ", message))) is not None
 
 
 def _is_plural(call: nodes.Call) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
-from sagittal.web.language import MONTHS, fill_placeholders
+from sagittal.web.message_format import MONTHS, fill_placeholders
 
 
 class Verbatim(str):

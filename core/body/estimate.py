@@ -44,6 +44,7 @@ from sagittal.core.errors import EstimationError, Notice
 from sagittal.core.estimators import BY_NAME, ERKF, L7S_3I, NO_FIGURE, ORIENTATIONS_ONLY, Estimator
 from sagittal.core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
 from sagittal.core.fusion.orientations import LastReading, Orientations
+from sagittal.core.message import Message
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.held_samples import lay_aside
 from sagittal.core.signals.memory import give_memory_back
@@ -102,7 +103,11 @@ def estimate_poses(
         except EstimationError as error:
             if estimator == choice.order[-1]:
                 raise
-            message = f"{estimator} cannot estimate this take, the next one is used. {error.message}"
+            message = Message(
+                "{estimator} cannot estimate this take, the next one is used. {message}",
+                estimator=estimator,
+                message=error.message,
+            )
             notices.append(Notice("estimator_failed", message, error.sensor, error.t_s))
             reduced = "estimator_failed"
     if made is None:
@@ -113,7 +118,10 @@ def estimate_poses(
         try:
             made = take.with_feet(made, used)
         except EstimationError as error:
-            message = f"The paths of the feet cannot be estimated, so there are no distances. {error.message}"
+            message = Message(
+                "The paths of the feet cannot be estimated, so there are no distances. {message}",
+                message=error.message,
+            )
             notices.append(Notice("foot_paths_failed", message, error.sensor, error.t_s))
     poses = replace(
         made.poses,

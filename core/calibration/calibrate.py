@@ -50,6 +50,7 @@ from sagittal.core.calibration.ways import CalibrationWalk
 from sagittal.core.errors import CalibrationError, Notice, SignalError
 from sagittal.core.frames import R_NEUTRAL, Bools, Floats, Segment
 from sagittal.core.fusion.attitude import AttitudeParams, estimate_orientation
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import find_vertical, from_matrix, rotate
 from sagittal.core.signals.calibrated import CalibratedRecording, Calibration, SegmentCalibration
@@ -195,9 +196,11 @@ def _calibrate_at(
         notices += f.notices
     steps = _straight_steps(found, standing, q, walk)
     if steps is not None and steps < FEW_STEPS:
-        message = (
-            f"Calibration saw about {steps} straight {plural(steps, 'step', 'steps')}, {FEW_STEPS} or more "
-            "are good; walk further straight."
+        message = Message(
+            f"Calibration saw about {{steps}} straight {plural(steps, 'step', 'steps')}, {{FEW_STEPS}} "
+            "or more are good; walk further straight.",
+            steps=steps,
+            FEW_STEPS=FEW_STEPS,
         )
         notices.append(Notice("few_steps", message))
     if facing:
@@ -285,9 +288,11 @@ def _tell_facing(turn: float, leads: bool) -> Notice:
         if leads
         else ("walking and standing", "Stand still where the walk ends before turning where possible.")
     )
-    message = (
-        f"The person turned by {abs(degrees(turn)):.0f}° between {between}; forward is where they stood "
-        f"facing. {todo}"
+    message = Message(
+        "The person turned by {abs:.0f}° between {between}; forward is where they stood facing. {todo}",
+        abs=abs(degrees(turn)),
+        between=between,
+        todo=todo,
     )
     return Notice("facing_not_walking", message, severity="info")
 

@@ -21,6 +21,7 @@ from sagittal.core.calibration.knee_axis import KNEE_SEEN, STEEPEST, measure_kne
 from sagittal.core.calibration.score_rules import RULE_OF, CheckName, CheckRule
 from sagittal.core.calibration.walking import TRUNK
 from sagittal.core.frames import FOOT, GRAVITY, SEGMENTS, SHANK, SIDES, THIGH, Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import wrap_angle
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.rest import index_window, measure_turn
@@ -292,7 +293,11 @@ class _Evidence:
         found = self.knees.get(side)
         if found is None:
             return self._leave(
-                "knee_axis", segment, f"Thigh and shank were not both seen in {KNEE_SEEN:.0f} s of walking."
+                "knee_axis",
+                segment,
+                Message(
+                    "Thigh and shank were not both seen in {KNEE_SEEN:.0f} s of walking.", KNEE_SEEN=KNEE_SEEN
+                ),
             )
         apart = degrees(abs(float(wrap_angle(found.apart))))
         if found.steepest > STEEPEST:

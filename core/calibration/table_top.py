@@ -15,6 +15,7 @@ import numpy as np
 
 from sagittal.core.errors import CalibrationError, Notice
 from sagittal.core.frames import R_NEUTRAL, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, exp, from_matrix, mean, multiply, rotate, to_matrix
 from sagittal.core.rotation.compiled import turn
 from sagittal.core.signals.recording import SensorSignals, UniformRecording
@@ -101,9 +102,11 @@ def calibrate_table_top(recording: UniformRecording, params: TableTopParams | No
         q, drifts[segment] = _carry(signals, biases[segment], start, part, body, recording.rate_hz, params)
         mounts[segment], moved[segment] = to_matrix(multiply(to_segment, q)), body[0] - table[1]
         if drifts[segment] > params.drift:
-            message = (
-                f"{segment}: its tilt drifted by {degrees(drifts[segment]):.1f}° on the way from the table; "
-                "its heading may be off as much. Put it on again, faster."
+            message = Message(
+                "{segment}: its tilt drifted by {degrees:.1f}° on the way from the table; its "
+                "heading may be off as much. Put it on again, faster.",
+                segment=segment,
+                degrees=degrees(drifts[segment]),
             )
             notices.append(Notice("table_top_drift", message, sensor=segment))
     return TableTopMounts(mounts, biases, drifts, moved, tuple(notices))
@@ -133,8 +136,11 @@ def find_worn_standing(recording: UniformRecording, params: TableTopParams | Non
             return rest
     raise CalibrationError(
         "body_not_still",
-        f"No standing of {params.stand_s:g} s was found with all sensors on the body; stand still before "
-        "squatting.",
+        Message(
+            "No standing of {stand_s:g} s was found with all sensors on the body; stand still "
+            "before squatting.",
+            stand_s=params.stand_s,
+        ),
         t_s=rests[0][1],
     )
 
@@ -171,16 +177,24 @@ def _find_ends(
     if not rests or rests[0][0] > params.edge_s:
         raise CalibrationError(
             "table_not_still",
-            f"{segment} does not lie still when the take begins; leave it on the table for "
-            f"{params.rest.shortest_s:g} s or more after the start.",
+            Message(
+                "{segment} does not lie still when the take begins; leave it on the table for {shortest_s:g} "
+                "s or more after the start.",
+                segment=segment,
+                shortest_s=params.rest.shortest_s,
+            ),
             sensor=segment,
             t_s=0.0,
         )
     if len(rests) < 2 or rests[-1][1] < end_s - params.edge_s:
         raise CalibrationError(
             "body_not_still",
-            f"{segment} is not still on the body when the take ends; stand still for "
-            f"{params.rest.shortest_s:g} s or more before stopping.",
+            Message(
+                "{segment} is not still on the body when the take ends; stand still for {shortest_s:g} "
+                "s or more before stopping.",
+                segment=segment,
+                shortest_s=params.rest.shortest_s,
+            ),
             sensor=segment,
             t_s=end_s,
         )
@@ -188,8 +202,13 @@ def _find_ends(
     if body[0] - table[1] > params.longest_s:
         raise CalibrationError(
             "table_top_too_long",
-            f"{segment} was on its way for {body[0] - table[1]:.0f} s; the gyroscope can be trusted for "
-            f"{params.longest_s:g} s.",
+            Message(
+                "{segment} was on its way for {table:.0f} s; the gyroscope can be trusted for {longest_s:g} "
+                "s.",
+                segment=segment,
+                table=body[0] - table[1],
+                longest_s=params.longest_s,
+            ),
             sensor=segment,
             t_s=table[1],
         )
@@ -197,8 +216,14 @@ def _find_ends(
     if rate > params.still:
         raise CalibrationError(
             "table_not_still",
-            f"{segment} is not still on the table: its rate varies by {degrees(rate):.1f} °/s, limit "
-            f"{degrees(params.still):.0f} °/s. Leave it alone for {params.still_s:g} s after the start.",
+            Message(
+                "{segment} is not still on the table: its rate varies by {rate:.1f} °/s, limit {still:.0f} "
+                "°/s. Leave it alone for {still_s:g} s after the start.",
+                segment=segment,
+                rate=degrees(rate),
+                still=degrees(params.still),
+                still_s=params.still_s,
+            ),
             sensor=segment,
             t_s=table[0],
         )
@@ -206,7 +231,10 @@ def _find_ends(
     if silent:
         raise CalibrationError(
             "table_top_gap",
-            f"{segment} sent nothing for a while on its way; how it turned meanwhile is not known.",
+            Message(
+                "{segment} sent nothing for a while on its way; how it turned meanwhile is not known.",
+                segment=segment,
+            ),
             sensor=segment,
             t_s=silent[0][0] / recording.rate_hz,
         )
@@ -237,8 +265,13 @@ def _lie_on_table(segment: Segment, force: Floats, params: TableTopParams) -> Fl
     if slope > params.slope:
         raise CalibrationError(
             "table_orientation",
-            f"{segment} lies {degrees(slope):.0f}° off the agreed way on the table, limit "
-            f"{degrees(params.slope):.0f}°; lay all sensors the same way up.",
+            Message(
+                "{segment} lies {slope:.0f}° off the agreed way on the table, limit {slope2:.0f}°; "
+                "lay all sensors the same way up.",
+                segment=segment,
+                slope=degrees(slope),
+                slope2=degrees(params.slope),
+            ),
             sensor=segment,
             t_s=0.0,
         )

@@ -24,6 +24,7 @@ from sagittal.core.events.bouts import Bout, BoutParams, RowParams, plain_bouts,
 from sagittal.core.events.periodicity import Periodicity, PeriodicityParams, step_times
 from sagittal.core.events.steps import Step, Steps
 from sagittal.core.frames import Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import find_lengths
 from sagittal.core.signals.filtering import low_pass, smooth_gaussian
@@ -139,9 +140,12 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
         return _nothing(
             segment,
             "few_steps",
-            f"{len(times)} {plural(len(times), 'step was', 'steps were')} found, nowhere "
-            f"{params.bouts.min_strides + 2} without a break: no walking bout is reported. "
-            "Record a longer walk.",
+            Message(
+                f"{{times}} {plural(len(times), 'step was', 'steps were')} found, nowhere {{min_strides}} "
+                "without a break: no walking bout is reported. Record a longer walk.",
+                times=len(times),
+                min_strides=params.bouts.min_strides + 2,
+            ),
         )
     steps = [
         step
@@ -201,8 +205,12 @@ def _find_rows(
     if rate < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Steps need at least {params.min_rate_hz:g} Hz, the recording has {rate:g} Hz. Record at a"
-            " higher rate.",
+            Message(
+                "Steps need at least {min_rate_hz:g} Hz, the recording has {rate:g} Hz. Record at a "
+                "higher rate.",
+                min_rate_hz=params.min_rate_hz,
+                rate=rate,
+            ),
             sensor=segment,
         )
     signals = recording.sensors[segment]
@@ -220,9 +228,13 @@ def _find_rows(
         return _nothing(
             segment,
             "non_periodic",
-            f"The movement of the trunk has no rhythm of steps (best score {rhythm.score.max():.2f}; needed"
-            f" for several seconds: {params.periodicity.row_score:g}): no steps are reported. Record at least"
-            " ten steps straight ahead.",
+            Message(
+                "The movement of the trunk has no rhythm of steps (best score {max:.2f}; needed for "
+                "several seconds: {row_score:g}): no steps are reported. Record at least ten steps "
+                "straight ahead.",
+                max=rhythm.score.max(),
+                row_score=params.periodicity.row_score,
+            ),
         )
     return _steps(vertical, moving, rhythm, rate, params), rhythm, yaw_rate
 

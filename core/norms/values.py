@@ -8,6 +8,7 @@ from math import hypot, sqrt
 from typing import Final, Literal, cast
 
 from sagittal.core.frames import GRAVITY
+from sagittal.core.message import Message
 from sagittal.core.norms.speed import WBDS_MPS
 from sagittal.core.norms.tables import LEVEL, WBDS, WBDS_N, read_rows, wbds_group
 from sagittal.core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES, NormKey, find_entry
@@ -142,13 +143,17 @@ def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -
         row = table[key.row]
         note = _BAND if row["kind"] != "mean_sd" else _DIFFERS[key.differs]
         first, last = row["age_min"], row["age_max"]
-        ages = f"{first} years" if first == last else f"{first} to {last} years"
+        ages = (
+            Message("{first} years", first=first)
+            if first == last
+            else Message("{first} to {last} years", first=first, last=last)
+        )
         values[name] = NormValue(
             name=name,
             mean=float(row["mean"]),
             sd=float(row["sd"]),
             n=None,
-            group=f"{sex}, {ages}, {pace} pace",
+            group=Message("{sex}, {ages}, {pace} pace", sex=sex, ages=ages, pace=pace),
             source=row["source"],
             comparable=not note,
             note=note,
@@ -224,7 +229,7 @@ def predict_at_speed(
             mean=mean,
             sd=mean * float(row["resid_sd_ln"]),
             n=int(row["n"]) // _SPEEDS,
-            group=f"{group.lower()} adults at this speed on a treadmill",
+            group=Message("{lower} adults at this speed on a treadmill", lower=group.lower()),
             source="BMClab h2a (MIT)",
         )
     return values

@@ -9,6 +9,7 @@ from sagittal.core.activity.monitor import Progress, monitor_activity
 from sagittal.core.activity.result import ActivityResult
 from sagittal.core.errors import SignalError
 from sagittal.core.frames import Segment
+from sagittal.core.message import Message
 from sagittal.core.pipeline.analysis import TakeAnalysis
 from sagittal.core.pipeline.config import PipelineConfig
 from sagittal.core.pipeline.stages import PipelineStage
@@ -40,8 +41,11 @@ def find_trunk_stream(recording: Recording) -> tuple[Segment, LongStream]:
         return "chest", next(iter(there.values()))
     raise SignalError(
         "no_trunk_sensor",
-        "Daily life needs a sensor on the chest or the lower back. Say in the mapping which sensor was worn "
-        f"there (sensors found: {', '.join(there)}).",
+        Message(
+            "Daily life needs a sensor on the chest or the lower back. Say in the mapping which "
+            "sensor was worn there (sensors found: {there}).",
+            there=", ".join(there),
+        ),
     )
 
 
@@ -75,14 +79,16 @@ def share_known(found: ActivityResult) -> float:
 
 def list_doubts(found: ActivityResult) -> tuple[str, ...]:
     """Why the level is not good, as sentences."""
-    doubts = []
+    doubts: list[str] = []
     total = max(found.duration_s, 1e-9)
     unknown = 1.0 - share_known(found)
     if unknown > 0.1:
-        doubts.append(f"The posture is not known in {100 * unknown:.0f} % of the time worn.")
+        doubts.append(
+            Message("The posture is not known in {unknown:.0f} % of the time worn.", unknown=100 * unknown)
+        )
     lost = 60.0 * found.minutes("gap") / total
     if lost > 0.1:
-        doubts.append(f"{100 * lost:.0f} % of the time nothing was recorded.")
+        doubts.append(Message("{lost:.0f} % of the time nothing was recorded.", lost=100 * lost))
     if any(n.code in ("no_baseline", "baseline_assumed") for n in found.notices):
         doubts.append("Without walking it is not certain which way is up.")
     return tuple(doubts)

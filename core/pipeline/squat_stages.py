@@ -18,6 +18,7 @@ from sagittal.core.calibration.standing_leg import find_standing_legs
 from sagittal.core.calibration.table_top import calibrate_table_top, crop, find_worn_standing
 from sagittal.core.errors import Notice
 from sagittal.core.frames import SUFFIX
+from sagittal.core.message import Message
 from sagittal.core.pipeline.analysis import TakeAnalysis, require_stage
 from sagittal.core.pipeline.config import PipelineConfig
 from sagittal.core.pipeline.stages import PipelineStage
@@ -35,8 +36,11 @@ AGREED: Final = Notice(
 
 NO_HEIGHT: Final = Notice(
     "height_assumed",
-    f"Body height is not given; {NOMINAL_HEIGHT_M:.2f} m is taken. The way of the hip down depends on it, "
-    "the angles hardly.",
+    Message(
+        "Body height is not given; {NOMINAL_HEIGHT_M:.2f} m is taken. The way of the hip "
+        "down depends on it, the angles hardly.",
+        NOMINAL_HEIGHT_M=NOMINAL_HEIGHT_M,
+    ),
     severity="info",
 )
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 from sagittal.core.frames import Protocol
+from sagittal.core.message import Message
 
 WalkingPace = Literal["comfortable", "slow", "fast"]
 WalkingAid = Literal[
@@ -128,7 +129,11 @@ class WalkingCondition:
 
     @property
     def _floor(self) -> str:
-        belt = "" if self.belt_speed_mps is None else f" at {self.belt_speed_mps:.2f}\u202fm/s"
+        belt = (
+            ""
+            if self.belt_speed_mps is None
+            else Message(" at {belt_speed_mps:.2f}\u202fm/s", belt_speed_mps=self.belt_speed_mps)
+        )
         return PROTOCOL_WORDS[self.protocol] + belt
 
 
@@ -151,19 +156,27 @@ def compare_conditions(a: WalkingCondition, b: WalkingCondition) -> tuple[str, .
     """Differences between the conditions of one recording and a later one, in words: "own pace, then
     fast".
     """
-    found = []
+    found: list[str] = []
     if a.protocol != b.protocol:
-        found.append(f"{PROTOCOL_WORDS[a.protocol]}, then {PROTOCOL_WORDS[b.protocol]}")
+        found.append(
+            Message(
+                "{protocol}, then {protocol2}",
+                protocol=PROTOCOL_WORDS[a.protocol],
+                protocol2=PROTOCOL_WORDS[b.protocol],
+            )
+        )
     elif not _same_belt(a.belt_speed_mps, b.belt_speed_mps):
         speeds = [
             "unknown" if c.belt_speed_mps is None else f"{c.belt_speed_mps:.2f}\u202fm/s" for c in (a, b)
         ]
-        found.append(f"speed of the belt {speeds[0]}, then {speeds[1]}")
+        found.append(
+            Message("speed of the belt {speeds}, then {speeds2}", speeds=speeds[0], speeds2=speeds[1])
+        )
     for name, words in CHOICES.items():
         values = [getattr(c, name) for c in (a, b)]
         if values[0] != values[1]:
-            first, second = (words.get(v or "", f"{name} not stated") for v in values)
-            found.append(f"{first}, then {second}")
+            first, second = (words.get(v or "", Message("{name} not stated", name=name)) for v in values)
+            found.append(Message("{first}, then {second}", first=first, second=second))
     if a.feedback != b.feedback:
         found.append("with feedback, then without" if a.feedback else "without feedback, then with")
     return tuple(found)

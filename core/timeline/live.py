@@ -25,6 +25,7 @@ from sagittal.core.formats.live_log import (
     encode_batch,
 )
 from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.timeline.buffer import SampleBuffer
 from sagittal.core.timeline.params import TimelineParams
 from sagittal.core.timeline.queue import StreamQueue
@@ -203,7 +204,12 @@ class LiveAxis:
         """Add a notice about a stream, once."""
         if (code, queue.stream) in self._notified:
             return
-        notice = Notice(code, f"{', '.join(queue.ids)} {what}", queue.ids[0], self._next / self.rate_hz)
+        notice = Notice(
+            code,
+            Message("{ids} {what}", ids=", ".join(queue.ids), what=what),
+            queue.ids[0],
+            self._next / self.rate_hz,
+        )
         self._notified[code, queue.stream] = notice
         self._fresh.append(notice)
 
@@ -212,14 +218,22 @@ def _common_rate(queues: Sequence[StreamQueue], hello: Hello, params: TimelinePa
     if not queues:
         named = ", ".join(x.id for x in hello.sensors)
         raise SignalError(
-            "no_mapping", f"No sensor is worn on a segment; say which one is where (sensors: {named})."
+            "no_mapping",
+            Message(
+                "No sensor is worn on a segment; say which one is where (sensors: {named}).", named=named
+            ),
         )
     slowest = min(queues, key=lambda x: x.rate_hz)
     if slowest.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Sensor {slowest.ids[0]} sends {slowest.rate_hz:g} Hz; at least {params.min_rate_hz:g} Hz are "
-            "needed to find foot contacts. Set it to 60 Hz or more.",
+            Message(
+                "Sensor {ids} sends {rate_hz:g} Hz; at least {min_rate_hz:g} Hz are needed to find "
+                "foot contacts. Set it to 60 Hz or more.",
+                ids=slowest.ids[0],
+                rate_hz=slowest.rate_hz,
+                min_rate_hz=params.min_rate_hz,
+            ),
             sensor=slowest.ids[0],
         )
     return max(x.rate_hz for x in queues)

@@ -17,6 +17,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, delete, insert, select, update
 
 from sagittal.core.errors import SagittalError
+from sagittal.core.user_text import UserText
 from sagittal.server import audit
 from sagittal.server.clinic import patients
 from sagittal.server.errors import Conflict, ServiceError
@@ -32,7 +33,6 @@ from sagittal.server.storage.field_cipher import (
 )
 from sagittal.server.storage.schema.person_tables import identity_key, patient_identity
 from sagittal.server.storage.schema.tables import now
-from sagittal.web.user_text import UserText
 
 FIELDS: Final = ("name", "born_on", "record_number", "insurance_number", "contact")
 MOST: Final[Mapping[str, int]] = {

@@ -12,6 +12,7 @@ from contextlib import closing
 import msgspec
 
 from sagittal.core.errors import SagittalError
+from sagittal.core.user_text import encode_user_text
 from sagittal.server.auth.identity import Identity
 from sagittal.server.downloads.studies import StudyChoice, make_study
 from sagittal.server.export.zipping import zip_files
@@ -20,7 +21,6 @@ from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.files.blob_opening import open_blobs
-from sagittal.web.user_text import encode_user_text
 
 
 class StudyReply(msgspec.Struct, frozen=True):

@@ -6,6 +6,7 @@ from typing import Final
 
 import msgspec
 
+from sagittal.core.user_text import encode_user_text
 from sagittal.server.auth.identity import Identity
 from sagittal.server.downloads.studies import StudyChoice, check_size, list_visits
 from sagittal.server.downloads.study_child import StudyReply
@@ -14,7 +15,6 @@ from sagittal.server.processes.child import FAR_BEHIND
 from sagittal.server.processes.errand import ErrandTurn, TooManyErrands, run_errand
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
-from sagittal.web.user_text import encode_user_text
 
 CHILD: Final = "sagittal.server.downloads.study_child"
 LONGEST_S: Final = 300.0

@@ -21,12 +21,12 @@ from sagittal.core.functional_tests.result import GuidedTestView, TimedSegment
 from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame, SensorHealth
 from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.core.parameters.result import Parameter
+from sagittal.core.user_text import encode_user_text
 from sagittal.server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
 from sagittal.server.report.view.calibration_checks import say_verdict
 from sagittal.server.report.view.functional import segment_label
 from sagittal.server.report.words.guided_words import tell_person
 from sagittal.server.report.words.wording import place_words, reason_words, speak_places
-from sagittal.web.user_text import encode_user_text
 
 LOST_WARN, LOST_BAD = 0.01, 0.20
 """Fractions of lost samples, as in the assessment of a whole trial (core/quality/assessment.py)."""

@@ -8,9 +8,9 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, Row, select
 
+from sagittal.core.user_text import UserText
 from sagittal.server.storage.schema.care_tables import emergency_access
 from sagittal.server.storage.schema.tables import patient, session
-from sagittal.web.user_text import UserText
 from sagittal.web.words import day
 
 DEEDS: Final[Mapping[str, str]] = {

@@ -11,6 +11,7 @@ from sagittal.core.body.erkf.poses import ErkfRun
 from sagittal.core.body.erkf.start import find_parts
 from sagittal.core.body.health import LONGEST_MOVING_S, HealthFinding, longest_run_s
 from sagittal.core.errors import Notice, Severity
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, multiply, wrap_angle, yaw
 from sagittal.core.signals.held_samples import cut_blocks
 
@@ -134,7 +135,7 @@ def erkf_notices(run: ErkfRun, findings: tuple[HealthFinding, ...]) -> tuple[Not
     for f in findings:
         if f.verdict != "good" and f.name in TOLD:
             code, severity, words = TOLD[f.name]
-            message = words.format(of=f.of, value=f.value, warn=f.warn)
+            message = Message(words, of=f.of, value=f.value, warn=f.warn)
             told.append(Notice(code, message, sensor=(f.of or "").split("-")[-1] or None, severity=severity))
     if run.rest is None:
         told.append(Notice("started_moving", STARTED_MOVING, t_s=0.0))

@@ -12,6 +12,7 @@ from sagittal.core.body.health import LONGEST_MOVING_S, HealthFinding, longest_r
 from sagittal.core.body.poses import Poses
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Protocol, Segment
+from sagittal.core.message import Message
 
 CONSTRAINT_MM: Final = (1.0, 10.0)
 """What constraints leave after projection: below .01 with two, 10 accepted with one
@@ -180,7 +181,7 @@ def list_health_notices(findings: Sequence[HealthFinding]) -> tuple[Notice, ...]
         if f.name in TOLD:
             code, words = TOLD[f.name]
             sensor = f.of if f.name == "gap_s" else None
-            message = words.format(of=f.of, value=f.value, warn=f.warn)
+            message = Message(words, of=f.of, value=f.value, warn=f.warn)
             notices[code] = Notice(code, message, sensor=sensor)
     return tuple(notices.values())
 
@@ -189,8 +190,9 @@ def l7s_notices(protocol: Protocol) -> tuple[Notice, ...]:
     """Notice for recordings of protocols that L7S is not designed for."""
     if protocol not in LEVEL:
         return ()
-    message = (
-        f"L7S takes the pelvis to stay at its standing height; in '{protocol}' it does not. Read its angles "
-        "and positions for walking parts only, or wear seven sensors."
+    message = Message(
+        "L7S takes the pelvis to stay at its standing height; in '{protocol}' it does not. "
+        "Read its angles and positions for walking parts only, or wear seven sensors.",
+        protocol=protocol,
     )
     return (Notice("pelvis_height_assumed", message),)

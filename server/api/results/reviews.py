@@ -13,6 +13,7 @@ from starlette.responses import Response
 
 from sagittal.core.events.edits import read_edit
 from sagittal.core.events.result import list_known
+from sagittal.core.user_text import encode_user_text
 from sagittal.server.api.documents import refusals
 from sagittal.server.api.downloads.downloads import BINARY, attachment
 from sagittal.server.api.results import review_schemas as schemas
@@ -28,7 +29,6 @@ from sagittal.server.results import analyses, edit_log, reviews, signals
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
 from sagittal.server.trail import AuditTrail
-from sagittal.web.user_text import encode_user_text
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}", tags=["review"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]

@@ -12,6 +12,7 @@ from sqlalchemy import Connection
 from starlette.responses import Response
 
 from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.user_text import UserText
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
@@ -28,7 +29,6 @@ from sagittal.server.results import analyses, edit_log, visits
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.sharing import care_teams
 from sagittal.server.storage.schema.tables import now
-from sagittal.web.user_text import UserText
 from sagittal.web.words import number
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)

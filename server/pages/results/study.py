@@ -9,6 +9,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
+from sagittal.core.user_text import UserText
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
@@ -16,7 +17,6 @@ from sagittal.server.context import Db, StudyVisits
 from sagittal.server.downloads import studies
 from sagittal.server.pages.shell import record_listing, render_page
 from sagittal.server.pages.words import PROTOCOL_NAMES
-from sagittal.web.user_text import UserText
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 

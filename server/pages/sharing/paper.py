@@ -14,13 +14,13 @@ from markupsafe import Markup
 from starlette.requests import Request
 from starlette.responses import Response
 
+from sagittal.core.user_text import UserText
 from sagittal.server.http.headers import allow_camera, lock_document
 from sagittal.server.http.templates import TEMPLATES, language_of
 from sagittal.server.pages.assets import STATIC
 from sagittal.server.pages.words import PROTOCOL_NAMES
 from sagittal.server.settings import Settings
 from sagittal.server.sharing import pdfs
-from sagittal.web.user_text import UserText
 
 SHEETS: Final = ("base", "pages", "visits", "daily", "paper")
 """Style sheets for print, in order."""

@@ -12,8 +12,11 @@ from sqlalchemy import Connection
 from starlette.responses import Response
 
 from sagittal.core.frames import SEGMENTS
+from sagittal.core.message import read_message
 from sagittal.core.plurals import plural
 from sagittal.core.subject.anthropometry import LIMITS
+from sagittal.core.user_text import UserText
+from sagittal.core.user_text import quote as quote_text
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
@@ -29,8 +32,6 @@ from sagittal.server.report.files.bundle import ABOUT_FILES
 from sagittal.server.results import histories
 from sagittal.server.uploads import recordings, uploads
 from sagittal.server.uploads.recordings import StoredRecording
-from sagittal.web.user_text import UserText
-from sagittal.web.user_text import quote as quote_text
 from sagittal.web.words import number, seconds
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -229,7 +230,7 @@ def view_inspection(
     hint = next(
         (text for basis, text in BASIS_WORDS.items() if basis in bases), "Say where each sensor sits."
     )
-    left_out = [n["message"] for n in results["notices"] if n["code"] in ABOUT_FILES]
+    left_out = [read_message(n) for n in results["notices"] if n["code"] in ABOUT_FILES]
     return {
         "facts": _facts(results, devices),
         "unused": left_out,
@@ -356,7 +357,7 @@ def _notices(inspection: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]
             continue
         suffix = f", {quote_id(n['sensor'])}" if n["sensor"] else ""
         title = n["code"].replace("_", " ").capitalize() + suffix
-        notice = {"kind": KINDS[n["severity"]], "title": title, "message": n["message"]}
+        notice = {"kind": KINDS[n["severity"]], "title": title, "message": read_message(n)}
         if notice not in notices:
             notices.append(notice)
     order = list(KINDS.values())

@@ -14,6 +14,7 @@ from sagittal.core.events.result import Stride, Strides
 from sagittal.core.frames import SIDES, Floats, Side
 from sagittal.core.plurals import plural
 from sagittal.core.signals.rest import find_runs
+from sagittal.core.user_text import quote
 from sagittal.server.report.charts.panels import CurvePanel, SideCurve
 from sagittal.server.report.charts.svg import (
     KEY,
@@ -25,7 +26,6 @@ from sagittal.server.report.charts.svg import (
     stretch,
 )
 from sagittal.server.report.words.wording import explain_exclusion, format_number
-from sagittal.web.user_text import quote
 
 X_TICKS: Final = (0, 20, 40, 60, 80, 100)
 

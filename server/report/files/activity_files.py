@@ -145,7 +145,7 @@ def read_activity(files: Mapping[str, bytes]) -> ActivityResult:
         days=tuple(_read_day(d) for d in data["days"]),
         periods=tuple(_read_period(p) for p in data["periods"]),
         inclination_deg=floats_of(inclination, "inclination_deg"),
-        notices=tuple(Notice(**n) for n in data["notices"]),
+        notices=tuple(Notice.from_json(n) for n in data["notices"]),
     )
 
 

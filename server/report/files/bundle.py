@@ -131,7 +131,7 @@ def read_warnings(data: Mapping[str, Any]) -> tuple[Notice, ...]:
     """Notices of analysis.json about the trial, without those about unused files, shown on the upload
     page.
     """
-    return keep_told(Notice(**row) for row in data["warnings"])
+    return keep_told(Notice.from_json(row) for row in data["warnings"])
 
 
 def keep_told(notices: Iterable[Notice]) -> tuple[Notice, ...]:

@@ -19,7 +19,7 @@ from sagittal.core.activity.result import ActivityResult
 from sagittal.core.parameters.result import Parameter
 from sagittal.server.report.charts.svg import PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.words.wording import format_number
-from sagittal.web.language import MONTHS
+from sagittal.web.message_format import MONTHS
 
 LONG_BOUT_S: Final = 60.0
 """Minimum duration of walking bouts at home for comparing cadence: short ones include turns and stops."""

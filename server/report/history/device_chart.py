@@ -9,7 +9,7 @@ from typing import Final
 from sagittal.server.report.charts.svg import PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.history.trend_chart import BOTTOM, LABEL_PX, ROOM, TOP, WIDTH_PX
 from sagittal.server.report.words.wording import format_number
-from sagittal.web.language import MONTHS
+from sagittal.web.message_format import MONTHS
 
 HEIGHT: Final = 168
 """px including margins."""

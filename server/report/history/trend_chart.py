@@ -15,7 +15,7 @@ from typing import Final
 from sagittal.server.report.charts.svg import KEY, PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.history.trends import AnalysedVisit, Trend, TrendSeries
 from sagittal.server.report.words.wording import format_number
-from sagittal.web.language import MONTHS
+from sagittal.web.message_format import MONTHS
 
 TOP, BOTTOM, LEFT, RIGHT = 22, 22, 44, 12
 """Margins in px, the padding of `<div class="chart trend-plot">`."""

@@ -11,12 +11,12 @@ from sagittal.core.events.result import Strides
 from sagittal.core.frames import SIDES, Side
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.core.parameters.rows import Column
+from sagittal.core.user_text import quote
 from sagittal.server.report.charts.svg import KEY, find_round_ticks, make_label, make_time_labels
 from sagittal.server.report.files.columns import reduce_to_plain
 from sagittal.server.report.view.level import define_parameter
 from sagittal.server.report.view.table import ParameterRow
 from sagittal.server.report.words.wording import explain_exclusion, format_number
-from sagittal.web.user_text import quote
 
 HEIGHT: Final = 220
 TOP, BOTTOM = 12, 24

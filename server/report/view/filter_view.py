@@ -12,6 +12,7 @@ import numpy as np
 
 from sagittal.core.frames import SEGMENTS, SIDES, SUFFIX, Floats, Side
 from sagittal.core.fusion.algorithms.listed import ENGINES
+from sagittal.core.message import Message, read_message
 from sagittal.core.plurals import plural
 from sagittal.server.report.charts.filter_charts import Over, draw_agreement, draw_spread
 from sagittal.server.report.words.filter_list import GRADES_IN_WORDS
@@ -130,7 +131,7 @@ def view_comparison(
         rows, drawn = tuple(replace(row, to_median=("", "")) for row in rows), {}
     return ComparisonView(
         headline=_headline(spreads, ran, len(data["segments"])),
-        sentences=(*_notes(data, has_cycles), *(n["message"] for n in data["notices"])),
+        sentences=(*_notes(data, has_cycles), *(read_message(n) for n in data["notices"])),
         rows=rows,
         over=over,
         groups=(
@@ -226,7 +227,9 @@ def _row(f: Mapping[str, Any]) -> FilterRow:
         return ("", "") if score is None else (_text(score["inclination"]), _text(score["heading"]))
 
     problems = tuple(
-        f"{place_words(n['sensor']).capitalize()}: {n['message']}" if n["sensor"] else n["message"]
+        Message("{place}: {message}", place=place_words(n["sensor"]).capitalize(), message=read_message(n))
+        if n["sensor"]
+        else read_message(n)
         for n in f["told"]
     )
     engine = "" if f["engine"] is None else f"{f['engine']} {ENGINES[f['engine']]}"
@@ -281,7 +284,7 @@ def _reference(data: Mapping[str, Any], item: str | None, filter_name: str | Non
     )
     return ReferenceView(
         r["source"],
-        tuple(n["message"] for n in r["notices"]),
+        tuple(read_message(n) for n in r["notices"]),
         tuple((value, words, value == chosen) for value, words in names.items()),
         names.get(chosen, ""),
         heads,

@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import Comparison, find_entry
 from sagittal.core.parameters.kinematic import is_level
 from sagittal.core.parameters.symmetry import Symmetry
-from sagittal.web.user_text import UserText
+from sagittal.core.user_text import UserText
 
 Plane = Literal["sagittal", "frontal", "transverse"]
 
@@ -216,7 +217,9 @@ def speak_places(text: str) -> str:
     >>> speak_places("Units of shank_r and foot_l; columns shank_l_qw stay.")
     'Units of right shank and left foot; columns shank_l_qw stay.'
     """
-    return _SIDED.sub(lambda match: place_words(match[0]), text)
+    if isinstance(text, Message):
+        return text.map_words(speak_places)
+    return _SIDED.sub(lambda found: place_words(found[0]), text)
 
 
 _SIDED: Final = re.compile(r"\b(?:thigh|shank|foot)_[lr]\b")
