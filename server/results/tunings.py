@@ -52,8 +52,8 @@ class TuningOrder:
     Parameters
     ----------
     validation : names of validation trials. scheme : adaptation of gains to the motion, None = default.
-    magnetometer : None = if the algorithm supports it. particles … random_rounds : of the swarm, None =
-        as in the thesis.
+    magnetometer : None = if the algorithm supports it. particles … random_rounds : of the swarm, None = as in
+        the thesis.
     """
 
     algorithm: str

@@ -156,13 +156,13 @@ def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence |
     if side is None:
         return None
     apart = round_difference(row.left.value, row.right.value, parameter_term(name))
-    own, other = (row.left, row.right) if side == "left" else (row.right, row.left)
+    own, opposite = (row.left, row.right) if side == "left" else (row.right, row.left)
     words = {
         "noun": p.noun,
         "word": p.more if (side == larger) == (p.sign > 0) else p.less,
         "d": _number(row, apart),
         "v": _number(row, p.sign * own.value),
-        "o": _number(row, p.sign * other.value),
+        "o": _number(row, p.sign * opposite.value),
         "norm": _norm_words(row, p),
     }
     return make_sentence(row.name, p.family, "sides", size, OF_SIDES, words, side)

@@ -219,7 +219,7 @@ def speak_places(text: str) -> str:
     """
     if isinstance(text, Message):
         return text.map_words(speak_places)
-    return _SIDED.sub(lambda found: place_words(found[0]), text)
+    return _SIDED.sub(lambda match: place_words(match[0]), text)
 
 
 _SIDED: Final = re.compile(r"\b(?:thigh|shank|foot)_[lr]\b")
