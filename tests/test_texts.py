@@ -129,7 +129,8 @@ MORE_THAN_ONE: Final = (
     "{value} times its usual",
     # shown or refused because there are several
     "in {still} parts", "{segments} sensors are available", "{chosen} visits match",
-    "{t_s} days; at most", "{days} days; expected", "{value} samples at {rate} Hz", "samples of {id}", "{count} samples of {device}",
+    "{t_s} days; at most", "{days} days; expected", "{value} samples at {rate} Hz", "samples of {id}",
+    "{count} samples of {device}", "starts again after {wrap} samples",
     "The file has {size} bytes", "announced with {size} bytes", "{offset} of {size} bytes",
     # "4 left and 1 right strides"
     "{cycle_counts} strides",
