@@ -8,6 +8,7 @@ ones are invalid and hold the last value (docs/science/timeline.md, "Rule").
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,8 +35,7 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
     params = params or TimelineParams()
     worn = _find_worn(recording)
     _refuse_copies(worn)
-    notices = list(recording.notices)
-    notices += [n for s in worn.values() for n in s.notices]
+    notices = [*recording.notices, *_merge_alike([n for s in worn.values() for n in s.notices])]
     usable = _find_usable(worn)
     _check_clocks(usable)
     rate, rate_notices = _common_rate(usable, params)
@@ -66,6 +66,15 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
         notices=(*notices, *rate_notices, *length_notices),
         belt_speed_mps=recording.belt_speed_mps,
     )
+
+
+def _merge_alike(notices: list[Notice]) -> list[Notice]:
+    """Merge notices of several sensors of one table that have the same words."""
+    merged: dict[tuple[str, str], Notice] = {}
+    for n in notices:
+        key = n.code, n.message
+        merged[key] = n if key not in merged else replace(n, sensor=None)
+    return list(merged.values())
 
 
 def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:

@@ -22,8 +22,8 @@ from sagittal.web.template_texts import list_texts, reads_like_text
 from tests.data import ROOT
 
 SAID: Final = re.compile(
-    r"^(Notice|_notify|_refuse|Problem|Offer|SignalError|CalibrationError|EstimationError"
-    r"|ServiceError|NotFound|NotAllowed|Conflict|TooLarge|__init__|KeyUnusable|ValueUnreadable|Message)$"
+    r"^(Notice|Repair|_notify|_refuse|Problem|Offer|SignalError|CalibrationError|EstimationError"
+    r"|ServiceError|NotFound|NotAllowed|Conflict|TooLarge|__init__|KeyUnusable|ValueUnreadable)$"
 )
 """Classes, and what makes them, whose arguments pages show, wherever they are made."""
 
