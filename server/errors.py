@@ -41,7 +41,7 @@ class Conflict(ServiceError):  # noqa: N818 - the name of the HTTP status
 
 
 NODE_AWAY = "node_away"
-"""Also the problem of a take whose web server is away, or was when the take was ended."""
+"""Also the problem code of a trial whose web server is or was unavailable."""
 
 
 class NodeAway(ServiceError):  # noqa: N818 - what the person reads

@@ -1,8 +1,8 @@
 """Languages of the pages: English in the sources, others as catalogues in web/texts.
 
 A message is an English text with `{placeholders}`; a `Message` of core holds it together with its values.
-Each is written as its type asks: a number by the locale, a word of the product by the catalogue, user text as
-it is. Sentences without a template go to `web/stored_sentences.py` (docs/how-to/languages.md).
+Values are formatted by type: numbers by locale, words of the product by the catalogue, user text unchanged.
+Sentences without a template are handled by `web/stored_sentences.py` (docs/how-to/languages.md).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def name_language(code: str) -> str:
 LANGUAGES: Final[Mapping[str, str]] = {
     code: name_language(code) for code in (SOURCE, *sorted(path.stem for path in TEXTS.glob("*.po")))
 }
-"""Code of a language → its own name; the first is that of the sources, every catalogue is another."""
+"""Language code → its own name; the first is that of the sources, the others have catalogues."""
 
 
 def choose_language(accepted: str | None) -> str:
@@ -107,18 +107,18 @@ class Catalogue:
         return self._values.day(value)
 
     def _render(self, message: Message) -> str | None:
-        """The text of a template with its values; None where the catalogue does not have it."""
+        """Translation of a message with its values; None if the catalogue does not contain it."""
         identifier, formats = parse_template(message.template)
-        said = self.messages.get(identifier)
-        if said is None:
+        translation = self.messages.get(identifier)
+        if translation is None:
             if has_words(identifier):
                 return None
-            said = identifier
+            translation = identifier
         values = {name: self._write(message.values[name], spec) for name, spec in formats.items()}
-        return match_case(message, fill_placeholders(self._values.mark_quotations(said), values))
+        return match_case(message, fill_placeholders(self._values.mark_quotations(translation), values))
 
     def _write(self, value: Value, spec: str) -> str:
-        """A value as this language writes it."""
+        """Format a value in this language."""
         if isinstance(value, dt.date) and not spec:
             return self.day(value)
         if isinstance(value, str):
@@ -177,7 +177,7 @@ SCRIPT_PLACES: Final = (
     "server/pages/words.py",
     "tests/helpers/texts.py",
 )
-"""Where the messages come from that scripts say, or are sent to say."""
+"""Sources of messages that are used in scripts."""
 
 
 @functools.cache

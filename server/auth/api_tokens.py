@@ -30,10 +30,10 @@ from sagittal.server.storage.schema.person_tables import api_token
 from sagittal.server.storage.schema.tables import new_id, now, user
 
 PREFIX: Final = "sgt_"
-"""By it a token is known where one has leaked."""
+"""Makes leaked tokens recognizable."""
 MOST_DAYS: Final = 365
 MOST_TOKENS: Final = 50
-"""Of one person."""
+"""Per user."""
 _TOUCH_EVERY: Final = dt.timedelta(minutes=10)
 _DOORS: Final = ("/api/v1/", "/metrics")
 
@@ -73,7 +73,7 @@ SCOPES: Final[Mapping[Scope, frozenset[Action]]] = {
     ),
     Scope.METRICS: frozenset({Action.READ_SYSTEM}),
 }
-"""What each scope allows; no scope deletes a patient or a visit, reads the audit log or touches accounts."""
+"""Actions allowed by each scope; none deletes a patient or visit, reads the audit log or changes accounts."""
 
 
 def issue(

@@ -19,9 +19,9 @@ MAX_LENGTH = 128  # OWASP ASVS 4.0.3, 2.1.2
 
 # argon2id m=64 MiB, t=3, p=4 (RFC 9106 §4, second recommended option) are the hasher's defaults
 _HASHER = PasswordHash((Argon2Hasher(),))
-# each hash takes 64 MiB: without a bound a burst of sign-ins would take the machine's memory
+# each hash takes 64 MiB: unbounded, a burst of sign-ins would exhaust memory
 _SLOTS = threading.BoundedSemaphore(2)
-# and without an end to the waiting it would take every thread that answers requests
+# and with unlimited waiting it would occupy all threads that serve requests
 PATIENCE_S = 5.0
 
 

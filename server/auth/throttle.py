@@ -26,9 +26,9 @@ WINDOW_S = 15 * 60.0
 MAX_PER_PAIR = 10
 """Failures on one account from one address."""
 MAX_PER_ACCOUNT = 50
-"""From all addresses; higher, so that a stranger cannot lock a colleague out with ten wrong guesses."""
+"""From all addresses; higher, so that a stranger cannot lock out a user with ten wrong guesses."""
 MAX_PER_ADDRESS = 30
-"""On all accounts; a clinic may share one address. NIST SP 800-63B §5.2.2 allows 100 failures in a row."""
+"""On all accounts; a clinic may share one address. NIST SP 800-63B §5.2.2 allows 100 consecutive failures."""
 _MAX_KEYS = 10_000
 
 
@@ -88,7 +88,7 @@ class Throttle:
         Counting first keeps a burst of guesses from passing before the first of them has failed.
         """
 
-        # who is stopped already costs others no turn
+        # blocked attempts do not use up further attempts of others
         self.check(account, address)
 
         def do(times: FailureTimes) -> float:

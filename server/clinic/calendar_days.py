@@ -11,7 +11,7 @@ from sagittal.server.storage.schema.tables import now
 
 FIRST: Final = dt.date(1900, 1, 1)
 AHEAD: Final = dt.timedelta(days=3653)
-"""Nobody plans further ahead than ten years (our choice)."""
+"""Maximum of ten years ahead (our choice)."""
 
 
 def require_day(day: dt.date) -> dt.date:

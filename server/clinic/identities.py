@@ -42,7 +42,7 @@ MOST: Final[Mapping[str, int]] = {
     "insurance_number": 64,
     "contact": 1000,
 }
-"""Characters at most."""
+"""Maximum number of characters."""
 OLDEST: Final = dt.date(1850, 1, 1)
 
 
@@ -200,7 +200,7 @@ def change_key(db: Database, key_file: Path) -> tuple[str, int]:
         audit.record(c, None, "identities.key_changed", "database", None, {"patients": len(rows)})
     with db.write() as c:
         keys = _read_sealing(c, key_file)
-        _open_all(c, keys)  # the old one goes only when nothing needs it
+        _open_all(c, keys)  # the old key is removed only when it is no longer needed
         drop_other_keys(key_file, keys.name)
         return keys.name, len(rows)
 
@@ -299,7 +299,7 @@ def _check(name: str, value: object) -> object:
     if name not in FIELDS:
         raise ServiceError("bad_value", "An identity has no such field.")
     if name == "born_on":
-        # a day to come may be today elsewhere on earth
+        # tomorrow may be today in another time zone
         if isinstance(value, dt.date) and not OLDEST <= value <= now().date() + dt.timedelta(days=1):
             raise ServiceError("bad_value", "The date of birth is expected from 1850 to today.")
         return value

@@ -223,7 +223,7 @@ def _listing() -> Select[Any]:
         .correlate(patient)
         .scalar_subquery()
     )
-    # read once for all patients: asked for each, it would look through every job that waits each time
+    # one query for all patients: per patient, it would scan all queued jobs each time
     running = patient.c.id.in_(
         select(session.c.patient_id)
         .join(recording, recording.c.session_id == session.c.id)

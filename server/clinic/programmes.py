@@ -21,7 +21,7 @@ from sagittal.server.storage.schema.tables import new_id, now, planned_visit, pr
 VisitState = Literal["done", "missing", "next", "planned"]
 
 NEAR = dt.timedelta(days=4)
-"""A session this close to a planned day is probably that visit: half the distance of two weeks' visits."""
+"""A session this close to a planned date probably is that visit: half the interval of weekly visits."""
 
 
 @dataclass(frozen=True)

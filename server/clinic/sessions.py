@@ -39,7 +39,7 @@ from sagittal.server.storage.schema.tables import (
 )
 
 WALKS: Final = ("walk", "treadmill")
-"""Protocols whose speed is somebody's walking speed."""
+"""Protocols whose speed is a gait speed."""
 
 CHANGEABLE = frozenset({"title", "performed_on", "protocol", "height_m", *CHOICES, "feedback", "note"})
 
@@ -218,7 +218,7 @@ def list_walks(c: Connection, patient_ids: Collection[str]) -> dict[str, list[Wa
     conditions: dict[tuple[Any, ...], WalkingCondition] = {}
     for session_id, patient_id, performed_on, *walked in c.execute(query):
         condition_key = tuple(walked)
-        if condition_key not in conditions:  # a clinic has few
+        if condition_key not in conditions:  # a clinic has only a few
             conditions[condition_key] = WalkingCondition(
                 **dict(zip(("protocol", *CHOICES), condition_key, strict=True))
             )
@@ -242,7 +242,7 @@ _ACTIVE = (
     .where(job.c.state.in_(ACTIVE_STATES), job.c.kind.not_in(BESIDE))
     .correlate(None)
 )
-"""Read once for all sessions: asked for each, it would look through every job that waits each time."""
+"""One query for all sessions: per session, it would scan all queued jobs each time."""
 _STATE = case(
     (session.c.id.in_(_ACTIVE), "running"),
     (exists().where(analysis.c.recording_id == recording.c.id, _MINE).correlate(session), "done"),
@@ -250,7 +250,9 @@ _STATE = case(
     (exists().where(recording_file.c.recording_id == recording.c.id, _MINE).correlate(session), "uploaded"),
     else_="empty",
 )
-"""State of a session, in the statement that reads it: as many sessions as one likes cost no further one."""
+"""State of a session, as part of the statement that reads it, so that any number of sessions needs
+only one.
+"""
 
 _HAS_VIDEO = exists().where(session_video.c.session_id == session.c.id).correlate(session)
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from sagittal.core.formats.source import SourceFile
 
 SIGNED: Final = "signed-"
-"""Begin of the names of the signed report's documents among the files of a job."""
+"""Prefix of the signed report's documents among the files of a job."""
 
 MEDIA_TYPES: Final = {signed_reports.PDF: "application/pdf", signed_reports.DOCUMENT: "text/html"}
 """Of the documents of a signed report, the printable one first."""

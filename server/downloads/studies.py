@@ -38,7 +38,7 @@ from sagittal.server.storage.schema.tables import now
 from sagittal.server.uploads import recordings
 
 MOST_VISITS: Final = 300
-"""Of one study; more are asked for in parts."""
+"""Per study; larger ones must be requested in parts."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ def _open_take(
         elif "strides.csv" in record.files:
             strides = analyses.file_bytes(reviewed.blobs, record, "strides.csv")
     except StoreAway:
-        raise  # it is not this visit that cannot be read
+        raise  # the problem is not this visit's data
     except SagittalError as refused:
         error = refused
     return StudyTake(name, labels, len(files), _hide_names(files), error, lambda: analysis, lambda: strides)

@@ -60,7 +60,7 @@ TABLE_COLUMNS: Final = {
     "kind": "ic = initial contact, tc = terminal contact (foot-off)",
     "source": "Which detector found the contact; manual = a person",
 }
-"""Columns of the tables that are no parameters → what they hold."""
+"""Columns that are not parameters → definition."""
 
 
 def list_about(content: ExportContent) -> TableSheet:

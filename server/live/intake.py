@@ -95,8 +95,8 @@ class Intake:
         self.next_seq = 0
         self.durable = 0
         self._hash = hashlib.sha256()
-        self._said: Finish | None = None  # the end, as the tablet or this side said it
-        self._base = 0  # batches that were there when the log was opened
+        self._said: Finish | None = None  # the end as declared by the tablet or this side
+        self._base = 0  # batches in the log when it was opened
         self._end_durable = False
         self._spans: dict[int, _Span] = {}
 
@@ -158,8 +158,8 @@ class Intake:
                     "to record with other sensors.",
                 )
             )
-        # not `next_seq`: whoever takes a welcome for an acknowledgement must not be wrong; what is sent
-        # twice for it is a duplicate
+        # not `next_seq`: a client that takes the welcome for an acknowledgement must still be correct;
+        # batches sent twice for it are duplicates
         return IntakeAnswer(protocol.welcome(self.durable))
 
     def offer(self, message: bytes | str) -> IntakeAnswer:

@@ -42,7 +42,7 @@ def pair(address: str, code: str) -> PairingResult:
         data=json.dumps({"code": code}).encode(),
         headers={"Content-Type": "application/json"},
     )
-    # no proxy of the environment: a server on loopback is not its business
+    # ignore the environment's proxy, which does not apply to a loopback server
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
         with opener.open(request, timeout=20) as answer:

@@ -30,7 +30,7 @@ from sagittal.core.signals.recording import ImuStream, Recording
 from sagittal.core.signals.rest import find_runs
 
 ON_GRID: Final = 0.01
-"""Largest distance from the grid in samples, as core/timeline takes it."""
+"""Maximum distance from the grid in samples, as in core/timeline."""
 
 
 @dataclass(frozen=True)

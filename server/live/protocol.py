@@ -25,11 +25,11 @@ from sagittal.core.formats.live_log import (
 from sagittal.core.message import Message
 
 MAX_UNACKED: Final = 64
-"""Batches a tablet may have sent beyond the last acknowledgement; then it waits."""
+"""Unacknowledged batches after which a tablet must wait."""
 MOST_UNACKED: Final = 2 * MAX_UNACKED
-"""One that has sent so many does not listen to acknowledgements and is closed."""
+"""A tablet with more unacknowledged batches is disconnected."""
 HELLO_WITHIN_S: Final = 10.0
-"""Time a socket has to say hello."""
+"""Time limit for the hello of a socket."""
 MOST_MESSAGE_BYTES: Final = MOST_FRAME_BYTES
 
 
@@ -52,7 +52,7 @@ class CloseCode(IntEnum):
 FINAL: Final = frozenset(
     {CloseCode.TOO_BIG, CloseCode.MALFORMED, CloseCode.UNAUTHORISED, CloseCode.ENDED, CloseCode.REPLACED}
 )
-"""A client that is closed so does not come back with the same messages; after any other it resumes."""
+"""Close codes after which a client must not reconnect with the same messages; after others it resumes."""
 
 
 class ProtocolError(InputError):
@@ -74,7 +74,7 @@ class Battery:
 
 
 Said = Hello | SampleBatch | Finish | Battery
-"""A text message of the tablet."""
+"""A text message from the tablet."""
 
 
 def parse(text: str) -> Said:

@@ -28,16 +28,16 @@ from sagittal.server.report.words.guided_words import tell_person
 from sagittal.server.report.words.wording import place_words, reason_words, speak_places
 
 LOST_WARN, LOST_BAD = 0.01, 0.20
-"""Shares of lost samples, as the report judges a whole take (core/quality/assessment.py)."""
+"""Fractions of lost samples, as in the assessment of a whole trial (core/quality/assessment.py)."""
 SATURATED_WARN: Final = 0.001
-"""Share of samples at range, as there."""
+"""Fraction of samples at full scale, likewise."""
 DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
     "sensors_exchanged": ("bad", "exchanged"),
     "sensor_slipped": ("bad", "slipped"),
     "sensor_late": ("warn", "late"),
     "clocks_disagree": ("warn", "clock in doubt"),
 }
-"""What the other sensors say of one (core/agreement/live.py) → its state and words."""
+"""Inconsistency with the other sensors (core/agreement/live.py) → state and words."""
 TEST_PROBLEMS: Final[Mapping[str, str]] = {
     "segments_missing": (
         "This test requires a sensor on the pelvis or chest or, for walking tests, on both feet."
@@ -45,9 +45,9 @@ TEST_PROBLEMS: Final[Mapping[str, str]] = {
     "stepped": "The person moved. Stand still again; the time restarts.",
     "trial_too_long": "No end detected within three minutes. Start over.",
 }
-"""Why a guided test began anew, or cannot begin (core/functional_tests/guided.py)."""
+"""Why a guided test was restarted or cannot start (core/functional_tests/guided.py)."""
 CURVE_POINTS: Final = 51
-"""Every second of the 101 points of a cycle: a chart on a tablet shows no more."""
+"""Every second of the 101 points of a cycle, which suffices for a chart on a tablet."""
 
 _SEVERITY: Final = {"info": "info", "warning": "warn", "error": "bad"}
 _DEGREES: Final = 180.0 / pi
@@ -298,7 +298,7 @@ def _trace(trail: Iterable[AngleTrail]) -> dict[str, list[float | None]]:
     pieces = [piece for piece in trail if len(piece.t_s)]
     if not pieces:
         return {"t": []}
-    # a new calibration may change the names: what was before is another curve
+    # a new calibration may change the set of angles: earlier curves no longer match
     names = pieces[-1].names
     pieces = [piece for piece in pieces if piece.names == names]
     values = np.concatenate([piece.values for piece in pieces]).T * _DEGREES

@@ -36,7 +36,7 @@ from sagittal.server.uploads import receiving, recordings, videos
 log = logging.getLogger(__name__)
 
 MOST_PIECE_BYTES: Final = MOST_FRAME_BYTES
-"""Of one piece: one or two seconds of a film have a quarter of it."""
+"""Maximum size of a chunk; one or two seconds of video take a quarter of it."""
 
 
 class TokenNotValid(ServiceError):  # noqa: N818 - what the person reads
@@ -179,7 +179,7 @@ class FilmIntake:
             sizes: list[int] = []
             opened = segments.recover(path, lambda one: sizes.append(len(one.body)))
             if opened is not None:
-                # the head is no piece
+                # the header is not a chunk
                 film = _OpenFilm(opened, len(sizes) - 1, sum(sizes[1:]))
                 self._open[take_id] = film
         return film
@@ -245,7 +245,7 @@ def settle(db: Database, blobs: BlobStore, settings: Settings, path: Path) -> bo
             with db.write() as c:
                 audit.record(c, None, "video.discarded", "session", take.session_id, {"take_id": take_id})
     except NotFound:
-        attached = False  # erased meanwhile
+        attached = False  # erased in the meantime
     fs.remove_file(path)
     return attached
 
@@ -289,7 +289,7 @@ def _keep(
         try:
             film.keep()
         except NotFound:
-            # erased meanwhile: nothing of it may wait in the trash
+            # erased in the meantime: nothing of it may remain in the trash
             references.discard(db, blobs, take.patient_id, [content.hexdigest()])
             raise
     return True

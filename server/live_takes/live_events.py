@@ -18,12 +18,12 @@ from sagittal.server.storage.schema.live_tables import live_event, live_take
 from sagittal.server.storage.schema.tables import now, user
 
 DAMAGED = "live_log_damaged"
-"""Code of the notice that a part of a take's log could not be read back."""
+"""Code of the notice that part of a trial's log could not be read."""
 
 COMMANDS = (
     "start", "stop", "mark", "undo_mark", "feedback", "level", "pause", "redo_calibration", "ghost", "test",
 )  # fmt: skip
-"""What a therapist may do in a running take; each is kept as an event."""
+"""Commands of a therapist in a running trial, stored as events."""
 
 
 @dataclass(frozen=True)

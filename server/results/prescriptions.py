@@ -285,7 +285,7 @@ def _baseline(
     today = any(t.session_id == session_id for t in alike)
     baseline = Baseline(
         last_level=_last_level(c, [t for t in trained if t.prescription_id == written.id]),
-        # the block opens the visit, not its later takes
+        # the block opens the visit, not its later trials
         after_training=bool(alike) and not today,
     )
     usual = None if walk is None else targets.find_usual_value(walk, content.parameter, content.side)

@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from sagittal.core.squat.sensitivity import ReferenceAngles
 
 ANALYSED: Final = 0.3
-"""Share of a run after which the take is analysed again and the 24 parameters begin."""
+"""Fraction of a run at which the trial has been reanalysed and the 24 parameters begin."""
 
 TABLE: Final = ".parquet"
-"""Ending of a reference that holds joint angles."""
+"""Extension of a reference with joint angles."""
 
 
 @dataclass(frozen=True)

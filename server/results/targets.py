@@ -29,7 +29,7 @@ from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.web.words import day
 
 FEWEST: Final = 5
-"""Strides below which a person's own mean and SD are no target (our choice)."""
+"""Minimum number of strides for using a patient's own mean and SD as a target (our choice)."""
 
 
 @dataclass(frozen=True, eq=False)

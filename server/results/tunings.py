@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 RESULT: Final = "tuning.json"
 TRIAL: Final = ".npz"
 BEHIND: Final = 10
-"""Added to the niceness of each thread that searches (a thread's own on Linux)."""
+"""Increment of the nice value of each search thread (per thread on Linux)."""
 SWARM: Final = ("particles", "iterations", "rounds", "random_rounds")
 
 
@@ -53,8 +53,8 @@ class TuningOrder:
     Parameters
     ----------
     validation : names of validation trials. scheme : adaptation of gains to the motion, None = default.
-    magnetometer : None = if the algorithm supports it. particles … random_rounds : of the swarm, None =
-    as in the thesis.
+    magnetometer : None = if the algorithm supports it. particles … random_rounds : of the swarm, None = as in
+        the thesis.
     """
 
     algorithm: str

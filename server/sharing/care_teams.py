@@ -27,11 +27,11 @@ from sagittal.server.storage.schema.tables import audit as audit_table
 from sagittal.server.storage.schema.tables import new_id, now, patient, session, user
 
 EMERGENCY: Final = dt.timedelta(hours=4)
-"""How long a patient stays open to who opened him or her in an emergency (our choice)."""
+"""Duration of emergency access (our choice)."""
 SHOWN: Final = dt.timedelta(days=90)
-"""How long the patient's page shows that; the audit log keeps it."""
+"""How long the patient's page shows it; the audit log retains it."""
 REASON: Final = (10, 500)
-"""Characters of a reason, at least and at most."""
+"""Minimum and maximum length of a reason."""
 _NOT_OF_A_TEAM: Final = (
     "emergency.opened",
     "emergency.ended",
@@ -39,7 +39,7 @@ _NOT_OF_A_TEAM: Final = (
     "patient.hidden",
     "study.exported",
 )
-"""Rows of the audit log that put nobody into a team: from outside it, or of a study over many visits."""
+"""Audit actions that do not make a user a team member: access from outside, or studies over many visits."""
 
 
 @dataclass(frozen=True)
@@ -172,8 +172,7 @@ def open_in_emergency(c: Connection, user: Identity, code: str, reason: str) -> 
     Raises
     ------
     NotFound : no patient has exactly this code. ServiceError bad_value : the reason is too short or too long.
-        Conflict
-    care_teams_off, seen_already.
+    Conflict : care_teams_off, seen_already.
     """
     if not are_on(c):
         raise Conflict(
@@ -206,7 +205,7 @@ def open_in_emergency(c: Connection, user: Identity, code: str, reason: str) -> 
         "ends_at": time + EMERGENCY,
     }
     c.execute(insert(emergency_access).values(**row, user_id=user.user_id))
-    # the reason stays with the patient, and goes when the patient is erased; the row of the log does not
+    # the reason is stored with the patient and deleted with it; the audit row remains
     detail = {"access": row["id"], "hours": EMERGENCY / dt.timedelta(hours=1)}
     audit.record(c, user, "emergency.opened", "patient", patient_id, detail)
     return _get_access(c, row["id"])
@@ -241,7 +240,7 @@ def end_emergency(c: Connection, user: Identity, access_id: str) -> EmergencyAcc
 
 def end_all_emergencies(c: Connection) -> None:
     """End all emergency accesses after a restore, since later changes to them are unknown."""
-    # those that are over too: the clock of this computer may be ahead
+    # including ended ones: the clock of this computer may be ahead
     unended = update(emergency_access).where(emergency_access.c.ended_at.is_(None))
     over = case((is_emergency_open(), now()), else_=emergency_access.c.ends_at)
     c.execute(unended.values(ended_at=over))

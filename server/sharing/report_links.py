@@ -31,7 +31,7 @@ from sagittal.server.storage.schema.tables import new_id, now, session, user
 MOST_DAYS: Final = 90
 USUAL_DAYS: Final = 14
 QUIET: Final = dt.timedelta(minutes=1)
-"""Openings of a link within this time are one."""
+"""Openings of a link within this time count as one."""
 
 
 @dataclass(frozen=True)
@@ -225,4 +225,4 @@ _WITH_MAKER: Final = (
     .join(signed_report, signed_report.c.id == report_link.c.report_id)
     .join(session, session.c.id == signed_report.c.session_id)
 )
-"""Ids of links, joined with their makers and sessions."""
+"""Ids of links, joined with their creators and sessions."""

@@ -24,9 +24,9 @@ from sagittal.server.storage.schema.report_tables import assessment, report_file
 from sagittal.server.storage.schema.tables import now, session
 
 MOST_CHARACTERS: Final = 10_000
-"""Of the reason to reopen a report."""
+"""Maximum length of the reason for reopening a report."""
 ASSESSMENT_CHARACTERS: Final = 420
-"""Of the therapist's text, as many as fit on the first sheet beside the profile."""
+"""Maximum length of the assessment, as many as fit on the first page next to the profile."""
 
 DOCUMENT: Final = "report.html"
 PSEUDONYMISED: Final = "shared.html"

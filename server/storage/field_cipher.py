@@ -116,7 +116,7 @@ def make_keys(path: Path) -> str:
 
 def add_key(path: Path) -> None:
     """Add a new key to a file, which encrypts from now on. Raises KeyUnusable."""
-    # a link leads to where the file is kept
+    # follow a link to the actual key file
     _write(path.resolve(), [os.urandom(32), *read_keys(path).keys.values()])
 
 

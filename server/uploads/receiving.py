@@ -156,8 +156,8 @@ def check_name(name: str) -> str:
 
 
 def _unprintable(name: str) -> bool:
-    # control characters, lone surrogates, marks that turn the direction of writing and so show another
-    # ending, and what stands for bytes that were no text; joiners stay, emoji are made of them
+    # control characters, lone surrogates, marks that reverse the text direction and disguise the extension,
+    # and stand-ins for undecodable bytes; joiners are kept, as emoji need them
     return any(
         unicodedata.category(c) in {"Cc", "Cs"}
         or unicodedata.bidirectional(c) in _TURNING

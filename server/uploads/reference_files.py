@@ -19,7 +19,7 @@ from sagittal.server.uploads.receiving import receive
 from sagittal.server.uploads.recordings import RecordedFile
 
 MOST_FILES: Final = 20
-"""References of a session (our choice)."""
+"""References per session (our choice)."""
 
 
 def list_files(c: Connection, session_id: str) -> list[RecordedFile]:

@@ -27,7 +27,7 @@ from sagittal.server.uploads import receiving, recordings
 from sagittal.server.uploads.recordings import RecordedFile
 
 ABANDONED: Final = dt.timedelta(days=1)
-"""An upload to which nothing was added for so long goes."""
+"""Uploads idle for longer than this are deleted."""
 
 
 @dataclass(frozen=True)
@@ -200,12 +200,12 @@ def finish(
         with db.read() as c:
             space = recordings.patient_of(c, session_id)
             receiving.check_set(c, settings, session_id, this.name, this.size)
-        # before the transaction: into a bucket it takes a while
+        # before the transaction: uploading to a bucket takes a while
         blobs.adopt(space, path, sha256)
         try:
             stored = _publish(db, blobs, settings, actor, session_id, this, sha256)
         except NotFound:
-            # erased meanwhile: nothing of it may wait, in the trash neither
+            # erased in the meantime: nothing of it may remain, not even in the trash
             fs.remove_file(path)
             references.discard(db, blobs, space, [sha256])
             raise

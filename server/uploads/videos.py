@@ -23,7 +23,7 @@ from sagittal.server.uploads.receiving import receive
 from sagittal.server.uploads.recordings import RecordedFile
 
 BEGINS: Final = 12
-"""Bytes that tell what a file is."""
+"""Number of initial bytes that identify the type of a file."""
 
 MOST_OFFSET_S: Final = 24 * 3600.0
 

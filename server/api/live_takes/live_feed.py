@@ -30,7 +30,7 @@ from sagittal.server.nodes.pins import Pin, find_owner
 router = APIRouter(include_in_schema=False)
 
 GONE = 4404
-"""Close code: there is no such session (any more)."""
+"""Close code: the session does not exist (any more)."""
 
 
 @router.websocket("/sessions/{sid}/live/feed")

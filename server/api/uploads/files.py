@@ -26,7 +26,7 @@ from sagittal.server.uploads import receiving, recordings
 router = APIRouter(prefix="/sessions/{session_id}/files", tags=["files"])
 
 CHUNK_BYTES = 1_000_000
-"""One thread hop and one write per megabyte, whatever pieces the network delivers."""
+"""One thread hop and one write per megabyte, independent of network packets."""
 
 FileName = Annotated[str, Path(max_length=2000, description="with folders; any Unicode")]
 RAW_BODY = {"content": {"application/octet-stream": {"schema": BINARY}}}
@@ -85,7 +85,7 @@ async def post_files(
         raise Problem(
             411, "length_required", "A form upload must state its length. Send a Content-Length header."
         )
-    # boundaries and part headers take some hundred bytes a file
+    # boundaries and part headers take some hundred bytes per file
     size = read_size(request, settings.max_set_bytes + 1000 * settings.max_files)
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise Problem(422, "no_form", "Expected multipart/form-data with the field 'files'.")

@@ -43,7 +43,7 @@ LIMITS: Final = {
     "gyro_noise": f"{GYRO_NOISE_ROSE:g}",
     "acc_noise": f"{ACC_NOISE_ROSE:g}",
 }
-"""Limits as the pages say them: °/s, %, %, times, times."""
+"""Limits as shown on pages: °/s, %, %, times, times."""
 
 
 @router.get("/sensors")

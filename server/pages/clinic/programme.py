@@ -32,7 +32,7 @@ STATE_WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "next": ("run", "Next"),
     "planned": ("none", "Planned"),
 }
-"""State of a planned visit → shape and word."""
+"""State of a planned visit → symbol and word."""
 
 
 @router.get("/patients/{pid}/programme")

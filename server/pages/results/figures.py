@@ -23,7 +23,7 @@ from sagittal.server.viewer.still import draw_still
 log = logging.getLogger(__name__)
 
 MOST_FRAMES: Final = 120_000
-"""A page would wait too long for the first picture of a walk of more, 20 min at 100 Hz."""
+"""Longer walks have no first frame, which would delay the page: 20 min at 100 Hz."""
 
 
 def draw_contact(

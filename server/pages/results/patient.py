@@ -77,7 +77,7 @@ def show_patient(
     trend = None
     if results:
         trained = next((w.content for w in written if w.ended_at is None), None)
-        with suppress(StoreAway):  # the visits say that they cannot be read; the next one can be begun
+        with suppress(StoreAway):  # the visits report that they are unreadable; a new one can be started
             history = histories.read_history(reviewed, patient, done, plans)
             trend = draw_figures(history, None if trained is None else trained.parameter)
     walked = histories.baseline([a for a in done if a.session.protocol in sessions.WALKS])

@@ -19,7 +19,7 @@ SECONDARY: Final = (
     "Regularity of the trunk",
     "Support in seconds",
 )
-"""Groups for those who look closer: folded on the page, not on paper."""
+"""Groups for detailed inspection: collapsed on the page, omitted in print."""
 
 MATTERING: Final = (
     "gait_speed_mps",
@@ -43,12 +43,12 @@ MATTERING: Final = (
     "step_count",
     "walking_duration_min",
 )
-"""What a therapist reads first, of what the sensors can give."""
+"""The most important parameters for a therapist, depending on the sensors."""
 
 FIRST_ROWS: Final = 10
 
 NOT_ON_PAPER: Final = ("swing_pct", "swing_time_s", "turning_angle_deg")
-"""What the rest of a stride leaves, and what a straight walk has none of."""
+"""Parameters redundant with others or absent in straight walking."""
 
 require_entries((*MATTERING, *NOT_ON_PAPER), "sagittal.server.pages.results.report_rows")
 

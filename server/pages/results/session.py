@@ -67,13 +67,14 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 SEVERITIES: Final = ("bad", "warn", "info")
 
 NO_STRIDE_CODES: Final = ("foot_missing", "no_strides", "few_steps")
-"""Notices that explain a take without strides."""
+"""Notices that explain a trial without strides."""
 
 OVERVIEW, CURVES, PAPER, VALUES = "session.html", "kinematics.html", "print.html", "_values.html"
 
 STRIP_STRIDES: Final = {OVERVIEW: 64, CURVES: 150}
-"""A longer walk has too many strides to be told apart beside the figure, and for the overview's 80 kB; the
-timeline shows them."""
+"""Longer walks have too many strides for the strip next to the avatar and for the overview's 80 kB; the
+timeline shows them.
+"""
 
 FIRST_CURVES: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 
@@ -93,7 +94,7 @@ SHOWN: Final = (
     "headline",
     "functional",
 )
-"""Members of ReportModel that templates use as they are."""
+"""Attributes of ReportModel used directly by templates."""
 
 
 @router.get("/sessions/{sid}")
@@ -314,7 +315,7 @@ def _follow(reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str
         return None
     visits: dict[dt.date, AnalysedVisit] = {}
     for a, kind in alike:
-        with suppress(IntegrityError, FormatError):  # its own page says what is wrong
+        with suppress(IntegrityError, FormatError):  # its own page reports the problem
             visit = histories.read_visit(reviewed, a, kind)
             if visit.numbers.verdict[0] != "bad":
                 visits[visit.performed_on] = visit

@@ -36,7 +36,7 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
 LEAFLET, COURSE = "leaflet.html", "course.html"
 CHART_HEIGHT: Final = 108
-"""In px, so that five rows of charts stand on a sheet."""
+"""In px, for five rows of charts per page."""
 
 
 @router.get("/sessions/{sid}/leaflet")

@@ -55,7 +55,7 @@ BASIS_WORDS: Final = {
 }
 
 KINDS: Final = {"error": "bad", "warning": "warn", "info": ""}
-"""Severity of a notice → its look."""
+"""Severity of a notice → style."""
 
 GONIOMETER: Final = (
     ("pelvis_tilt", "Anterior pelvic tilt"),
@@ -66,7 +66,7 @@ GONIOMETER: Final = (
     ("ankle_dorsiflexion_l", "Dorsiflexion, left"),
     ("ankle_dorsiflexion_r", "Dorsiflexion, right"),
 )
-"""Standing angles that the page asks for; the manifest takes all of `core.subject.standing_angles`."""
+"""Standing angles requested on the page; the manifest accepts all of `core.subject.standing_angles`."""
 
 TAPE: Final = (
     ("leg_m", "Leg", "Anterior superior iliac spine (ASIS) to medial malleolus, standing."),
@@ -77,7 +77,7 @@ TAPE: Final = (
     ("pelvis_width_m", "Pelvis, width", "Between the anterior superior iliac spines (ASIS)."),
     ("pelvis_depth_m", "Pelvis, depth", "Mid-ASIS to mid-PSIS; used together with the width."),
 )
-"""Lengths of `subject.measures` that the page asks for, and how they are taken."""
+"""Lengths of `subject.measures` requested on the page, with instructions."""
 
 LENGTHS: Final = tuple((name, label, *LIMITS[name], how) for name, label, how in TAPE)
 

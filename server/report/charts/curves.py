@@ -198,7 +198,7 @@ class _CyclePlot(PlotArea):
 
     def foot_offs(self, sides: Mapping[Side, SideCurve]) -> None:
         pct_by_side = {s: c.foot_off_pct for s, c in sides.items() if c.foot_off_pct is not None}
-        # labels stand on their lines, the earlier one to the left; close ones make room for each other
+        # labels are placed at their lines, the earlier one to the left; overlapping ones are shifted
         earlier = min(pct_by_side, key=lambda side: pct_by_side[side], default=None)
         close = len(pct_by_side) == 2 and max(pct_by_side.values()) - min(pct_by_side.values()) < _CLOSE_PCT
         for side, x in pct_by_side.items():

@@ -21,11 +21,11 @@ TOP, BOTTOM = 12, 34
 """Chart and its margins, px, the padding of `<div class="chart fb-plot">`."""
 
 FAR: Final = 6.0
-"""Values further than this many level widths beyond the zones lie on the edge of the chart."""
+"""Values further than this many level widths outside the zones are drawn at the edge of the chart."""
 
 
 NARROW: Final = 50.0
-"""Runs of strides narrower than this, of 1000, get no word: it would touch the next."""
+"""Runs of strides narrower than this, of 1000, have no label, as it would touch the next."""
 
 
 def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str:

@@ -31,7 +31,7 @@ NO_BAND: Final[Mapping[Zero, str]] = {
     "stride_mean": "No norm band: measured relative to its own mean over the stride, unlike the norm.",
     "anatomical": "No norm band: the norm is relative to standing.",
 }
-"""Zero of a curve → why none of the known bands may stand behind it."""
+"""Zero of a curve → why no known band is shown."""
 
 FEW_BAND: Final = Message(
     "No norm band: at least {COMPARED} strides per side are needed for a comparison.", COMPARED=COMPARED
@@ -39,7 +39,7 @@ FEW_BAND: Final = Message(
 """The same where no side has enough strides."""
 
 DRAWN_STRIDES: Final = 40
-"""Single strides drawn per side at most, spread over the take; more only make the page heavy."""
+"""Maximum of single strides drawn per side, spread over the trial; more would only enlarge the page."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ def same_zero(earlier: CurvePanel, later: CurvePanel) -> tuple[CurvePanel, Curve
     if earlier.zero == later.zero or None in (earlier.zero, later.zero):
         return earlier, later
     if "walking" in (earlier.zero, later.zero):
-        # a curve without a level is not drawn over one that has one
+        # a curve without an absolute level is not overlaid on one that has one
         return replace(earlier, sides={}, reason=reason_words("no_standing")), later
     return _from_standing(earlier), _from_standing(later)
 

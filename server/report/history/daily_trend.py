@@ -23,14 +23,14 @@ from sagittal.server.report.words.wording import format_number
 from sagittal.web.message_format import MONTHS
 
 LONG_BOUT_S: Final = 60.0
-"""Walks at home whose cadence is compared last at least so long: short ones turn and stop."""
+"""Minimum duration of walking bouts at home for comparing cadence: short ones include turns and stops."""
 
 PANEL_PX: Final = 96
 ROOM: Final = 0.06
-"""Part of the time axis left free at both ends."""
+"""Fraction of the time axis left free at both ends."""
 
 LABEL_SHARE: Final = 0.13
-"""Labels under the axis keep this share of its width from each other."""
+"""Minimum distance of labels under the axis, as a fraction of its width."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from sagittal.server.report.words.wording import format_number
 from sagittal.web.message_format import MONTHS
 
 HEIGHT: Final = 168
-"""px with margins."""
+"""px including margins."""
 
 
 def draw_device(

@@ -18,10 +18,10 @@ VERDICT_WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "redo": ("bad", "redo"),
     "not_judged": ("none", "not assessed"),
 }
-"""Verdict → its shape and its word."""
+"""Verdict → symbol and word."""
 
 WHOLE: Final = "take"
-"""Stands for the checks that no single sensor has."""
+"""Stands for checks of no single sensor."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ RIBBON_PX: Final = 52
 """Height of a day's ribbon."""
 
 SLOT_S: Final = 30
-"""A ribbon shows what fills most of every half minute; at 1000 px a pixel is almost three of them."""
+"""A ribbon shows the predominant activity of each half minute; at 1000 px a pixel covers almost three."""
 
 SLOTS: Final = int(DAY_S) // SLOT_S
 
@@ -40,7 +40,7 @@ LEVELS: Final[dict[ActivityKind, float]] = {
     "non_wear": 0.5,
     "gap": 0.5,
 }
-"""Height of the bar of each kind, share of the ribbon."""
+"""Height of the bar of each activity, fraction of the ribbon."""
 
 CSS: Final[dict[ActivityKind, str]] = {
     "lying": "ak-lie",
@@ -50,7 +50,7 @@ CSS: Final[dict[ActivityKind, str]] = {
     "stairs_up": "ak-walk",
     "stairs_down": "ak-walk",
 }
-"""Class of what is filled with a colour."""
+"""Class of coloured areas."""
 
 PATTERNS: Final[dict[ActivityKind, str]] = {
     "stairs_up": "ap-up",
@@ -59,7 +59,7 @@ PATTERNS: Final[dict[ActivityKind, str]] = {
     "non_wear": "ap-off",
     "gap": "ap-gap",
 }
-"""Pattern over the bar; the page has each once (web/templates/_daily_patterns.html)."""
+"""Pattern over the bar; defined once per page (web/templates/_daily_patterns.html)."""
 
 HOURS: Final = (0, 3, 6, 9, 12, 15, 18, 21, 24)
 LEAN_RANGE: Final = (-90.0, 90.0)

@@ -44,13 +44,13 @@ from sagittal.server.report.words.daily_words import (
 from sagittal.server.report.words.wording import format_number
 
 BIN_EDGES_S: Final = (10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
-"""Ends of the bins of walking bouts, s; the last bin is open."""
+"""Limits of the bins of walking bouts, s; the last bin is open."""
 
 EVENTS_SHOWN: Final = 300
-"""Rows of the list of transitions on the page; the file holds all."""
+"""Rows in the page's list of transitions; the file contains all."""
 
 COURSE_S: Final = 600
-"""The course of inclination is drawn in windows of this length, s."""
+"""Window length for drawing inclination, s."""
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ KINDS: Final[tuple[tuple[Kind, str, bool], ...]] = (
     ("off", "of these, while off, paused or without current data", True),
     ("stopped", "of these, after the end", True),
 )
-"""Kind of stride, its words, and whether it is a part of the one above."""
+"""Kind of stride, its label, and whether it is part of the row above."""
 
 _HOW_TO_READ: Final = (
     "Values are from the completed analysis; the zone is that of the level at each stride. Only strides "

@@ -30,10 +30,10 @@ HEADLINE: Final = (
     ("foot", "_inclination", "inclination of the foot"),
     ("pelvis", "_inclination", "inclination of the pelvis"),
 )
-"""What the sentence speaks of, the first that there is: name, ending, words."""
+"""Quantity of the sentence, the first available: name, ending, words."""
 
 CLEAR: Final = 1.05
-"""Room above the highest curve."""
+"""Margin above the highest curve."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def view_comparison(
     ran = sum(f["to_median"] is not None for f in data["filters"]) - 1
     rows = tuple(_row(f) for f in data["filters"])
     drawn: Mapping[str, Any] = spreads
-    if ran < 2:  # a single filter is its own median: 0° everywhere, which would read as agreement
+    if ran < 2:  # a single filter is its own median: 0° everywhere would look like agreement
         rows, drawn = tuple(replace(row, to_median=("", "")) for row in rows), {}
     return ComparisonView(
         headline=_headline(spreads, ran, len(data["segments"])),

@@ -34,7 +34,7 @@ TOTALS: Final = (
     "walk_6min_distance_m",
     "sway_rms_mps2",
 )
-"""The figure that stands for a test, by what was measured."""
+"""Main parameter of a test, by what was measured."""
 
 require_entries(TOTALS, "sagittal.server.report.view.functional")
 
@@ -50,7 +50,7 @@ SEGMENTS: Final[Mapping[str, str]] = {
     "slowing_down": "Slowing down",
     "standing": "Quiet standing",
 }
-"""Name of a segment → its words; minutes count themselves."""
+"""Name of a phase → label; minutes are numbered automatically."""
 
 MEANT: Final[Mapping[str, str]] = {
     "tug_duration_s": "From the first lean forward to the end of sitting down.",
@@ -59,10 +59,10 @@ MEANT: Final[Mapping[str, str]] = {
     "walk_6min_distance_m": "From the strides of the feet, turns included.",
     "sway_rms_mps2": "From the horizontal acceleration below 3.5 Hz; the forward direction is unknown.",
 }
-"""How the total of a test is meant."""
+"""Explanation of the total of a test."""
 
 TEST_NORM_NOTE: Final = "If a norm exists for the test, it is shown below its phases."
-"""Below the table of a test's parameters."""
+"""Shown below the table of a test's parameters."""
 
 NO_NORM: Final = "No norm: no published values for this test."
 NO_AGE: Final = "No norm: enter the year of birth."

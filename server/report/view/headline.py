@@ -36,13 +36,13 @@ from sagittal.server.report.words.wording import format_number, parameter_term
 Kind = Literal["norm", "limit", "sides", "change"]
 
 LARGEST: Final = 5.0
-"""Sizes are cut here: what is further off is not told first for being absurd."""
+"""Sizes are capped here, so that absurd values do not come first."""
 
 MOST: Final = 6
-"""Sentences on the page, changes among them."""
+"""Maximum number of sentences on the page, including changes."""
 
 KEPT: Final = 2
-"""Of them for changes, however much stands out; they also take what it leaves free."""
+"""Of these reserved for changes, which may also use free space."""
 
 
 @dataclass(frozen=True)

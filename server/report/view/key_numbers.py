@@ -31,7 +31,7 @@ KEY_NUMBERS: Final = (
 require_entries(KEY_NUMBERS, "sagittal.server.report.view.key_numbers")
 
 SHOWN_LARGE: Final = 4
-"""So many of them are shown, those that were measured."""
+"""Number displayed, of those measured."""
 
 
 @dataclass(frozen=True)

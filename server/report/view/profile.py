@@ -18,7 +18,7 @@ from sagittal.server.report.words.change_words import SCORE_TERMS
 from sagittal.server.report.words.wording import VARIABLES, format_number, reason_words
 
 SCALE_DEG: Final = 24.0
-"""Right end of the bars; a GVS of 24° is beyond any pathology in the tables."""
+"""Right end of the bars; a GVS of 24° exceeds all pathologies in the tables."""
 
 WIDTH: Final = 150
 
@@ -32,7 +32,9 @@ LABELS: Final = {v.name: v.label for v in VARIABLES} | {"foot_progression": "Foo
 PLANES: Final = {v.name: v.plane for v in VARIABLES}
 
 MODE: Final[Mode] = "offset_removed"
-"""Our angles start from the person's own standing, so levels say nothing; the shape does."""
+"""Our angles are relative to the patient's own standing posture, so offsets carry no information; the shape
+does.
+"""
 
 
 TOTALS: Final[tuple[tuple[str, Mode, str], ...]] = (
@@ -41,7 +43,7 @@ TOTALS: Final[tuple[tuple[str, Mode, str], ...]] = (
     ("gps_sagittal_deg", "raw", "Sagittal profile score, with levels"),
     ("gps_deg", "raw", "GPS"),
 )
-"""Profiles over several curves → their titles; those with levels need goniometer angles of standing."""
+"""Profiles over several curves → titles; those with offsets need goniometer angles in standing."""
 
 
 @dataclass(frozen=True)

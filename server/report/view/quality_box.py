@@ -273,7 +273,7 @@ def _calibration(
 ) -> list[QualityItem]:
     """Calibration method, number of checks passed, and zero of the angles."""
     if calibration is None:
-        # steps of a trunk sensor are read from it as it sits
+        # steps of a trunk sensor are measured without alignment
         return [] if not needed else [QualityItem("Calibration", "not reached", kind="bad")]
     method = CALIBRATION_METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
     if calibration.get("posture") == "walking" and calibration["method"] == "walking_direction":

@@ -19,7 +19,7 @@ from sagittal.server.report.files.columns import SCHEMA, reduce_to_plain, write_
 from sagittal.server.report.words.wording import format_number
 
 if TYPE_CHECKING:
-    # brings numba, which the web process does without
+    # imports numba, which the web process avoids
     from sagittal.core.frames import Floats, Side
     from sagittal.core.squat.sensitivity import SensitivityRow, SensitivityTable
 
@@ -36,14 +36,14 @@ TABLES: Final[tuple[tuple[str, tuple[int, ...], tuple[int, ...], str], ...]] = (
     ("Ankle and knee", (0, 1, 2, 3), (0, 1, 2), "Ankle average"),
     ("Hip", (4, 5, 6), (4, 5, 6), "Hip average"),
 )
-"""Title, columns, the columns that are averaged, and what their average is called."""
+"""Title, columns, averaged columns, and label of their average."""
 
 SHOWN: Final[Mapping[str, str]] = {
     "step": "delta_step_deg",
     "share": "delta_relative_deg",
     "quotient": "sensitivity_pct",
 }
-"""What a table shows → member of a row."""
+"""Displayed quantity → key of a row."""
 
 GROUPS: Final[tuple[tuple[str, Mapping[str, str]], ...]] = (
     (
@@ -86,7 +86,7 @@ GROUPS: Final[tuple[tuple[str, Mapping[str, str]], ...]] = (
         },
     ),
 )
-"""The paper's names in words, by what they are of."""
+"""The paper's names in words, by group."""
 
 
 def summarise_sensitivity(

@@ -112,7 +112,7 @@ def _place(s: Mapping[str, Any]) -> tuple[str, str]:
             ),
             "warn",
         )
-    # an older version did not say from when to when it could judge
+    # older versions did not store the period of the check
     if (duration_s := s.get("place_judged_s")) is None:
         return Message("Placement {NOT_JUDGED}", NOT_JUDGED=NOT_JUDGED), ""
     start, end = (format_number(x) for x in duration_s)

@@ -10,7 +10,7 @@ from sagittal.core.message import Message
 from sagittal.server.report.words.wording import format_number, place_words
 
 OFF_SD: Final = 2.0
-"""A place further from the nominal one than so many standard deviations is told."""
+"""Deviations from the nominal position above this number of standard deviations are reported."""
 
 AXES: Final = ("forward", "up", "outward")
 
@@ -58,7 +58,7 @@ JOINTS: Final = {
     ("right", "knee"): "Right knee",
     ("right", "ankle"): "Right ankle",
 }
-"""Side and joint → what it is called."""
+"""Side and joint → label."""
 
 
 def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
@@ -95,7 +95,7 @@ def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
 
 
 def _view_place(title: str, left: bool, stored: Mapping[str, Any], measured: Sequence[bool]) -> PlaceRow:
-    # outward is to the left on the left
+    # lateral is to the left on the left side
     out = (1.0, 1.0, -1.0 if left else 1.0)
     estimate, guess = ([a * b for a, b in zip(stored[k], out, strict=True)] for k in ("cm", "guess_cm"))
     spread = stored["sd_cm"]

@@ -35,16 +35,16 @@ VARIABLES: Final = (
     Variable("hip_adduction", "Hip adduction", "frontal", *ASIDE),
     Variable("hip_rotation", "Hip rotation", "transverse", *TURN),
 )
-"""Charts of a squat; the knee bends further than in walking, so the axes are their own."""
+"""Charts of a squat; the knee flexes more than in walking, so the axes differ."""
 
 NORM_NOTE: Final = "There is no norm for squats."
 
 SURE: Final = ("knee_flexion", "hip_flexion", "ankle_dorsiflexion")
-"""Of the others the level is not, or less surely, known (docs/science/squat.md, "Limits")."""
+"""Variables with a reliable offset (docs/science/squat.md, "Limits")."""
 
 
 UNSURE_FIGURES: Final = ("squat_knee_valgus", "squat_hip_adduction", "squat_hip_rotation")
-"""Beginnings of the figures that are read from these others."""
+"""Prefixes of parameters derived from the other variables."""
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ from sagittal.server.report.words.wording import (
 )
 
 NOBODY: Final = Norms(None, None)
-"""No reference people at all."""
+"""No reference group."""
 
 
 FEW_NOTE: Final = Message(
@@ -44,7 +44,7 @@ FEW_NOTE: Final = Message(
 
 
 BEYOND_SD: Final = 2.0
-"""A value further from the norm's mean is beyond what healthy people vary by."""
+"""z-score outside the normal range."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class ParameterRow:
         if self.norm_mean is None or self.norm_sd is None:
             marks = {key: cell.value for key, cell in cells.items() if cell is not None}
             return range_svg(marks, None, self.scale)
-        # a side of too few strides is not put over the norm of the other
+        # a side with too few strides is not shown with the norm of the other
         marks = {key: cell.value for key, cell in cells.items() if cell is not None and not cell.few}
         return range_svg(marks, (self.norm_mean, self.norm_sd), self.scale)
 

@@ -33,7 +33,7 @@ SCORE_TERMS: Final[Mapping[str, Term]] = {
         "GDI*, sagittal", "points", "Deviation from healthy adults", 0, (40, 120), ("larger", "smaller")
     ),
 }
-"""Scores that are followed over visits, after the parameters: shape of the curves, offsets removed."""
+"""Scores followed over visits, after the parameters: shape of the curves without offsets."""
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ KIND_WORDS: Final[Mapping[ActivityKind, str]] = {
     "non_wear": "no movement for at least half an hour, not even breathing",
     "gap": "the device stored no samples",
 }
-"""How each kind is told, in the words of its definition (docs/science/activity.md)."""
+"""Activity → how it is recognized, in the words of its definition (docs/science/activity.md)."""
 
 WALKED: Final[tuple[ActivityKind, ...]] = ("walking", "stairs_up", "stairs_down")
 
@@ -55,7 +55,7 @@ TOTALS: Final[Mapping[str, tuple[ActivityKind, ...]]] = {
     "Not worn": ("non_wear",),
     "Not recorded": ("gap",),
 }
-"""Columns of the totals → what they add up."""
+"""Columns of the totals → activities they sum."""
 
 TRANSITION_LABELS: Final[Mapping[TransitionKind, str]] = {
     "sit_to_stand": "Sit to stand",

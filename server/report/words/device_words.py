@@ -28,7 +28,7 @@ ADVICE: Final = {
     "gyro_noise": "Check strap and case. Tremor of the wearer has the same effect.",
     "acc_noise": "Check strap and case. Tremor of the wearer has the same effect.",
 }
-"""Quantity of a finding → what to do."""
+"""Quantity of a finding → remedy."""
 
 
 @dataclass(frozen=True)

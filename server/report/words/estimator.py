@@ -25,7 +25,7 @@ VERDICTS: Final[Mapping[str, str]] = {
     "bad": "inconsistent",
 }
 NOT_JUDGED: Final = "has no self-check"
-"""Of an estimator that has no quantity with a limit."""
+"""For an estimator without health limits."""
 
 REDUCED: Final[Mapping[str, str]] = {
     "sensor_failed": "reduced: a sensor failed in this trial",
@@ -60,7 +60,7 @@ QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
 """Name of a finding → label, decimals, unit."""
 
 HIDDEN: Final = ("min_eigenvalue",)
-"""For those who check numbers: in analysis.json, not on the page."""
+"""Measures for verification: in analysis.json, not on the page."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ TOTAL: Final[Mapping[str, str]] = {
     "standing_eyes_open": "sway_rms_mps2",
     "standing_eyes_closed": "sway_rms_mps2",
 }
-"""Guided protocol → the figure that stands for it."""
+"""Guided protocol → main parameter."""
 
 _UPRIGHT: Final = "The test has started. Keep standing still."
 
@@ -51,7 +51,7 @@ SAYS: Final[Mapping[str, Mapping[str, str]]] = {
         "running": Message("{UPRIGHT} Eyes closed.", UPRIGHT=_UPRIGHT),
     },
 }
-"""What the person is told: protocol → phase → words."""
+"""Instruction to the subject: protocol → phase → words."""
 
 HINTS: Final[Mapping[str, str]] = {
     "tug": "The clock starts with the first lean forward and stops when the person sits again.",
@@ -65,7 +65,7 @@ HINTS: Final[Mapping[str, str]] = {
         "Press Go. The clock starts after two seconds of quiet standing and stops after 30 s."
     ),
 }
-"""How a test begins and ends."""
+"""Start and end of a test."""
 
 OVER: Final = "The test is over. You may rest."
 
