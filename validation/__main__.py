@@ -59,7 +59,7 @@ class Unit:
 def list_units() -> list[Unit]:
     """All units of the validation, in the order in which they run."""
     units = []
-    for part, folder, alone in (
+    for part, folder, single in (
         ("accuracy", "validation/accuracy", False),
         ("bench", "validation/bench", True),
         ("faults", "tests/faults", False),
@@ -67,7 +67,7 @@ def list_units() -> list[Unit]:
     ):
         for path in sorted((ROOT / folder).glob("test_*.py")):
             name = str(path.relative_to(ROOT))
-            units.append(Unit(part, name, (name,), alone))
+            units.append(Unit(part, name, (name,), single))
     units.append(Unit("bench", "tests", ("tests", "-m", "bench"), alone=True))
     for path in sorted((ROOT / "tests").rglob("test_*.py")):
         if SWEEP.search(path.read_text("utf-8")):
@@ -183,8 +183,8 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         "--within", type=float, default=float("inf"), metavar="S", help="start no unit after S seconds"
     )
     options = parser.parse_args(arguments)
-    known = {*parts, *(u.name for u in list_units())}
-    if unknown := [p for p in options.part if p not in known]:
+    reference = {*parts, *(u.name for u in list_units())}
+    if unknown := [p for p in options.part if p not in reference]:
         parser.error(f"no part or unit is called {', '.join(unknown)}; --list lists them")
     if options.write and options.sample:
         parser.error("--write needs all cases: leave out --sample")
@@ -192,7 +192,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run what the command line asks for; 1 if a unit failed."""
+    """Run the requested units; 1 if one failed."""
     options = parse(arguments)
     units = [u for u in list_units() if not options.part or {u.part, u.name} & set(options.part)]
     if options.tenth is not None:

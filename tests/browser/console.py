@@ -17,7 +17,7 @@ ASSETS: Final = ("/static/", "/texts/", "/views/client/")
 
 
 class Console:
-    """Collects what the pages of all watched browsers say."""
+    """Collect console messages of all watched browsers."""
 
     def __init__(self) -> None:
         self._messages: list[str] = []
@@ -54,7 +54,7 @@ class Console:
 
 
 def is_expected(text: str, address: str) -> bool:
-    """Tell whether the browser, not a page, says this of what a test provokes: a refusal or a lost line."""
+    """Whether a browser message results from a provoked refusal or lost connection."""
     if text.startswith("Failed to load resource"):
         return not urlsplit(address).path.startswith(ASSETS) or "net::ERR" in text
     if text.startswith(READBACK):

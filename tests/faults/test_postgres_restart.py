@@ -31,7 +31,7 @@ async def test_a_restart_of_postgresql_costs_a_sentence_and_no_work(
                 waiting = clinic.submit()
                 until(reached.exists)
                 path = f"/api/v1/patients/{clinic.patient.id}"
-                before = (await client.get(path)).raise_for_status().json()
+                initial_body = (await client.get(path)).raise_for_status().json()
                 with stopped_server():
                     away = [
                         await client.get(path),
@@ -40,7 +40,7 @@ async def test_a_restart_of_postgresql_costs_a_sentence_and_no_work(
                 gate.touch()
                 assert [answer.status_code for answer in away] == [503, 503]
                 assert {answer.json()["code"] for answer in away} == {"database_busy"}
-                assert (await client.get(path)).raise_for_status().json()["id"] == before["id"]
+                assert (await client.get(path)).raise_for_status().json()["id"] == initial_body["id"]
                 added = await client.post("/api/v1/patients", json={"code": "P-2"})
                 assert added.status_code == 201
                 ended = [clinic.ended(view) for view in (held, waiting)]

@@ -98,10 +98,10 @@ def test_a_file_swept_before_its_row_was_written_is_noticed(clinic: Clinic) -> N
         clinic.db, clinic.blobs, clinic.settings, None, clinic.session.id, "b.txt"
     ) as upload:
         upload.write(b"content")
-        kept = upload._receiver.keep
+        stored_keep = upload._receiver.keep
 
         def keep_and_lose() -> object:
-            blob = kept()
+            blob = stored_keep()
             clinic.blobs.path(clinic.patient.id, blob.sha256).unlink()
             return blob
 

@@ -1,4 +1,4 @@
-"""What a clinician would read off a walk, from its truth: medians over the steady strides of one side."""
+"""Clinical gait features from ground truth: medians over the steady strides of one side."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The L7S step in 27 × 27 matrices, equation by equation: what the compiled step is held against."""
+"""L7S step with 27 × 27 matrices, equation by equation, as a reference for the compiled step."""
 
 from __future__ import annotations
 

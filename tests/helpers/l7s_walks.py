@@ -1,7 +1,7 @@
-"""Simulated walks for L7S with their truth, and its scores against it as Sy 2021 §III-B defines them.
+"""Simulated walks for L7S with ground truth, and scores after Sy 2021 §III-B.
 
-Sensors sit on skin, are mounted at random and have the errors of docs/science/simulation.md. Calibration,
-orientations and stillness come from the signals alone; only the body's lengths are known, as in the paper.
+Sensors are on skin, randomly oriented, with the errors of docs/science/simulation.md. Calibration,
+orientations and stillness come from the signals; only body lengths are known, as in the paper.
 """
 
 from __future__ import annotations
@@ -86,12 +86,12 @@ class Trial:
 
 def steps_of(calibrated: CalibratedRecording) -> dict[Side, Bools]:
     """Where each foot rests, by the rule on its own signals."""
-    found: dict[Side, Bools] = {}
+    result: dict[Side, Bools] = {}
     for side in SIDES:
         x = calibrated.recording.sensors[FOOT[side]]
         gyr = x.gyr - calibrated.calibration.segments[FOOT[side]].gyro_bias
-        found[side] = still_samples(x.acc, gyr, x.valid, calibrated.recording.rate_hz, FOOT_STILL)
-    return found
+        result[side] = still_samples(x.acc, gyr, x.valid, calibrated.recording.rate_hz, FOOT_STILL)
+    return result
 
 
 def trial_of(recording: UniformRecording, truth: WalkTruth) -> Trial:
@@ -124,7 +124,7 @@ def turned_headings(of: Trial, by_deg: Mapping[Segment, float]) -> Trial:
 
 
 def straight_cycles(truth: WalkTruth) -> list[tuple[Side, float, float]]:
-    """Side, start and end in s of the strides straight ahead, without the short ones beside standing."""
+    """Side, start and end in s of straight strides, without the short ones next to standing."""
     typical = float(np.median([s.length_m for s in truth.strides]))
     return [
         (s.side, s.start_s, s.end_s)
@@ -137,25 +137,25 @@ def raw_angles(poses: Poses, calibrated: CalibratedRecording) -> dict[str, Float
     """Angles (n,) by name in degrees, not zeroed."""
     q = dict(poses.q)
     posed = Orientations(poses.t_s, poses.rate_hz, q, dict.fromkeys(q, np.ones_like(poses.valid)), "")
-    found = measure_angles(posed, calibrated.calibration.zero)
-    return {name: np.degrees(x + found.zero_offset[name]) for name, x in found.angles.items()}
+    angles = measure_angles(posed, calibrated.calibration.zero)
+    return {name: np.degrees(x + angles.zero_offset[name]) for name, x in angles.angles.items()}
 
 
 def cycle_scores(of: Trial, poses: Poses) -> Floats:
     """RMSE in ° (offset removed) and correlation (cycles, 3, 2) of the straight gait cycles of both legs."""
-    found, rate = raw_angles(poses, of.calibrated), poses.rate_hz
+    result, rate = raw_angles(poses, of.calibrated), poses.rate_hz
     scores = []
     for side, start_s, end_s in straight_cycles(of.truth):
         part = slice(round(start_s * rate), round(end_s * rate))
-        scores.append([_score(found, of.truth, f"{name}_{SUFFIX[side]}", part) for name in FLEXION])
+        scores.append([_score(result, of.truth, f"{name}_{SUFFIX[side]}", part) for name in FLEXION])
     return np.array(scores)
 
 
 def trial_scores(of: Trial, poses: Poses) -> Floats:
     """The same (3, 2) over everything between the first and the last standing, mean of the legs."""
-    found, rate, stands = raw_angles(poses, of.calibrated), poses.rate_hz, of.truth.stands
+    result, rate, stands = raw_angles(poses, of.calibrated), poses.rate_hz, of.truth.stands
     part = slice(round(stands[0][1] * rate), round(stands[-1][0] * rate))
-    scores = [[_score(found, of.truth, f"{n}_{e}", part) for n in FLEXION] for e in "lr"]
+    scores = [[_score(result, of.truth, f"{n}_{e}", part) for n in FLEXION] for e in "lr"]
     return np.asarray(np.mean(scores, axis=0))
 
 
@@ -165,10 +165,10 @@ def _score(found: Mapping[str, Floats], truth: WalkTruth, name: str, part: slice
 
 
 def pose_errors(of: Trial, poses: Poses) -> tuple[float, float]:
-    """e_pos in cm of hips, knees and ankles from mid-pelvis, e_ori in ° of the segments without a sensor.
+    """e_pos in cm of hips, knees and ankles from mid-pelvis, e_ori in ° of segments without a sensor.
 
-    Sy 2021 eq 45 and 46 (with the transpose that print lost) between the first and the last standing. Our
-    world has a heading of its own, so it is turned by the mean difference of the feet's.
+    Sy 2021 eq 45 and 46 (with the transpose missing in print) between first and last standing, after aligning
+    the mean heading of the feet.
     """
     rate, stands, truth = poses.rate_hz, of.truth.stands, of.truth
     part = slice(round(stands[0][1] * rate), round(stands[-1][0] * rate))
@@ -198,12 +198,12 @@ def _heading(q: Floats) -> Floats:
 def edges(of: Trial, side: Side) -> np.ndarray:
     """First flagged sample of the foot's rest after each of its contacts: the paper's edges of step flags."""
     contacts, step, rate = of.truth.contacts[side], of.steps[side], of.calibrated.recording.rate_hz
-    found = []
+    result = []
     for contact, release in zip(contacts.contact, np.append(contacts.release[1:], np.inf), strict=True):
         first, last = round(contact * rate), round(min(release * rate, len(step)))
         rests = np.flatnonzero(step[first:last])
-        found += [first + rests[0]] if len(rests) else []
-    return np.array(found)
+        result += [first + rests[0]] if len(rests) else []
+    return np.array(result)
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,5 +223,5 @@ class Strides:
 def strides_of(of: Trial, poses: Poses, side: Side) -> Strides:
     """Distances of the ankle in the floor's plane between edges of step flags (Sy 2021 §III-B.3)."""
     k, foot = edges(of, side), FOOT[side]
-    found, true = (np.linalg.norm(np.diff(p[foot][k, :2], axis=0), axis=1) for p in (poses.p, of.truth.p))
-    return Strides(found, true, np.diff(k) / poses.rate_hz)
+    result, true = (np.linalg.norm(np.diff(p[foot][k, :2], axis=0), axis=1) for p in (poses.p, of.truth.p))
+    return Strides(result, true, np.diff(k) / poses.rate_hz)

@@ -29,7 +29,7 @@ Samples = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class LiveTake:
-    """What a tablet sent."""
+    """Messages of a tablet."""
 
     hello: Hello
     batches: tuple[SampleBatch, ...]
@@ -92,20 +92,20 @@ def sensor_samples(stream: ImuStream) -> Samples:
 def shared(
     recording: Recording, start_us: int = 1_000_000, number: int = 0, clock: Clock = "shared"
 ) -> Device:
-    """All worn sensors of a recording on one clock; a row that a sensor does not have is NaN."""
-    worn = [(d, s) for d, s in recording.segments.items() if s is not None]
-    rate = recording.streams[worn[0][0]].rate_hz
-    rows = {d: np.rint(recording.streams[d].t_s * rate).astype(np.int64) for d, _ in worn}
+    """All sensors of a recording on one clock; missing rows are NaN."""
+    segments = [(d, s) for d, s in recording.segments.items() if s is not None]
+    rate = recording.streams[segments[0][0]].rate_hz
+    rows = {d: np.rint(recording.streams[d].t_s * rate).astype(np.int64) for d, _ in segments}
     ticks = np.unique(np.concatenate(list(rows.values())))
-    samples = np.full((len(ticks), len(worn), 9), np.nan, np.float32)
-    for i, (d, _) in enumerate(worn):
+    samples = np.full((len(ticks), len(segments), 9), np.nan, np.float32)
+    for i, (d, _) in enumerate(segments):
         samples[np.searchsorted(ticks, rows[d]), i] = sensor_samples(recording.streams[d])
-    info = StreamInfo(number, rate, clock, tuple(SensorInfo(d, s) for d, s in worn))
+    info = StreamInfo(number, rate, clock, tuple(SensorInfo(d, s) for d, s in segments))
     return Device(info, start_us + np.rint((ticks - ticks[0]) * 1e6 / rate).astype(np.int64), samples)
 
 
 def send(devices: Sequence[Device], n: int = 10, take: str = "take") -> LiveTake:
-    """Batches of up to n samples in order of sending; a hole that no offsets tell begins a new batch."""
+    """Batches of up to n samples in sending order; a gap without offsets starts a new batch."""
     sent: list[tuple[int, int, SampleBatch]] = []
     for d in devices:
         step = 1e6 / d.info.rate_hz

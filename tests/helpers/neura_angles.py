@@ -26,7 +26,7 @@ PLANES = (
 
 @dataclass(frozen=True)
 class Score:
-    """Agreement of one angle in degrees: as it is, standing zeroed, offset removed, and correlation."""
+    """Agreement of one angle in degrees: raw, zeroed at standing, offset removed, and correlation."""
 
     raw: float
     zeroed: float

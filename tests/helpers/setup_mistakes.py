@@ -1,4 +1,4 @@
-"""Mistakes in the set-up of a right take: who wears what, how sensors sit, their axes, units and signs."""
+"""Set-up mistakes on a correct trial: labels, alignment, axes, units and signs."""
 
 from __future__ import annotations
 
@@ -41,20 +41,20 @@ def change_axes(
 
 
 def exchange_labels(recording: Recording, names: Mapping[Segment, Segment]) -> Recording:
-    """Sensors that are said to be worn elsewhere: true segment → stated one."""
+    """Sensors with wrong labels: true segment → stated one."""
     stated = {d: None if s is None else names.get(s, s) for d, s in recording.segments.items()}
     return replace(recording, segments=stated)
 
 
 def apply_repair(recording: Recording, repair: SetupRepair) -> Recording:
-    """The recording as it is read with the repaired manifest."""
+    """Recording read with the repaired manifest."""
     streams, _ = correct_streams(recording.streams, repair.corrections)
     segments = {d: repair.segments.get(d, s) for d, s in recording.segments.items()}
     return replace(recording, streams=streams, segments=segments)
 
 
 def look_at(recording: Recording) -> tuple[SetupRepair | None, SensorExchange | None]:
-    """What the stage `agreement` proposes and what it exchanges by itself, without the stages behind."""
+    """Proposal and automatic corrections of the stage `agreement`, without later stages."""
     uniform, params = synchronise(recording), AgreementParams()
     repair = propose_repair(recording, uniform, agreement=params)
     if repair is not None:

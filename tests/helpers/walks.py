@@ -67,13 +67,13 @@ def neura_walk() -> UniformRecording:
 
 @keep_recorded
 def neura_analysis() -> TakeAnalysis:
-    """What the product makes of it."""
+    """Analysis of the walk."""
     return analyse(neura_recording())
 
 
 @keep
 def analysed(name: str, seed: int = 0) -> TakeAnalysis:
-    """What the product makes of a named script."""
+    """Analysis of a named script."""
     return analyse(simulate_scenario(name, seed).recording)
 
 

@@ -1,4 +1,4 @@
-"""Many patients with many analysed visits in a clinic, written in bulk: what a page costs once it is full."""
+"""Bulk creation of many patients with analysed visits, for page cost measurements."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ def fill(
     *,
     controls: bool = False,
 ) -> list[list[str]]:
-    """Add people who came on `visits` days each; returns the sessions of every person, oldest first.
+    """Add people with one visit on each of `visits` days; return each person's sessions, oldest first.
 
     Parameters
     ----------
-    results : files of every visit's analysis; None = an analysis whose files nobody can open.
-    controls : the people serve as reference of the clinic.
+    results : analysis files of every visit; None = unreadable files.
+    controls : the people serve as the clinic's reference.
     """
     rows: Rows = {table: [] for table in TABLES}
     people = []
@@ -64,9 +64,9 @@ def fill(
         stored = {name: blobs.put(person, content) for name, content in (results or {}).items()}
         people.append([_visit(rows, person, day, stored) for day in range(visits)])
     with clinic.db.write() as c:
-        for table, made in rows.items():
-            if made:
-                c.execute(insert(table), made)
+        for table, result in rows.items():
+            if result:
+                c.execute(insert(table), result)
     return people
 
 
@@ -107,7 +107,7 @@ def _visit(rows: Rows, person: str, day: int, stored: Mapping[str, Blob]) -> str
 
 @contextlib.contextmanager
 def statements() -> Iterator[list[str]]:
-    """Every statement that is sent for what is asked meanwhile, but for what begins a transaction."""
+    """SQL statements executed meanwhile, without those that begin transactions."""
     sent: list[str] = []
 
     def note(c: object, cursor: object, statement: str, *rest: object) -> None:

@@ -1,4 +1,4 @@
-"""A recording of daily life whose every minute is known, as the monitor would tell it, and as files."""
+"""Daily-life recording with known activity in every minute, as monitor result and as files."""
 
 from __future__ import annotations
 

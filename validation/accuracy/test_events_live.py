@@ -24,10 +24,12 @@ def streamed(here: Orientations, side: Side, block: int) -> list[tuple[str, floa
     events: list[tuple[str, float, float]] = []
     for first in range(0, len(s), block):
         part = slice(first, first + block)
-        for kind, index, known, offset in zip(*advance_foot_pitch(state, s[part], valid[part]), strict=True):
-            assert first <= known < first + block, "an event is told in the block in which it is known"
+        for kind, index, reference, offset in zip(
+            *advance_foot_pitch(state, s[part], valid[part]), strict=True
+        ):
+            assert first <= reference < first + block, "an event is told in the block in which it is known"
             time = float(here.t_s[index] + offset / here.rate_hz)
-            events.append((KINDS[kind], time, float(here.t_s[known])))
+            events.append((KINDS[kind], time, float(here.t_s[reference])))
     return events
 
 

@@ -1,8 +1,7 @@
 """Steps of one lower-back sensor against INDIP on mobgap_lowback, and against the feet on neura_walk.
 
-Nothing was fitted on these recordings: the scale of the Gaussian is 64 ms at the step time of Test5
-(docs/science/trunk-steps.md, "Parameters"), the least prominence lies on a plateau (0.15 to 0.4 m/s² give the
-same F1).
+Not fitted to these recordings, except that the Gaussian's scale is 64 ms at the step time of Test5
+(docs/science/trunk-steps.md, "Parameters"); prominences of 0.15 to 0.4 m/s² give the same F1.
 """
 
 from __future__ import annotations
@@ -121,7 +120,7 @@ def test_write_down_the_figures() -> None:
     for trial in TRIALS:
         results = [score for t, _, score in scores() if t == trial]
         walks = periods(trial)
-        counted, reference = sum(len(inside(trial, p)) for p in walks), sum(len(p.contacts) for p in walks)
+        total, reference = sum(len(inside(trial, p)) for p in walks), sum(len(p.contacts) for p in walks)
         errors = np.concatenate([r.errors for r in results])
         ours, theirs = (
             cadence([np.array(inside(trial, p)) for p in walks]),
@@ -132,11 +131,11 @@ def test_write_down_the_figures() -> None:
             (
                 " ".join(trial),
                 f"{f1(results):.2f}",
-                f"{counted}/{reference}",
+                f"{total}/{reference}",
                 f"{ours:.1f}/{theirs:.1f}",
                 f"{1e3 * np.mean(errors):+.0f}",
                 f"{1e3 * np.std(errors, ddof=1):.0f}",
-                str(len(sides) - counted),
+                str(len(sides) - total),
                 f"{len(sides) - sides.count(None)}",
             )
         )

@@ -92,7 +92,7 @@ def scored(name: str, adjoint: Adjoint) -> Floats:
 
 
 def test_each_departure_from_print_pays_on_a_simulated_walk() -> None:
-    """Factors of the mean RMSE of the three joints, with the printed adjoint: half of what was reached."""
+    """Factors of the mean RMSE of the three joints, with the printed adjoint: half of those reached."""
     ours = scored("ours", "printed")[:, 0].mean()
     for name, factor in (
         ("no constraints", 1.2),
@@ -105,8 +105,8 @@ def test_each_departure_from_print_pays_on_a_simulated_walk() -> None:
 
 
 def test_a_second_projection_changes_no_angle() -> None:
-    once, twice = (scored(n, "printed") for n in ("one projection, as in the paper", "ours"))
-    np.testing.assert_allclose(once, twice, atol=0.1)
+    single, twice = (scored(n, "printed") for n in ("one projection, as in the paper", "ours"))
+    np.testing.assert_allclose(single, twice, atol=0.1)
 
 
 @whole_only

@@ -1,6 +1,7 @@
-"""Steps of one lower-back sensor on ipol_walks, against the contacts of the feet that people checked.
+"""Steps of one lower-back sensor on ipol_walks against manually checked foot contacts.
 
-The walks have a turn, in which steps are easily missed; the feet before and after it are told on their own.
+The walks contain a turn, in which steps are easily missed; sides before and after it are determined
+separately.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ WINDOW_S = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Steps of one walk against the checked contacts: pairs, number, told feet and how many are right."""
+    """Steps of one walk against the checked contacts: pairs, number, reported and correct sides."""
 
     score: Score
     steps: int
@@ -56,9 +57,9 @@ def test_the_steps_are_those_of_the_feet() -> None:
 
 
 def test_a_foot_that_is_told_is_the_right_one() -> None:
-    told = sum(found(w).told for w in WALKS)
-    assert told >= 300
-    assert sum(found(w).right for w in WALKS) >= 0.99 * told
+    total = sum(found(w).told for w in WALKS)
+    assert total >= 300
+    assert sum(found(w).right for w in WALKS) >= 0.99 * total
 
 
 def test_the_figures_are_in_the_document() -> None:

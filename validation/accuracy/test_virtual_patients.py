@@ -1,7 +1,7 @@
-"""What the whole chain tells of the virtual people beside what they did: figures for validation/report.md.
+"""Results of the whole chain on virtual people against their truth: figures for validation/report.md.
 
-A deviation that the analysis loses, exaggerates or invents would show here; how well it does on patients does
-not (docs/science/simulation.md).
+Deviations that the analysis loses, exaggerates or invents appear here; accuracy on patients does not
+(docs/science/simulation.md).
 """
 
 from __future__ import annotations
@@ -65,11 +65,11 @@ def told(found: TakeAnalysis, side: Side) -> Told:
 def test_what_is_told_of_each_person_is_what_the_person_did() -> None:
     rows = []
     for name in WALKING:
-        made = simulate_scenario(name, SEED)
-        found = analyse(made.recording)
-        assert found.problem is None, name
-        did = {side: true(made.truth, side) for side in SIDES}
-        says = {side: told(found, side) for side in SIDES}
+        simulation = simulate_scenario(name, SEED)
+        analysis = analyse(simulation.recording)
+        assert analysis.problem is None, name
+        did = {side: true(simulation.truth, side) for side in SIDES}
+        says = {side: told(analysis, side) for side in SIDES}
         for side in SIDES:
             assert abs(says[side].step_m - did[side].step_m) < STEP_M, (name, side)
             assert abs(says[side].stance_pct - did[side].stance_pct) < STANCE_PCT, (name, side)
@@ -102,8 +102,8 @@ def test_what_is_told_of_each_person_is_what_the_person_did() -> None:
 
 @pytest.mark.parametrize("seed", [7, 8])
 def test_a_severe_shuffle_is_refused_and_not_guessed(seed: int) -> None:
-    found = analysed("severe_shuffle", seed)
-    assert "no_toe_off" in {n.code for n in found.notices}
-    figures = [p for p in found.parameters if p.name in ("stride_time_s", "stance_pct")]
+    result = analysed("severe_shuffle", seed)
+    assert "no_toe_off" in {n.code for n in result.notices}
+    figures = [p for p in result.parameters if p.name in ("stride_time_s", "stance_pct")]
     assert [(p.mean, p.reason) for p in figures] == [(None, "no_strides")] * len(figures)
     assert len(figures) >= 2

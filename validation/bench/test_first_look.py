@@ -1,4 +1,4 @@
-"""What a first look costs: a session page beside many controls, and a large table before it is described."""
+"""Cost of first views: a session page with many controls, and a large undescribed table."""
 
 from __future__ import annotations
 

@@ -45,6 +45,6 @@ async def test_a_search_among_ten_thousand_visits_answers_at_once(tmp_path: Path
                     (await client.get(path.format(code=code))).raise_for_status()
                     took.append(time.perf_counter() - began)
                 quickest[what] = min(took)
-    found = ", ".join(f"{what} {1e3 * s:.0f} ms" for what, s in quickest.items())
-    sys.stdout.write(f"{'PostgreSQL' if url else 'SQLite'}: {found}\n")
+    text = ", ".join(f"{what} {1e3 * s:.0f} ms" for what, s in quickest.items())
+    sys.stdout.write(f"{'PostgreSQL' if url else 'SQLite'}: {text}\n")
     assert max(quickest.values()) <= SEARCH_S

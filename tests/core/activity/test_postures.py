@@ -18,8 +18,8 @@ def decide(
     candidates: list[TransitionCandidate] | None = None,
     limit: float = 1e9,
 ) -> tuple[list[tuple[str, float | None]], list[bool]]:
-    spans, judged = decide_postures(100.0, WALKS, [], transitions, candidates or [], limit)
-    return [(s.kind, s.confidence) for s in spans[1:-1]], [t.consistent for t in judged]
+    spans, verdict = decide_postures(100.0, WALKS, [], transitions, candidates or [], limit)
+    return [(s.kind, s.confidence) for s in spans[1:-1]], [t.consistent for t in verdict]
 
 
 def test_both_ends_agree_on_standing_and_sitting() -> None:

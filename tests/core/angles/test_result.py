@@ -1,4 +1,4 @@
-"""Joints of a leg, signs of their angles, and which angles nobody measures."""
+"""Joints of a leg, signs of their angles, and unmeasured angles."""
 
 from __future__ import annotations
 

@@ -44,8 +44,8 @@ def standing(analysis: TakeAnalysis) -> slice:
 @pytest.mark.sweep
 @pytest.mark.parametrize("width", [0.1, 0.3])
 def test_the_figure_stands_as_wide_as_measured(width: float) -> None:
-    made = analysed(width)
-    assert apart_m(made)[standing(made)].mean() == pytest.approx(width, abs=0.02)
+    result = analysed(width)
+    assert apart_m(result)[standing(result)].mean() == pytest.approx(width, abs=0.02)
 
 
 @pytest.mark.slow

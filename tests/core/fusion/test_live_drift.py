@@ -47,11 +47,11 @@ def test_headings_are_held_over_five_minutes_and_turns_are_not_taken_for_drift()
     for i, rate in ((1, 6.0), (2, -4.0)):
         assert abs(apart(q, i, last) - apart(q, i, first)) > 3.5 * abs(rate)
         assert abs(apart(held, i, last) - apart(held, i, first)) < 3.0
-    again = q.copy()
+    second_duplicate = q.copy()
     hold = HeadingHold(("pelvis", "foot_l", "foot_r"), RATE, MOVING)
     for k in in_blocks(n, 5):
-        hold.push(again[k], gyr[k], valid[k])
-    np.testing.assert_array_equal(again, held)
+        hold.push(second_duplicate[k], gyr[k], valid[k])
+    np.testing.assert_array_equal(second_duplicate, held)
 
 
 def test_a_segment_alone_has_nothing_to_be_held_to() -> None:

@@ -100,20 +100,20 @@ def test_people_who_lack_a_side_or_a_joint_are_scored_by_what_they_have() -> Non
             scores: dict[Side, dict[str, float]] = {side: {} for side in SIDES}
             for side, own in this.items():
                 for variable, curve in own.items():
-                    others = [
+                    other_averages = [
                         np.mean([of[variable] for of in person.values() if variable in of], axis=0)
                         for person in group
                         if person is not this and any(variable in of for of in person.values())
                     ]
-                    scores[side][variable] = float(gvs(curve, np.mean(others, axis=0), mode))
+                    scores[side][variable] = float(gvs(curve, np.mean(other_averages, axis=0), mode))
                     expected.setdefault(variable, []).append(scores[side][variable])
             for name, variables in PROFILES.items():
                 values = {
                     f"{name}_side": [side_profile(scores[side], variables) for side in SIDES],
                     f"{name}_overall": [overall_profile(scores, variables)],
                 }
-                for part, found in values.items():
-                    expected.setdefault(part, []).extend(x for x in found if x is not None)
+                for part, result in values.items():
+                    expected.setdefault(part, []).extend(x for x in result if x is not None)
         assert 1 < len(expected["gps_side"]) < 2 * len(expected["gps_overall"]) + 4 < 2 * len(group)
         spreads = leave_one_out(group)[mode]
         assert set(spreads) == set(expected)

@@ -1,4 +1,4 @@
-"""Radio hiccups of one foot while somebody walks: what still counts is as without them, or it is withheld."""
+"""Radio dropouts of one foot in walking: counted parameters are unchanged, or suppressed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def take(walk: str, worn: str) -> UniformRecording:
 
 
 def strides_of(recording: UniformRecording) -> list[LiveStride]:
-    """As they were told last."""
+    """Last reported version of each stride."""
     return list({s.n: s for f in live(recording)[1] for s in f.strides}.values())
 
 
@@ -74,7 +74,7 @@ def disturbed(
 
 
 def find_wrong(found: list[LiveStride], whole: list[LiveStride]) -> list[tuple[object, ...]]:
-    """Counted figures that are beyond `TOLERANCE`, and counted strides that nobody made."""
+    """Counted parameters beyond `TOLERANCE`, and counted strides that do not exist."""
     wrong: list[tuple[object, ...]] = []
     for s in (s for s in found if s.counted):
         same = [x for x in whole if x.side == s.side and abs(x.end_s - s.end_s) < SAME_S]
@@ -116,10 +116,10 @@ def test_a_hiccup_leaves_no_wrong_number_that_counts(
     walk: str, worn: str, segment: Segment, fault: Fault, start_s: float, length_s: float
 ) -> None:
     whole = undisturbed(walk, worn)
-    found = strides_of(disturbed(take(walk, worn), segment, fault, start_s, length_s, 1))
-    assert find_wrong(found, whole) == []
+    strides = strides_of(disturbed(take(walk, worn), segment, fault, start_s, length_s, 1))
+    assert find_wrong(strides, whole) == []
     for side in ("left", "right"):
-        there, left = (sum(s.counted for s in x if s.side == side) for x in (whole, found))
+        there, left = (sum(s.counted for s in x if s.side == side) for x in (whole, strides))
         assert left >= there - 3
 
 
@@ -128,12 +128,12 @@ def test_a_hiccup_leaves_no_wrong_number_that_counts(
 def test_no_hiccup_leaves_a_wrong_number_that_counts(seed: int) -> None:
     r = np.random.default_rng(seed)
     walk = str(r.choice(["arc", "comfortable", "hemiparetic", "fast_with_turns", "slow"]))
-    worn, segment = str(r.choice(list(SETS))), FOOT[SIDES[int(r.integers(2))]]
+    text, segment = str(r.choice(list(SETS))), FOOT[SIDES[int(r.integers(2))]]
     fault: Fault = ("freeze", "hole", "burst")[int(r.integers(3))]
-    recording = take(walk, worn)
+    recording = take(walk, text)
     length_s = float(r.choice([0.03, 0.05, 0.08, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7]))
     start_s = float(r.uniform(13.0, recording.t_s[-1] - 3.0))
     if fault == "hole" and r.random() < 0.2:
         length_s = float(recording.t_s[-1]) - start_s - float(r.uniform(0.0, 1.0))
-    found = strides_of(disturbed(recording, segment, fault, start_s, length_s, seed))
-    assert find_wrong(found, undisturbed(walk, worn)) == [], (walk, worn, segment, fault, start_s, length_s)
+    strides = strides_of(disturbed(recording, segment, fault, start_s, length_s, seed))
+    assert find_wrong(strides, undisturbed(walk, text)) == [], (walk, text, segment, fault, start_s, length_s)

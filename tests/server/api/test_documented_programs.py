@@ -1,4 +1,4 @@
-"""The programs of docs/reference/api.md do what it says, against a real server with a real worker."""
+"""Run the programs of docs/reference/api.md against a real server and worker."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ async def test_the_programs_upload_analyse_and_download(tmp_path: Path) -> None:
     assert set(PROGRAMS) == set(RUNNERS)
     if shutil.which("curl") is None:
         pytest.skip("curl is not installed")
-    made = simulate((Stand(5.0), Straight(12.8, 0.64, 0.54), Stand(4.0)), seed=5)
+    simulation = simulate((Stand(5.0), Straight(12.8, 0.64, 0.54), Stand(4.0)), seed=5)
     take = tmp_path / "take"
     take.mkdir()
-    for name, content in mt_files(made.recording, "walk", made.first_counter).items():
+    for name, content in mt_files(simulation.recording, "walk", simulation.first_counter).items():
         (take / name).write_bytes(content)
-    (take / "manifest.json").write_text(json.dumps({"sensors": dict(made.recording.segments)}))
+    (take / "manifest.json").write_text(json.dumps({"sensors": dict(simulation.recording.segments)}))
     async with open_clinic(tmp_path / "data") as clinic, serve(clinic.app) as port:
         clinic.user("clinician")
         workers = Workers(clinic.settings)

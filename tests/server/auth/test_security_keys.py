@@ -1,4 +1,4 @@
-"""A security key beside the password, and what an intruder would try with one."""
+"""Security keys with a password, and attacks on them."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ async def person(clinic: Clinic) -> AsyncIterator[tuple[httpx.AsyncClient, list[
     key = clinic.settings.second_factor_key
     with clinic.db.write() as c:
         second_factor.remove(c, user_id)
-        made = second_factor.begin(c, key, user_id, "clinician")
-        codes = second_factor.confirm(c, key, user_id, pyotp.TOTP(made.secret).now())
+        session = second_factor.begin(c, key, user_id, "clinician")
+        codes = second_factor.confirm(c, key, user_id, pyotp.TOTP(session.secret).now())
     cookie = {"Cookie": f"sid={clinic.token('clinician')}"}
     async with clinic.client(headers=cookie) as client:
         client.base_url = httpx.URL(HERE)
@@ -86,8 +86,8 @@ async def test_a_key_takes_the_place_of_the_code(
     assert "blue" in (await client.get("/account")).text
     path = f"{API}/account/security-keys/{listed['id']}/remove"
     proofs = {"password": PASSWORD, "code": codes.pop()}
-    async with clinic.client("viewer") as other:
-        assert (await other.post(path, json=proofs)).status_code == 404
+    async with clinic.client("viewer") as other_client:
+        assert (await other_client.post(path, json=proofs)).status_code == 404
     assert (await client.post(path, json=proofs | {"password": "wrong"})).status_code == 403
     assert (await client.post(path, json=proofs)).status_code == 204
     assert (await challenge(clinic)).status_code == 404
@@ -157,14 +157,14 @@ async def test_another_service_on_this_host_gets_nothing_it_can_use(
 ) -> None:
     client, codes = person
     key, there = await set_up(client, codes), "http://localhost:8443"
-    for asked, sent in ((HERE, there), (HERE, HERE)):
-        answer = key.get((await challenge(clinic, at=asked)).json()["options"], there)
+    for requests, sent in ((HERE, there), (HERE, HERE)):
+        answer = key.get((await challenge(clinic, at=requests)).json()["options"], there)
         got = await sign_in(clinic, answer, at=sent)
-        assert (got.status_code, got.json()["code"]) == (401, "key_refused"), (asked, sent)
+        assert (got.status_code, got.json()["code"]) == (401, "key_refused"), (requests, sent)
     assert (await challenge(clinic, at=there)).status_code == 404
     # a key set up at that port signs in there, and there alone
     client.base_url = httpx.URL(there)
-    other = await set_up(client, codes, there)
+    second = await set_up(client, codes, there)
     assert [k["host"] for k in (await client.get(f"{API}/account/security-keys")).json()] == [
         "localhost",
         "localhost:8443",
@@ -172,9 +172,9 @@ async def test_another_service_on_this_host_gets_nothing_it_can_use(
     options = (await challenge(clinic, at=there)).json()["options"]
     assert options["rpId"] == "localhost"
     assert len(options["allowCredentials"]) == 1
-    assert (await sign_in(clinic, other.get(options, there), at=there)).status_code == 200
+    assert (await sign_in(clinic, second.get(options, there), at=there)).status_code == 200
     options = (await challenge(clinic)).json()["options"]
-    assert (await sign_in(clinic, other.get(options, HERE))).status_code == 401
+    assert (await sign_in(clinic, second.get(options, HERE))).status_code == 401
     # a port nobody could keep is no place for keys
     client.base_url = httpx.URL(HERE)
     far = {"Host": f"localhost:{'1' * 300}"}
@@ -326,7 +326,7 @@ async def test_a_key_is_set_up_once_for_one_account_and_one_name(
     refused = await client.post(f"{add}/options", json=proofs)
     assert refused.json()["code"] == "no_keys_here"
     assert (await challenge(clinic, at="http://127.0.0.1")).status_code == 404
-    async with clinic.client("viewer") as other:
-        other.base_url = httpx.URL(HERE)
-        refused = await other.post(f"{add}/options", json=proofs)
+    async with clinic.client("viewer") as other_client:
+        other_client.base_url = httpx.URL(HERE)
+        refused = await other_client.post(f"{add}/options", json=proofs)
         assert refused.status_code in {401, 409}

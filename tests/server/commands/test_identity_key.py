@@ -28,8 +28,8 @@ def ask(
 def test_a_key_is_made_once(clinic: Clinic, capsys: pytest.CaptureFixture[str]) -> None:
     file = clinic.settings.identity_key_file
     assert ask(clinic, "make") == 0
-    said = capsys.readouterr().out
-    assert said.startswith(f"{file} holds the key ")
+    stdout = capsys.readouterr().out
+    assert stdout.startswith(f"{file} holds the key ")
     content = file.read_bytes()
     assert ask(clinic, "make") == 1
     assert capsys.readouterr().out == ""

@@ -28,7 +28,7 @@ async def answer(up: ServerConnection) -> None:
 
 
 async def carry(*told: Any, stay: bool = True, **options: Any) -> list[dict[str, Any]]:
-    """What a client gets that says these things; `stay`: it then waits for the end, else it goes."""
+    """Response received by a client that sends these headers; with `stay` it waits for the end."""
     sent: list[dict[str, Any]] = []
     waiting: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
     waiting.put_nowait({"type": "websocket.connect"})

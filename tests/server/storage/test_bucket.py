@@ -221,9 +221,9 @@ def test_a_command_with_another_setting_than_the_files_is_refused(
         open_blobs(there)
     open_blobs(here).remove(SPACE, blob.sha256)
     open_blobs(there).put(SPACE, b"walk")
-    for other in (here, Settings(data_dir=tmp_path, bucket="s3://another")):
+    for second in (here, Settings(data_dir=tmp_path, bucket="s3://another")):
         with pytest.raises(SettingsError, match=f"Set SAGITTAL_BUCKET={bucket.url}"):
-            open_blobs(other)
+            open_blobs(second)
 
 
 @pytest.mark.slow

@@ -28,13 +28,13 @@ SPACE = "0" * 32
 
 
 def claim(number: int) -> Claim:
-    given: dict[str, Any] = dict.fromkeys(inspect.signature(Claim).parameters)
-    given |= {"job_id": f"job-{number}", "attempt": 1, "kind": "told", "params": {"space": SPACE}}
-    return Claim(**given)
+    fields: dict[str, Any] = dict.fromkeys(inspect.signature(Claim).parameters)
+    fields |= {"job_id": f"job-{number}", "attempt": 1, "kind": "told", "params": {"space": SPACE}}
+    return Claim(**fields)
 
 
 class ToldChild:
-    """Leaves a checkpoint, and tells the result of its first job when it is asked a second time."""
+    """Write a checkpoint, and return the first job's result on the second attempt."""
 
     pid = 1
 
@@ -54,7 +54,7 @@ class ToldChild:
 
 
 class ToldQueue:
-    """Two jobs; what is published."""
+    """Two jobs and their published results."""
 
     def __init__(self, stop: threading.Event, leave: Callable[[], None]) -> None:
         self.stop, self.leave, self.number = stop, leave, 0
@@ -136,7 +136,7 @@ def test_a_full_disk_is_no_error_of_the_program(monkeypatch: pytest.MonkeyPatch)
         raise OSError(errno.ENOSPC, "No space left on device", "walk.c3d")
 
     monkeypatch.setitem(TASKS, "told", Task("told", run, lambda *rest: None, keeps_files=False))
-    found = compute(Order("told", None, [], {}), cast("BlobStore", None), cast("Channel", None))
-    assert isinstance(found, Failure)
-    assert (found.code, found.passing) == ("disk_full", False)
-    assert "disk is full" in found.message
+    result = compute(Order("told", None, [], {}), cast("BlobStore", None), cast("Channel", None))
+    assert isinstance(result, Failure)
+    assert (result.code, result.passing) == ("disk_full", False)
+    assert "disk is full" in result.message

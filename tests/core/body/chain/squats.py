@@ -38,8 +38,8 @@ def squat_on(
 
 def stack_signals(made: SquatSimulation, side: Side) -> tuple[Floats, Floats]:
     """Rates and forces (n, 3, 3) of errorless sensors, from the foot up."""
-    worn = leg_segments(side)
-    return tuple(np.stack([getattr(made.ideal[s], k) for s in worn], axis=1) for k in ("gyr", "acc"))  # type: ignore[return-value]
+    segments = leg_segments(side)
+    return tuple(np.stack([getattr(made.ideal[s], k) for s in segments], axis=1) for k in ("gyr", "acc"))  # type: ignore[return-value]
 
 
 def start_filter(
@@ -84,9 +84,9 @@ def run(
 
 def split(n: int, sizes: Sequence[int]) -> list[slice]:
     """Blocks of these sizes in turn, over n samples."""
-    found, at, k = [], 0, 0
+    result, at, k = [], 0, 0
     while at < n:
         size = sizes[k % len(sizes)]
-        found.append(slice(at, min(n, at + size)))
+        result.append(slice(at, min(n, at + size)))
         at, k = at + size, k + 1
-    return found
+    return result

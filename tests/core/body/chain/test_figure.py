@@ -1,4 +1,4 @@
-"""Legs followed as one body: whose pelvis it is, and what a lifted foot does."""
+"""Legs followed as one body: choice of the pelvis, and lifted feet."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def leg(side: Side, stands: Bools, turned_deg: float = 0.0, known: Bools | None 
     }
     q["pelvis"] = np.tile(multiply(about(2, np.radians(turned_deg)), NEUTRAL), (N, 1))
     there = np.ones(N, np.bool_) if known is None else known
-    made = Orientations(np.arange(N) / RATE, RATE, q, dict.fromkeys(q, there), "chain")
-    return LegMotion(side, made, None, None, 0, stands)  # type: ignore[arg-type]
+    orientations = Orientations(np.arange(N) / RATE, RATE, q, dict.fromkeys(q, there), "chain")
+    return LegMotion(side, orientations, None, None, 0, stands)  # type: ignore[arg-type]
 
 
 def turn_of(q: Floats) -> Floats:
@@ -38,8 +38,8 @@ ALWAYS = np.ones(N, np.bool_)
 
 
 def test_one_leg_is_its_own_body() -> None:
-    alone = leg("left", ALWAYS)
-    assert join_legs({"left": alone}) is alone.orientations
+    single = leg("left", ALWAYS)
+    assert join_legs({"left": single}) is single.orientations
 
 
 def test_the_pelvis_is_that_of_the_leg_that_stands() -> None:

@@ -71,10 +71,10 @@ def test_the_prediction_is_that_of_the_paper(printed: bool) -> None:
     )
     assert p == pytest.approx(expected_p)
     assert v == pytest.approx(expected_v)
-    found = wide.reshape(WIDTH, WIDTH)
-    np.testing.assert_allclose(found[:N, :N], F @ P @ F.T + noise, atol=1e-9)
-    assert not found[N].any()
-    assert not found[:, N].any()
+    result = wide.reshape(WIDTH, WIDTH)
+    np.testing.assert_allclose(result[:N, :N], F @ P @ F.T + noise, atol=1e-9)
+    assert not result[N].any()
+    assert not result[:, N].any()
 
 
 def rows_of(
@@ -82,9 +82,9 @@ def rows_of(
 ) -> tuple[Floats, Floats, Floats, list[int]]:
     """H (3, 27), residuals and variances of a group, and the places it reads."""
     at, H, left, variance, gain = updates.make_form()
-    given = np.array([0.3, 0.4])
+    values = np.array([0.3, 0.4])
     triples = kernel._write_rows(
-        group, R, p, v, measured, given, HEIGHTS, VARIANCES, (at, H, left, variance, gain), np.empty((3, 3))
+        group, R, p, v, measured, values, HEIGHTS, VARIANCES, (at, H, left, variance, gain), np.empty((3, 3))
     )
     whole = np.zeros((3, N))
     for t in range(triples):
@@ -126,8 +126,8 @@ def test_residuals_shrink_along_their_own_rows(group: int, places: list[int], sp
     for i in range(N):
         e = np.zeros(N)
         e[i] = step
-        after = rows_of(group, *move(R, p, v, e), measured)[1]
-        slope = (left[:rows] - after[:rows]) / step
+        final = rows_of(group, *move(R, p, v, e), measured)[1]
+        slope = (left[:rows] - final[:rows]) / step
         assert slope == pytest.approx(H[:rows, i], abs=1e-4), i
 
 

@@ -110,6 +110,6 @@ def test_a_sweep_leaves_the_negative_inverse_below_the_diagonal() -> None:
     A = B @ B.T + np.eye(SIZE)
     swept = np.tril(A).reshape(-1)
     assert node_kernel._sweep(swept, np.empty(SIZE))
-    found = np.tril(swept.reshape(SIZE, SIZE))
-    assert found == pytest.approx(np.tril(-np.linalg.inv(A)))
+    tril = np.tril(swept.reshape(SIZE, SIZE))
+    assert tril == pytest.approx(np.tril(-np.linalg.inv(A)))
     assert not node_kernel._sweep((A - 20.0 * np.eye(SIZE)).reshape(-1).copy(), np.empty(SIZE))

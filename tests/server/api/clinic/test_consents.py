@@ -1,4 +1,4 @@
-"""What a patient agreed to, over the API."""
+"""Consents of a patient over the API."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ async def test_consent_is_given_listed_and_withdrawn_once_by_who_may(clinic: Cli
         first = await client.post(here, json=body)
         assert first.status_code == 201, first.text
         assert {k: first.json()[k] for k in body} == body
-        again = await client.post(here, json=body)
-        assert again.status_code == 409
+        second_response = await client.post(here, json=body)
+        assert second_response.status_code == 409
         withdraw = f"{API}/consents/{first.json()['id']}/withdraw"
         gone = await client.post(withdraw)
         assert gone.json()["withdrawn_on"] == now().date().isoformat()

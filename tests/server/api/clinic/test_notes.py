@@ -1,4 +1,4 @@
-"""Dated notes about a patient: listed by day, removed by who may."""
+"""Dated notes about a patient: order and permission to delete."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ API = "/api/v1"
 
 async def test_a_note_is_removed_by_who_wrote_it_or_an_administrator(clinic: Clinic) -> None:
     with clinic.db.write() as c:
-        other = accounts.create(c, "colleague", None, Role.CLINICIAN, "x").id
+        other_id = accounts.create(c, "colleague", None, Role.CLINICIAN, "x").id
         patient = patients.create(c, None, code="V-NOTES").id
-        colleague = Identity(other, "colleague", "", Role.CLINICIAN, "")
+        colleague = Identity(other_id, "colleague", "", Role.CLINICIAN, "")
         theirs = notes.add(c, colleague, patient, "Written by a colleague.").id
     async with clinic.client("clinician") as client:
         mine = (await client.post(f"{API}/patients/{patient}/notes", json={"content": "My own."})).json()[

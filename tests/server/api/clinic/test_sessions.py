@@ -16,10 +16,14 @@ async def test_a_session_is_opened_changed_and_removed_by_who_may(clinic: Clinic
         session = sessions.create(c, None, patients.create(c, None, code="SE-1").id, title="Walk").id
     here = f"{API}/sessions/{session}"
     async with clinic.client("clinician") as client:
-        before = (await client.get(here)).json()
-        assert (before["title"], before["state"], before["patient_code"]) == ("Walk", "empty", "SE-1")
+        initial_body = (await client.get(here)).json()
+        assert (initial_body["title"], initial_body["state"], initial_body["patient_code"]) == (
+            "Walk",
+            "empty",
+            "SE-1",
+        )
         changed = (await client.patch(here, json={"height_m": 1.7, "note": None})).json()
-        assert changed == before | {"height_m": 1.7, "note": ""}
+        assert changed == initial_body | {"height_m": 1.7, "note": ""}
         assert (await client.patch(here, json={"title": ""})).status_code == 422
         empty = [
             await client.get(f"{here}/recording"),
@@ -44,12 +48,12 @@ async def test_files_are_described_and_looked_at_once_for_the_same_wish(clinic: 
     here = f"{API}/sessions/{session}"
     async with clinic.client("assistant") as client:
         assert (await client.put(f"{here}/files/walk.txt", content=b"recording")).is_success
-        first, again = [await client.post(f"{here}/inspections") for _ in range(2)]
+        first, second = [await client.post(f"{here}/inspections") for _ in range(2)]
         assert (first.status_code, first.json()["kind"]) == (202, "inspect")
-        assert again.json()["id"] == first.json()["id"]
-        told = (await client.get(f"{here}/recording")).json()
-        assert [(f["name"], f["size"]) for f in told["files"]] == [("walk.txt", 9)]
-        assert (told["manifest"], told["session_id"]) == (None, session)
+        assert second.json()["id"] == first.json()["id"]
+        body = (await client.get(f"{here}/recording")).json()
+        assert [(f["name"], f["size"]) for f in body["files"]] == [("walk.txt", 9)]
+        assert (body["manifest"], body["session_id"]) == (None, session)
         mapped = {"sensors": {"A1": "pelvis"}}
         assert (await client.put(f"{here}/manifest", json=mapped)).json()["manifest"]["sensors"] == mapped[
             "sensors"

@@ -42,13 +42,13 @@ async def test_a_comparison_is_asked_for_once_and_read_with_its_files(clinic: Cl
         )
         for wrong in refused:
             assert (await client.post(here, json=wrong)).status_code == 422, wrong
-        asked = {"filters": ["mahony_2008"]}
-        missing = await client.post(here, json=asked | {"reference": "none.sto"})
+        requests = {"filters": ["mahony_2008"]}
+        missing = await client.post(here, json=requests | {"reference": "none.sto"})
         assert missing.status_code == 404
-        assert (await client.post(f"{API}/sessions/{empty}/filter-runs", json=asked)).status_code == 404
-        first, again = [await client.post(here, json=asked) for _ in range(2)]
+        assert (await client.post(f"{API}/sessions/{empty}/filter-runs", json=requests)).status_code == 404
+        first, second = [await client.post(here, json=requests) for _ in range(2)]
         assert (first.status_code, first.json()["kind"]) == (202, COMPARE_FILTERS)
-        assert again.json()["id"] == first.json()["id"]
+        assert second.json()["id"] == first.json()["id"]
         assert (await client.get(here)).json() == []
         state = clinic.app.state
         claim = state.queue.claim("test", [COMPARE_FILTERS])

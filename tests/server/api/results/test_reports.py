@@ -29,16 +29,16 @@ async def test_json_and_tables_tell_the_same_numbers(clinic: Clinic) -> None:
         report = (await client.get(f"{here}/report")).json()
         parameters = await client.get(f"{here}/parameters.csv")
         curves = await client.get(f"{here}/curves.csv")
-        behind = (await client.get(f"{here}/parameters/stance_pct")).json()
+        body = (await client.get(f"{here}/parameters/stance_pct")).json()
         missing = [await client.get(f"{API}/sessions/{empty}/{what}") for what in ("report", "curves.csv")]
         unknown = await client.get(f"{here}/parameters/no_such_name")
         odd = await client.get(f"{here}/parameters/Stance")
     assert report["problem"] is None
     (row,) = [p for p in report["parameters"] if p["name"] == "stance_pct"]
-    assert behind["parameter"]["left"]["value"] == row["left"]["value"]
+    assert body["parameter"]["left"]["value"] == row["left"]["value"]
     used = [s for s in report["strides"] if s["side"] == "left" and s["used"]]
     assert row["left"]["n"] == len(used)
-    assert len(behind["strides"]) == len(report["strides"])
+    assert len(body["strides"]) == len(report["strides"])
     assert f"parameters-{session[:8]}.csv" in parameters.headers["content-disposition"]
     assert f"curves-{session[:8]}.csv" in curves.headers["content-disposition"]
     table = [r for r in rows_of(parameters.text) if "stance_pct" in r.values()]

@@ -1,4 +1,4 @@
-"""Tables nobody has described: guessed, checked by reading them, said once, and known from then on."""
+"""Undescribed tables: guess, preview, description, and reuse."""
 
 from __future__ import annotations
 
@@ -55,16 +55,16 @@ async def test_a_table_is_described_once_and_its_shape_is_known_from_then_on(cli
 
         answer = await client.put(f"{at}/tables", json={"files": list(files), "source": source})
         manifest = answer.json()["manifest"]
-        given = [SourceFile.of_bytes(name, data) for name, data in files.items()]
-        assert list(read_recording(given, manifest_of(manifest)).streams) == ["foot_l", "foot_r"]
+        inputs = [SourceFile.of_bytes(name, data) for name, data in files.items()]
+        assert list(read_recording(inputs, manifest_of(manifest)).streams) == ["foot_l", "foot_r"]
         (shape,) = (await client.get(f"{at}/tables")).json()
         assert (shape["basis"], list(shape["source"]["columns"])) == ("said", ["*"])
 
-        again = await uploaded(
+        second = await uploaded(
             clinic, "TABLES-2", {"three.csv": table(), "other.csv": table("n;a;b;c;d;e;f")}
         )
-        assert (await client.post(f"{again}/inspections")).status_code == 202
-        manifest = (await client.get(f"{again}/recording")).json()["manifest"]
+        assert (await client.post(f"{second}/inspections")).status_code == 202
+        manifest = (await client.get(f"{second}/recording")).json()["manifest"]
         assert [(s["file"], s["rate_hz"], list(s["columns"])) for s in manifest["sources"]] == [
             ("three.csv", 100, ["three"])
         ]

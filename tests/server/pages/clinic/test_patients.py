@@ -1,4 +1,4 @@
-"""The list of patients: speed and change of the latest visit, live takes, what is searched for."""
+"""Patient list: speed and change of the latest visit, live trials, search."""
 
 from __future__ import annotations
 
@@ -81,10 +81,10 @@ async def test_a_row_says_what_it_is_looked_for_by(clinic: Clinic) -> None:
         programmes.start(c, None, planned, starts_on=today)
 
     def kinds(*, results: bool = True) -> dict[str, set[str]]:
-        who = Identity(clinic.user("viewer"), "viewer", "", Role.VIEWER, "")
+        identity = Identity(clinic.user("viewer"), "viewer", "", Role.VIEWER, "")
         with clinic.db.read() as c:
-            found = patients.list_patients(c, who, search="K-")
-            rows = list_patients(c, clinic.app.state.reviewed, found, results=results)
+            result = patients.list_patients(c, identity, search="K-")
+            rows = list_patients(c, clinic.app.state.reviewed, result, results=results)
         return {row["id"]: set(row["kinds"]) for row in rows}
 
     assert kinds() == {here: {"today"}, planned: {"programme"}, nobody: set()}

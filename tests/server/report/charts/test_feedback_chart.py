@@ -25,8 +25,8 @@ def take(cues: list[Cue], values: list[float]) -> FeedbackSplit:
 
 
 def draw(cues: list[Cue], values: list[float] | None = None) -> ET.Element:
-    found = take(cues, [0.6] * len(cues) if values is None else values)
-    root: ET.Element = fromstring(feedback_svg(found, prescription(), parameter_term(NAME)))
+    trial = take(cues, [0.6] * len(cues) if values is None else values)
+    root: ET.Element = fromstring(feedback_svg(trial, prescription(), parameter_term(NAME)))
     return root
 
 
@@ -45,7 +45,7 @@ def test_strides_stand_in_their_order_filled_with_feedback_and_open_without() ->
 
 def test_blocks_without_feedback_are_columns_with_their_word() -> None:
     kinds: tuple[WhyNot | None, ...] = ("baseline", "baseline", None, "probe")
-    root = draw([cue(n, why) for n, why in enumerate(kinds)])
+    root = draw([cue(n, reason) for n, reason in enumerate(kinds)])
     assert [(e.get("x"), e.get("width")) for e in of_class(root, "fb-block")] == [
         ("0", "500"), ("750", "250")
     ]  # fmt: skip

@@ -41,7 +41,7 @@ def test_files_and_trash_go_and_what_is_damaged_or_still_coming_stays(
 ) -> None:
     folder = FolderBlobs(settings.blobs)
     whole, bad, old = (folder.put(SPACE, content) for content in (b"walk", b"bad", b"old"))
-    other = folder.put("b" * 32, b"another patient's")
+    other_response = folder.put("b" * 32, b"another patient's")
     folder.path(SPACE, bad.sha256).write_bytes(b"bat")
     folder.trash.prepare([(SPACE, old.sha256)], AT)
     folder.trash.take([(SPACE, old.sha256)], AT)
@@ -50,7 +50,7 @@ def test_files_and_trash_go_and_what_is_damaged_or_still_coming_stays(
     there = replace(settings, bucket=bucket.url)
 
     moved = move_blobs(there)
-    assert (moved.files, moved.size, moved.trashed) == (2, whole.size + other.size, 1)
+    assert (moved.files, moved.size, moved.trashed) == (2, whole.size + other_response.size, 1)
     assert moved.damaged == (f"{SPACE}/{bad.sha256}",)
     assert folder.path(SPACE, bad.sha256).read_bytes() == b"bat"
     assert (folder.root / INCOMING / "half").exists()
@@ -61,8 +61,8 @@ def test_files_and_trash_go_and_what_is_damaged_or_still_coming_stays(
     assert blobs.read(SPACE, whole.sha256) == b"walk"
     assert [one.name for one in blobs.trash.files()] == [old.sha256]
     assert (is_moving(there), read_note(there)) == (False, bucket.url)
-    again = move_blobs(there)  # what has come into the folder since
-    assert (again.files, again.trashed, again.damaged) == (0, 0, moved.damaged)
+    second = move_blobs(there)  # what has come into the folder since
+    assert (second.files, second.trashed, second.damaged) == (0, 0, moved.damaged)
 
 
 def test_a_prefix_in_which_something_is_belongs_to_somebody_else(

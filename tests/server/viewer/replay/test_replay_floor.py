@@ -1,4 +1,4 @@
-"""What is on the floor of a real viser scene at a moment, and that the moment costs little."""
+"""Floor elements of a real viser scene at a moment, and their cost."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class Scene:
     def drawn(self, side: str) -> np.ndarray:
         """Pieces (k, 2, 3) of the trail of a side that are to be seen, in order of time."""
         chunks = [n for name, n in self.nodes.items() if name.startswith(f"/room/ground/trail_{side}")]
-        seen = [np.asarray(n.points) for n in chunks if n.visible]
-        return np.concatenate(seen) if seen else np.zeros((0, 2, 3))
+        values = [np.asarray(n.points) for n in chunks if n.visible]
+        return np.concatenate(values) if values else np.zeros((0, 2, 3))
 
     def prints(self, side: str) -> np.ndarray:
         """Which prints of a side are to be seen."""
