@@ -69,13 +69,13 @@ def _kept_tablets(server: RunningServer) -> KeptContexts:
 
 
 @contextmanager
-def tablet(browser: Browser, at: RunningServer | Network) -> Iterator[Page]:
+def tablet(browser: Browser, position: RunningServer | Network) -> Iterator[Page]:
     """Capture page on a tablet with empty storage.
 
     Tablets of a server share one browser context in turn; with a simulated network each has its own.
     """
-    retained = _kept_tablets(at) if isinstance(at, RunningServer) else None
-    context = retained.take(browser) if retained else browser.new_context(base_url=at.url)
+    retained = _kept_tablets(position) if isinstance(position, RunningServer) else None
+    context = retained.take(browser) if retained else browser.new_context(base_url=position.url)
     page = context.new_page()
     page.set_viewport_size({"width": 810, "height": 1080})
     page.goto("/capture")

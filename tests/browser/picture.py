@@ -46,7 +46,7 @@ DRAWN = """() => new Promise(done => {
 """Three frames later, at once (conftest.py, PACED): a message is taken in one, drawn in the next."""
 
 
-def wait_for_picture(page: Page, wanted: Callable[[Mapping[str, float]], bool]) -> dict[str, float]:
+def wait_for_picture(page: Page, expected: Callable[[Mapping[str, float]], bool]) -> dict[str, float]:
     """Take screenshots of the frame until its colours match, and return the result of `COUNT`.
 
     Raises
@@ -57,7 +57,7 @@ def wait_for_picture(page: Page, wanted: Callable[[Mapping[str, float]], bool]) 
     end = time.monotonic() + PATIENCE_S
     while True:
         result: dict[str, float] = page.evaluate(COUNT, base64.b64encode(take_picture(page)).decode())
-        if wanted(result):
+        if expected(result):
             return result
         assert time.monotonic() < end, result
         page.wait_for_timeout(50)

@@ -477,21 +477,21 @@ def _faults_everywhere(this: Told, stage: Stage | None = None) -> dict[str, Any]
     return fields
 
 
-def _therapist(told: Opener, session: str) -> Page:
-    this = told(f"/sessions/{session}/live")
+def _therapist(notices: Opener, session: str) -> Page:
+    this = notices(f"/sessions/{session}/live")
     this.walk([0.53, 0.45, 0.52, 0.495], ["in", "low", "in", "near_low"])
     return this.page
 
 
-def _patient(told: Opener, session: str, *, sound: bool = False, **size: Any) -> Told:
-    this = told(f"/sessions/{session}/live/patient", **size)
+def _patient(notices: Opener, session: str, *, sound: bool = False, **size: Any) -> Told:
+    this = notices(f"/sessions/{session}/live/patient", **size)
     this.page.get_by_role("button", name="With sound" if sound else "Without sound").click()
     this.say(feed.state(), feed.feedback(), feed.frame(100.0, contact="r"))
     return this
 
 
 @contextmanager
-def _seen(place: Locator, what: str, wanted: Any) -> Iterator[None]:
+def _seen(place: Locator, what: str, expected: Any) -> Iterator[None]:
     """Assert that an element's value matched at least once while the block ran.
 
     Parameters
@@ -503,7 +503,7 @@ def _seen(place: Locator, what: str, wanted: Any) -> Iterator[None]:
           .observe(e, {{attributes: true, childList: true, characterData: true, subtree: true}}); }}"""
     )
     yield
-    place.page.wait_for_function("wanted => seen.includes(wanted)", arg=wanted)
+    place.page.wait_for_function("wanted => seen.includes(wanted)", arg=expected)
 
 
 def _until(done: Callable[[], bool], page: Page) -> None:

@@ -50,8 +50,8 @@ def handle(page: Page, kind: str, n: int = 2, side: str = "left") -> Locator:
     return page.locator(f"[data-side={side}] .ev.{kind}").nth(n)
 
 
-def drag(page: Page, what: Locator, by_px: float) -> None:
-    box = what.bounding_box()
+def drag(page: Page, label: Locator, by_px: float) -> None:
+    box = label.bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)

@@ -367,8 +367,8 @@ def take_out(clinic: Clinic, name: str) -> None:
         recordings.remove_file(c, None, clinic.session.id, name)
 
 
-def erase(clinic: Clinic, what: str) -> None:
-    if what == "patient":
+def erase(clinic: Clinic, label: str) -> None:
+    if label == "patient":
         erasure.erase_patient(
             clinic.db, ReviewedAnalyses(clinic.blobs), clinic.settings, None, clinic.patient.id, confirm="P-1"
         )

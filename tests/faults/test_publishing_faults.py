@@ -23,7 +23,7 @@ from tests.helpers.marks import sqlite_only
 
 
 def fail_at_every_call(
-    monkeypatch: pytest.MonkeyPatch, act: Callable[[], bool], after: Callable[[bool], None]
+    monkeypatch: pytest.MonkeyPatch, act: Callable[[], bool], later: Callable[[bool], None]
 ) -> int:
     """Repeat `act` with the first, second … call failing until it passes; returns the number of failures."""
     failures = 0
@@ -31,7 +31,7 @@ def fail_at_every_call(
         monkeypatch.setattr(fs, "system", FailingSystem(failures + 1, errno.ENOSPC))
         passed = act()
         monkeypatch.setattr(fs, "system", fs.System())
-        after(passed)
+        later(passed)
         if passed:
             return failures
         failures += 1

@@ -51,10 +51,10 @@ def prescription(**changes: Any) -> Prescription:
 
 
 def train(
-    values: Iterable[float], given: Prescription | None = None, baseline: Baseline = OPEN
+    values: Iterable[float], inputs: Prescription | None = None, baseline: Baseline = OPEN
 ) -> tuple[list[Cue], FeedbackEngine]:
     """Walk with these values of the left side."""
-    engine = FeedbackEngine(prescription() if given is None else given, baseline)
+    engine = FeedbackEngine(prescription() if inputs is None else inputs, baseline)
     cues = []
     for n, value in enumerate(values):
         cue = engine.push(walked(2 * n, value))

@@ -80,8 +80,8 @@ class Heard:
     def note_growth(self, size: int) -> None:
         self.sizes.append(size)
 
-    def note_acknowledged(self, below: int) -> None:
-        self.acks.append(below)
+    def note_acknowledged(self, limit: int) -> None:
+        self.acks.append(limit)
 
     def note_end(self, end: TakeEnd) -> None:
         self.ends.append(end)

@@ -54,5 +54,5 @@ def replayed(
     return message
 
 
-def items(said: Sequence[Report], kind: str) -> list[FeedItem]:
-    return [one for one in said if isinstance(one, FeedItem) and one.kind == kind]
+def items(message: Sequence[Report], kind: str) -> list[FeedItem]:
+    return [one for one in message if isinstance(one, FeedItem) and one.kind == kind]

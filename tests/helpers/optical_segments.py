@@ -42,9 +42,11 @@ class SegmentTrial:
     up: Floats
 
 
-def inclination_rms(q: Floats, of: SegmentTrial) -> float:
+def inclination_rms(q: Floats, source: SegmentTrial) -> float:
     """RMS angle in rad between the verticals of sensor and segment, after the turn and lag that fit best."""
-    return min(_fit(rotate(conjugate(q), UP), np.roll(of.up, lag, axis=0), of.trial.moving) for lag in LAGS)
+    return min(
+        _fit(rotate(conjugate(q), UP), np.roll(source.up, lag, axis=0), source.trial.moving) for lag in LAGS
+    )
 
 
 def _fit(ours: Floats, theirs: Floats, moving: Bools) -> float:

@@ -129,33 +129,33 @@ def digest(*results: object) -> str:
     return sha256.hexdigest()[:16]
 
 
-def _feed(seen: Any, value: object) -> None:
+def _feed(observations: Any, value: object) -> None:
     if isinstance(value, np.ndarray | np.generic):
         array = np.ascontiguousarray(value)
-        seen.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
+        observations.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
     elif dataclasses.is_dataclass(value) and not isinstance(value, type):
         if type(value).__name__.endswith("Params"):
             return
         for f in dataclasses.fields(value):
-            seen.update(f.name.encode())
-            _feed(seen, getattr(value, f.name))
+            observations.update(f.name.encode())
+            _feed(observations, getattr(value, f.name))
     elif isinstance(value, Mapping):
         for key, item in value.items():
-            _feed(seen, key)
-            _feed(seen, item)
+            _feed(observations, key)
+            _feed(observations, item)
     elif isinstance(value, list | tuple):
-        seen.update(f"[{len(value)}".encode())
+        observations.update(f"[{len(value)}".encode())
         for item in value:
-            _feed(seen, item)
+            _feed(observations, item)
     elif isinstance(value, set | frozenset):
-        _feed(seen, sorted(map(repr, value)))
+        _feed(observations, sorted(map(repr, value)))
     elif value is None or isinstance(value, str | bytes | int | float | bool | Enum):
-        seen.update(repr(value).encode() + b";")
+        observations.update(repr(value).encode() + b";")
     elif hasattr(value, "__dict__") or hasattr(type(value), "__slots__"):
         held = getattr(value, "__dict__", None) or {
             n: getattr(value, n) for n in getattr(type(value), "__slots__", ())
         }
-        _feed(seen, dict(sorted(held.items())))
+        _feed(observations, dict(sorted(held.items())))
     else:
         raise TypeError(f"cannot hash a {type(value).__name__}")
 
@@ -234,9 +234,9 @@ class DirectCall:
         return self.observe(stage, self.config)
 
 
-def _run_one(before: TakeAnalysis, stage: PipelineStage) -> tuple[TakeAnalysis | None, str]:
+def _run_one(earlier: TakeAnalysis, stage: PipelineStage) -> tuple[TakeAnalysis | None, str]:
     try:
-        final_stages = run_stages(before, (stage,), say_nothing)
+        final_stages = run_stages(earlier, (stage,), say_nothing)
     except SagittalError as error:
         return None, digest(error.code, error.message, error.sensor, error.t_s)
     getattrs = [getattr(final_stages, name) for name in stage.results]

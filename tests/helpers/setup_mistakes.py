@@ -30,10 +30,10 @@ MIRRORS: tuple[Floats, ...] = tuple(m for m in SIGNED if np.linalg.det(m) < 0.0)
 
 
 def change_axes(
-    recording: Recording, worn: Segment, acc: Floats | float = 1.0, gyr: Floats | float = 1.0
+    recording: Recording, segments: Segment, acc: Floats | float = 1.0, gyr: Floats | float = 1.0
 ) -> Recording:
     """One sensor whose accelerometer and gyroscope give their values times a matrix (3, 3) or a number."""
-    device = next(d for d, s in recording.segments.items() if s == worn)
+    device = next(d for d, s in recording.segments.items() if s == segments)
     x = recording.streams[device]
     a, g = (m * np.eye(3) if isinstance(m, float) else m for m in (acc, gyr))
     changed = replace(x, acc=x.acc @ a.T, gyr=None if x.gyr is None else x.gyr @ g.T, mag=None, quat=None)

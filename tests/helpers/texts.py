@@ -274,9 +274,11 @@ def titles_of(tree: ast.AST) -> Iterator[str]:
                 yield code.replace("_", " ").capitalize()
 
 
-def _between_tags(told: str) -> list[str]:
+def _between_tags(notices: str) -> list[str]:
     """Texts of an HTML fragment; other content is unchanged."""
-    return [t.strip() for t in re.findall(r">([^<>]+)(?=<)", told)] if told.startswith("<") else [told]
+    return (
+        [t.strip() for t in re.findall(r">([^<>]+)(?=<)", notices)] if notices.startswith("<") else [notices]
+    )
 
 
 def _is_text(node: ast.AST) -> bool:

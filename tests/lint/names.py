@@ -82,12 +82,12 @@ NAMED_OTHERWISE: Mapping[str, str] = {
 """Module of server/api → why no service and no page has its name."""
 
 
-def find_strangers(modules: Iterable[str], homes: Collection[str], known: Collection[str]) -> list[str]:
+def find_strangers(modules: Iterable[str], homes: Collection[str], reference: Collection[str]) -> list[str]:
     """Modules without a namesake that no exception names, and exceptions that are none any more."""
     single_names = {name for name in modules if name not in homes}
     return [
-        *sorted(single_names - set(known)),
-        *(f"remove the exception: {name}" for name in sorted(set(known) - single_names)),
+        *sorted(single_names - set(reference)),
+        *(f"remove the exception: {name}" for name in sorted(set(reference) - single_names)),
     ]
 
 

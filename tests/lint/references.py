@@ -96,11 +96,11 @@ def missing(root: Path) -> list[str]:
     return result
 
 
-def cited(text: str, at: int) -> Iterator[str]:
+def cited(text: str, position: int) -> Iterator[str]:
     """Headings named directly after a reference to a page."""
-    while (m := HEADINGS.match(text, at)) is not None:
+    while (m := HEADINGS.match(text, position)) is not None:
         yield m[1] or m[2]
-        at = m.end()
+        position = m.end()
 
 
 def mentions(root: Path) -> list[str]:

@@ -118,10 +118,10 @@ def fill_address(route: str, values: Mapping[str, str]) -> str:
     path = route.partition(" ")[2]
     named: Mapping[str, Any] = {"references": "optical.sto", "files": "walk.txt", "signals": "foot_pitch"}
 
-    def value(found: re.Match[str]) -> str:
-        initial = path[: found.start()].rstrip("/").rsplit("/", 1)[-1]
-        if found[1] == "name":
+    def value(result: re.Match[str]) -> str:
+        initial = path[: result.start()].rstrip("/").rsplit("/", 1)[-1]
+        if result[1] == "name":
             return str(named.get(initial, "stance_pct"))
-        return values[found[1]]
+        return values[result[1]]
 
     return re.sub(r"\{(\w+)(?::path)?\}", value, path)

@@ -110,7 +110,7 @@ def statements() -> Iterator[list[str]]:
     """SQL statements executed meanwhile, without those that begin transactions."""
     sent: list[str] = []
 
-    def note(c: object, cursor: object, statement: str, *rest: object) -> None:
+    def note(c: object, cursor: object, statement: str, *remainder: object) -> None:
         if _asking.get() and not statement.startswith("BEGIN"):
             sent.append(statement)
 

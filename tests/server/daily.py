@@ -91,11 +91,11 @@ def live(days: float = 2.0, *, clock: bool = True, height_m: float = 1.75) -> Ac
     )
 
 
-def files(found: ActivityResult) -> Mapping[str, bytes]:
+def files(result: ActivityResult) -> Mapping[str, bytes]:
     """The files that a worker stores of it."""
-    report = QualityReport("good", (), found.duration_s, found.rate_hz, MappingProxyType({}), (), ())
+    report = QualityReport("good", (), result.duration_s, result.rate_hz, MappingProxyType({}), (), ())
     source = Recording({}, {}, protocol="activity", sha256={"day.cwa": "ff"})
-    return analysis_files(TakeAnalysis(source=source, version="1", report=report, activity=found))
+    return analysis_files(TakeAnalysis(source=source, version="1", report=report, activity=result))
 
 
 def _walk(s: ActivitySpan) -> ActivityBout:

@@ -30,12 +30,12 @@ def settings(tmp_path: Path) -> Settings:
     return result
 
 
-def cut(settings: Settings, kept: int) -> Database:
+def cut(settings: Settings, retained: int) -> Database:
     """Remove the newest rows like an attacker with file access."""
     db = Database(settings.database)
     with db.write() as c:
         c.exec_driver_sql("DROP TRIGGER audit_no_delete")
-        c.exec_driver_sql("DELETE FROM audit WHERE seq > ?", (kept,))
+        c.exec_driver_sql("DELETE FROM audit WHERE seq > ?", (retained,))
     return db
 
 

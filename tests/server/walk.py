@@ -152,9 +152,9 @@ def tracks(duration_s: float = 12.0) -> Tracks:
     )
 
 
-def _flat(made: Poses, side: Side) -> Bools:
+def _flat(result: Poses, side: Side) -> Bools:
     """The middle of the stance."""
-    phase = (made.t_s / STRIDE_S + PHASE[side]) % 1.0
+    phase = (result.t_s / STRIDE_S + PHASE[side]) % 1.0
     return (phase > 0.15) & (phase < 0.35)
 
 

@@ -165,8 +165,8 @@ def watch_qmt(name: str, segment: Segment, *, gyro: bool) -> ActivityResult:
     return monitor_activity(as_long_stream(stream), segment, 1.75)
 
 
-def share_of(found: ActivityResult, kinds: tuple[str, ...], window: tuple[float, float]) -> float:
-    inside = (min(s.end_s, window[1]) - max(s.start_s, window[0]) for s in found.spans if s.kind in kinds)
+def share_of(result: ActivityResult, kinds: tuple[str, ...], window: tuple[float, float]) -> float:
+    inside = (min(s.end_s, window[1]) - max(s.start_s, window[0]) for s in result.spans if s.kind in kinds)
     return sum(x for x in inside if x > 0.0) / (window[1] - window[0])
 
 

@@ -45,8 +45,8 @@ SHOWN: Final = (
 )  # fmt: skip
 
 
-def differences(of: MeasuredGait) -> dict[str, float]:
-    return {s.name: s.difference for s in compare_sides(of.parameters)}
+def differences(source: MeasuredGait) -> dict[str, float]:
+    return {s.name: s.difference for s in compare_sides(source.parameters)}
 
 
 @pytest.fixture(scope="module")

@@ -46,12 +46,12 @@ def heading_change_deg(q: Floats, base: Floats) -> Floats:
     return np.asarray(np.degrees(np.angle(np.mean(np.exp(2j * np.arctan2(d[..., 3], d[..., 0])), axis=0))))
 
 
-def moved(made: Chain) -> tuple[float, float]:
+def moved(result: Chain) -> tuple[float, float]:
     """Largest change in degrees of a sensor's heading against the pelvis', and of a forward axis."""
     base = healthy()
-    sensors = heading_change_deg(made.run.track.q, base.run.track.q)
+    sensors = heading_change_deg(result.run.track.q, base.run.track.q)
     axes = heading_change_deg(
-        made.run.tree.segment_q(made.run.track.q), base.run.tree.segment_q(base.run.track.q)
+        result.run.tree.segment_q(result.run.track.q), base.run.tree.segment_q(base.run.track.q)
     )
     return (
         float(np.abs(_wrapped(sensors - sensors[0])).max()),

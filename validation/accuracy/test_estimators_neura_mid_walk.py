@@ -37,15 +37,15 @@ def cut_at(start_s: float) -> Chain:
     return chain(calibrated, estimate_orientations(calibrated))
 
 
-def offset_removed(made: Chain, name: str, first: int) -> float:
+def offset_removed(result: Chain, name: str, first: int) -> float:
     """RMSE of one angle against Vicon without its mean, degrees."""
-    x = made.angles_deg[name][ROWS.start + LAG - first : ROWS.stop + LAG - first]
+    x = result.angles_deg[name][ROWS.start + LAG - first : ROWS.stop + LAG - first]
     return float(np.std(x - reference()[name][ROWS]))
 
 
-def strides_cm(made: Chain, side: Side, first: int) -> Floats:
+def strides_cm(result: Chain, side: Side, first: int) -> Floats:
     """Errors of the straight strides within the cut trial."""
-    p = made.ankle(side)
+    p = result.ankle(side)
     return np.array(
         [
             100 * (np.linalg.norm((p[b - first] - p[a - first])[:2]) - length)
@@ -55,9 +55,9 @@ def strides_cm(made: Chain, side: Side, first: int) -> Floats:
     )
 
 
-def apart_mm(made: Chain) -> float:
+def apart_mm(result: Chain) -> float:
     """RMS distance of the two ends of the worst joint."""
-    return float(1000 * np.sqrt(np.mean(made.run.track.joint_residual**2, axis=0)).max())
+    return float(1000 * np.sqrt(np.mean(result.run.track.joint_residual**2, axis=0)).max())
 
 
 @pytest.mark.parametrize("start_s", CUTS_S)

@@ -200,9 +200,9 @@ def test_a_wrong_forward_axis_is_not_only_caught_but_repaired(name: str) -> None
     assert output.flexion_r == pytest.approx(healthy.flexion_r, abs=0.003)
 
 
-def lazy(by: dict[Segment, float]) -> tuple[list[str], float, float]:
+def lazy(key: dict[Segment, float]) -> tuple[list[str], float, float]:
     """Row, worst stride bias in cm and worst heading of the right leg of six-axis filters without joints."""
-    result, orientations = turn_forward_axes(*take(), by)
+    result, orientations = turn_forward_axes(*take(), key)
     _, score = scores(angles_deg(orientations, result))
     contacts = events.detect(orientations)
     down = {

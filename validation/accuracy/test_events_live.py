@@ -16,11 +16,11 @@ from validation.figures import record
 WALKS = ("gaitmap_foot", "neura_walk")
 
 
-def streamed(here: Orientations, side: Side, block: int) -> list[tuple[str, float, float]]:
+def streamed(place: Orientations, side: Side, block: int) -> list[tuple[str, float, float]]:
     """(kind, time, moment it is known) of a foot, its samples arriving in blocks."""
     foot = FOOT[side]
-    s, valid = pitch_signal(here.q[foot]), here.valid[foot]
-    state = FootPitchState.start(here.rate_hz, FootPitchParams())
+    s, valid = pitch_signal(place.q[foot]), place.valid[foot]
+    state = FootPitchState.start(place.rate_hz, FootPitchParams())
     events: list[tuple[str, float, float]] = []
     for first in range(0, len(s), block):
         part = slice(first, first + block)
@@ -28,8 +28,8 @@ def streamed(here: Orientations, side: Side, block: int) -> list[tuple[str, floa
             *advance_foot_pitch(state, s[part], valid[part]), strict=True
         ):
             assert first <= reference < first + block, "an event is told in the block in which it is known"
-            time = float(here.t_s[index] + offset / here.rate_hz)
-            events.append((KINDS[kind], time, float(here.t_s[reference])))
+            time = float(place.t_s[index] + offset / place.rate_hz)
+            events.append((KINDS[kind], time, float(place.t_s[reference])))
     return events
 
 

@@ -32,13 +32,13 @@ PLACES: dict[str, Segment] = {"hip": "pelvis", "lower_back": "pelvis", "upper_ba
 
 
 @cache
-def take(worn: tuple[tuple[Segment, str], ...]) -> UniformRecording:
+def take(segments: tuple[tuple[Segment, str], ...]) -> UniformRecording:
     """Some of the sensors on some segments."""
     data = loadmat(
         data_folder("qmt_fullbody") / "full_body_example_data.mat", squeeze_me=True, struct_as_record=False
     )
     sensors = {}
-    for segment, name in worn:
+    for segment, name in segments:
         acc, gyr = (np.array(getattr(data[name], k), np.float64) for k in ("acc", "gyr"))
         mask = np.ones(len(acc), np.bool_)
         sensors[segment] = SensorSignals(name, acc, gyr, None, mask, ~mask)

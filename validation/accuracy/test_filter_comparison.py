@@ -52,10 +52,10 @@ def on_neura() -> FilterComparison:
     return compare(neura_analysis(), OrientationTable("Vicon", t_s, q))
 
 
-def error_deg(found: FilterComparison, name: str | None) -> tuple[float, float] | None:
+def error_deg(result: FilterComparison, name: str | None) -> tuple[float, float] | None:
     """RMS over all segments, total and inclination; None where the filter needs a magnetometer."""
-    assert found.reference is not None
-    scores = list(found.reference.scores[name].values())
+    assert result.reference is not None
+    scores = list(result.reference.scores[name].values())
     if not scores:
         return None
     total, inclination = (

@@ -39,8 +39,8 @@ feet"). Errors add to a score as squares, so they show most on the legs that are
 Judged = tuple[dict[tuple[str, Side | None], Flag], Scores]
 
 
-def _judged(curves: CycleCurves, of: MeasuredGait, standing: dict[str, float]) -> Judged:
-    flags = judge_flags(curves, of.parameters, standing, HEIGHT_M)
+def _judged(curves: CycleCurves, source: MeasuredGait, standing: dict[str, float]) -> Judged:
+    flags = judge_flags(curves, source.parameters, standing, HEIGHT_M)
     # a ratio has no fixed side: its own name is enough
     by = {(f.name, None if f.kind == "ratio" else f.side): f for f in flags}
     return by, score_curves(curves, standing)

@@ -82,8 +82,8 @@ def run(
     return run_erkf(calibrated, orientations, BODY, (FOOT[side],), replace(OFFLINE, impact=impact))
 
 
-def refused_share(of: ErkfRun) -> float:
-    return float(of.track.refused.sum() / of.inputs.contact.sum())
+def refused_share(source: ErkfRun) -> float:
+    return float(source.track.refused.sum() / source.inputs.contact.sum())
 
 
 @cache

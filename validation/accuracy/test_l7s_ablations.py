@@ -58,17 +58,17 @@ CASES: Final[dict[str, tuple[int, type[Textbook] | None, bool]]] = {
 """Name → projections, form, ankle on the other side of the foot's middle."""
 
 
-def poses_of(of: Trial, R: Floats, p: Floats, model: LegModel) -> Poses:
+def poses_of(source: Trial, R: Floats, p: Floats, model: LegModel) -> Poses:
     """What `l7s_poses` makes of a track, without its diagnostics."""
     legs, n = solve_legs(R, p, model), len(p)
     return Poses(
-        t_s=of.orientations.t_s,
+        t_s=source.orientations.t_s,
         rate_hz=RATE,
         q={s: legs.q[:, i] for i, s in enumerate(FIGURE)},
         p={s: legs.p[:, i] for i, s in enumerate(FIGURE)},
         valid=np.ones(n, bool),
-        contact={FOOT[s]: of.steps[s] for s in SIDES},
-        body=of.truth.body,
+        contact={FOOT[s]: source.steps[s] for s in SIDES},
+        body=source.truth.body,
         method="l7s_3i",
     )
 

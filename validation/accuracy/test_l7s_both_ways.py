@@ -129,58 +129,61 @@ def simulated_take(recording: UniformRecording, walked: WalkTruth) -> Take:
 
 
 def estimate(
-    of: Take, worn: Worn, *, both_ways: bool, body: BodyModel | None = None
+    source: Take, segments: Worn, *, both_ways: bool, body: BodyModel | None = None
 ) -> tuple[dict[str, Floats], float]:
     """Angles in degrees from standing, and the share of the motion with a knee at its bound."""
     poses = l7s_poses(
-        of.orientations,
-        free_acceleration(of.calibrated, of.orientations),
-        steps_of(of.calibrated),
-        body or of.body,
-        worn=worn,
+        source.orientations,
+        free_acceleration(source.calibrated, source.orientations),
+        steps_of(source.calibrated),
+        body or source.body,
+        worn=segments,
         both_ways=both_ways,
     )
     q = dict(poses.q)
     posed = Orientations(poses.t_s, poses.rate_hz, q, dict.fromkeys(q, np.ones_like(poses.valid)), "")
-    angles = measure_angles(posed, of.calibrated.calibration.zero).angles
+    angles = measure_angles(posed, source.calibrated.calibration.zero).angles
     shares = poses.diagnostics["knee_straight_share"]
     assert isinstance(shares, dict)
     return {n: np.degrees(x) for n, x in angles.items()}, float(np.mean(list(shares.values())))
 
 
 @cache
-def estimated(name: str, worn: Worn, both_ways: bool) -> tuple[dict[str, Floats], float]:
-    return estimate(take(name), worn, both_ways=both_ways)
+def estimated(name: str, segments: Worn, both_ways: bool) -> tuple[dict[str, Floats], float]:
+    return estimate(take(name), segments, both_ways=both_ways)
 
 
-def spreads(of: Take, found: dict[str, Floats], name: str) -> Floats:
+def spreads(source: Take, result: dict[str, Floats], name: str) -> Floats:
     """SD of the error (3,) of hip, knee and ankle over the walk, mean of the sides."""
     if name == "neura_walk":
-        _, against = scores(found)
+        _, against = scores(result)
         return np.array([np.mean([against[f"{a}_{e}"].offset_removed for e in "lr"]) for a in FLEXION])
     return np.array(
-        [np.mean([(found[f"{a}_{e}"] - of.truth[f"{a}_{e}"])[of.part].std() for e in "lr"]) for a in FLEXION]
+        [
+            np.mean([(result[f"{a}_{e}"] - source.truth[f"{a}_{e}"])[source.part].std() for e in "lr"])
+            for a in FLEXION
+        ]
     )
 
 
 @cache
-def spread(name: str, worn: Worn, both_ways: bool) -> Floats:
-    return spreads(take(name), estimated(name, worn, both_ways)[0], name)
+def spread(name: str, segments: Worn, both_ways: bool) -> Floats:
+    return spreads(take(name), estimated(name, segments, both_ways)[0], name)
 
 
-def figures(of: Take, angles: dict[str, Floats]) -> Floats:
+def figures(source: Take, angles: dict[str, Floats]) -> Floats:
     """Maximum, minimum, range, contact and mean (5, 3) of straight strides, mean over strides and sides."""
     result = []
-    for side, a, b in of.cycles:
+    for side, a, b in source.cycles:
         curves = [angles[f"{n}_{SUFFIX[side]}"][a:b] for n in FLEXION]
         result.append([[x.max(), x.min(), np.ptp(x), x[0], x.mean()] for x in curves])
     return np.asarray(np.mean(result, axis=0).T)
 
 
 @cache
-def figure_errors(name: str, worn: Worn) -> Floats:
+def figure_errors(name: str, segments: Worn) -> Floats:
     of = take(name)
-    return figures(of, estimated(name, worn, True)[0]) - figures(of, of.truth)
+    return figures(of, estimated(name, segments, True)[0]) - figures(of, of.truth)
 
 
 @pytest.mark.parametrize("worn", get_args(Worn))
@@ -261,7 +264,7 @@ def floor_deg() -> Floats:
     return np.array(result)
 
 
-def reach_errors(worn: Worn, both_ways: bool) -> tuple[Floats, Floats]:
+def reach_errors(segments: Worn, both_ways: bool) -> tuple[Floats, Floats]:
     """Errors of hip to ankle in cm of a walking leg, of its full length: knee below 25°, and above."""
     of = take("neura_walk")
     poses = l7s_poses(
@@ -269,7 +272,7 @@ def reach_errors(worn: Worn, both_ways: bool) -> tuple[Floats, Floats]:
         free_acceleration(of.calibrated, of.orientations),
         steps_of(of.calibrated),
         of.body,
-        worn=worn,
+        worn=segments,
         both_ways=both_ways,
     )
     near, bent = [], []
@@ -283,9 +286,9 @@ def reach_errors(worn: Worn, both_ways: bool) -> tuple[Floats, Floats]:
     return np.concatenate(near), np.concatenate(bent)
 
 
-def per_stride(worn: Worn, both_ways: bool) -> Floats:
+def per_stride(segments: Worn, both_ways: bool) -> Floats:
     """SD of the error (3,) within each straight stride of neura_walk, mean of all: the paper's measure."""
-    of, (result, _) = take("neura_walk"), estimated("neura_walk", worn, both_ways)
+    of, (result, _) = take("neura_walk"), estimated("neura_walk", segments, both_ways)
     lag, _ = scores(result)
     rows = []
     for side, a, b in of.cycles:

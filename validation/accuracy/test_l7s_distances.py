@@ -157,7 +157,7 @@ def walks(name: str) -> list[Walk]:
     return [simulated_walk(name, seed) for seed in SEEDS]
 
 
-def pooled(taken: Sequence[Walk], run: str) -> Floats:
+def pooled(selection: Sequence[Walk], run: str) -> Floats:
     """Errors (strides, 4) in m and m/s of stride length, step length, step width, speed."""
     return np.array(
         [
@@ -167,21 +167,21 @@ def pooled(taken: Sequence[Walk], run: str) -> Floats:
                 a.width_m - b.width_m,
                 (a.stride_m - b.stride_m) / b.duration_s,
             ]
-            for walk in taken
+            for walk in selection
             for a, b in walk.errors(run)
         ]
     )
 
 
-def half_strides(taken: Sequence[Walk]) -> Floats:
+def half_strides(selection: Sequence[Walk]) -> Floats:
     """Errors in m of the guess that a step is half of the stride as the foot's own ErKF has it."""
-    return np.array([0.5 * a.stride_m - b.step_m for walk in taken for a, b in walk.errors(OWN)])
+    return np.array([0.5 * a.stride_m - b.step_m for walk in selection for a, b in walk.errors(OWN)])
 
 
-def asymmetries(taken: Sequence[Walk], run: str) -> tuple[Floats, Floats]:
+def asymmetries(selection: Sequence[Walk], run: str) -> tuple[Floats, Floats]:
     """Mean left minus mean right step length in m of every take, found and true."""
     result = []
-    for walk in taken:
+    for walk in selection:
         pairs = walk.errors(run)
         mean = {s: np.mean([(a.step_m, b.step_m) for a, b in pairs if a.side == s], axis=0) for s in SIDES}
         result.append(mean["left"] - mean["right"])

@@ -57,15 +57,15 @@ def true_figure(angle: Floats, cycles: list[tuple[int, int]], figure: CurveFigur
 
 
 @cache
-def told(worn: str) -> tuple[Told, ...]:
+def told(segments: str) -> tuple[Told, ...]:
     """All figures of all people."""
-    return tuple(result for name in PEOPLE for result in of_person(name, worn))
+    return tuple(result for name in PEOPLE for result in of_person(name, segments))
 
 
-def of_person(name: str, worn: str) -> Iterator[Told]:
+def of_person(name: str, segment_names: str) -> Iterator[Told]:
     simulated = simulate_scenario(name, SEED)
     recording, truth = simulated.recording, simulated.truth
-    segments = {d: s if s in WORN[worn] else None for d, s in recording.segments.items()}
+    segments = {d: s if s in WORN[segment_names] else None for d, s in recording.segments.items()}
     analysis = analyse(replace(recording, segments=segments))
     angles = truth.subtract_standing()
     for side in SIDES:
@@ -81,18 +81,18 @@ def of_person(name: str, worn: str) -> Iterator[Told]:
             yield Told(figure, None if p.mean is None else p.mean - true, p.uncertainty, p.reason)
 
 
-def stated(figure: str, worn: str) -> float:
+def stated(figure: str, segments: str) -> float:
     """Standard uncertainty of the leg model in °."""
     joint = FIGURES[figure].variable.partition("_")[0]
-    reference = ESTIMATED_DEG if worn != "feet" else FEET_ALONE_DEG
-    if worn == "feet" and FIGURES[figure].statistic == "at":
+    reference = ESTIMATED_DEG if segments != "feet" else FEET_ALONE_DEG
+    if segments == "feet" and FIGURES[figure].statistic == "at":
         reference = {**reference, **FEET_ALONE_AT_CONTACT_DEG}
     return reference[joint]
 
 
-def by_figure(worn: str) -> dict[str, list[float]]:
+def by_figure(segments: str) -> dict[str, list[float]]:
     errors: dict[str, list[float]] = defaultdict(list)
-    for t in told(worn):
+    for t in told(segments):
         if t.error is not None:
             errors[t.name].append(t.error)
     return errors

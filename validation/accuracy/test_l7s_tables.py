@@ -75,14 +75,14 @@ TABLE_IV = (
 
 
 @cache
-def runs(movement: str, worn: Worn, adjoint: Adjoint) -> tuple[tuple[Trial, Poses], ...]:
+def runs(movement: str, segments: Worn, adjoint: Adjoint) -> tuple[tuple[Trial, Poses], ...]:
     """Everybody's take of a movement and what L7S makes of it."""
     takes = [trial(movement, height_m, seed) for height_m, seed in PEOPLE]
-    return tuple((take, take.run(worn, adjoint)) for take in takes)
+    return tuple((take, take.run(segments, adjoint)) for take in takes)
 
 
-def pooled(worn: Worn, adjoint: Adjoint, side: Side) -> list[Strides]:
-    return [strides_of(t, p, side) for m in MOVEMENTS for t, p in runs(m, worn, adjoint)]
+def pooled(segments: Worn, adjoint: Adjoint, side: Side) -> list[Strides]:
+    return [strides_of(t, p, side) for m in MOVEMENTS for t, p in runs(m, segments, adjoint)]
 
 
 @pytest.mark.parametrize(("worn", "adjoint"), RUNS)

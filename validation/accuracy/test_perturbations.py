@@ -160,8 +160,8 @@ class Outcome:
     worst_deg: float | None
 
 
-def warnings_of(found: TakeAnalysis) -> frozenset[str]:
-    return frozenset(n.code for n in found.notices if n.severity != "info")
+def warnings_of(result: TakeAnalysis) -> frozenset[str]:
+    return frozenset(n.code for n in result.notices if n.severity != "info")
 
 
 def judge(name: str, make: Make) -> Outcome:

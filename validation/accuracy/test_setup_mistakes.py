@@ -149,24 +149,24 @@ def judge(name: str, make: Make, harmless: bool) -> str:
     return "silent" if wrong is not None and _is_untouched(wrong, make(right(name))) and not swap else "wrong"
 
 
-def _is_alike(found: ImuStream, true: ImuStream) -> bool:
+def _is_alike(result: ImuStream, true: ImuStream) -> bool:
     """Whether two streams differ by a turn of the whole sensor alone."""
-    assert found.gyr is not None
+    assert result.gyr is not None
     assert true.gyr is not None
-    good = np.isfinite(found.acc).all(axis=1) & np.isfinite(found.gyr).all(axis=1)
-    turn = np.linalg.lstsq(true.acc[good], found.acc[good], rcond=None)[0]
+    good = np.isfinite(result.acc).all(axis=1) & np.isfinite(result.gyr).all(axis=1)
+    turn = np.linalg.lstsq(true.acc[good], result.acc[good], rcond=None)[0]
     return bool(
         np.linalg.det(turn) > 0.99
         and np.allclose(turn @ turn.T, np.eye(3), atol=1e-6)
-        and np.allclose(true.gyr[good] @ turn, found.gyr[good], atol=1e-6)
+        and np.allclose(true.gyr[good] @ turn, result.gyr[good], atol=1e-6)
     )
 
 
-def _is_untouched(found: Recording, given: Recording) -> bool:
-    return found.segments == given.segments and all(
-        np.array_equal(found.streams[d].acc, x.acc, equal_nan=True)
-        and np.array_equal(found.streams[d].gyr, x.gyr, equal_nan=True)  # type: ignore[arg-type]
-        for d, x in given.streams.items()
+def _is_untouched(result: Recording, inputs: Recording) -> bool:
+    return result.segments == inputs.segments and all(
+        np.array_equal(result.streams[d].acc, x.acc, equal_nan=True)
+        and np.array_equal(result.streams[d].gyr, x.gyr, equal_nan=True)  # type: ignore[arg-type]
+        for d, x in inputs.streams.items()
     )
 
 
@@ -186,10 +186,10 @@ def test_right_set_ups_are_accused_of_nothing() -> None:
     assert {w: x.evidence for w, x in notices.items() if x is not None} == {}
 
 
-def rms_of_angles(found: TakeAnalysis, true: TakeAnalysis) -> float:
-    assert found.angles is not None
+def rms_of_angles(result: TakeAnalysis, true: TakeAnalysis) -> float:
+    assert result.angles is not None
     assert true.angles is not None
-    off = [np.degrees(found.angles.angles[k] - x) for k, x in true.angles.angles.items()]
+    off = [np.degrees(result.angles.angles[k] - x) for k, x in true.angles.angles.items()]
     return max(float(np.sqrt(np.nanmean(x**2))) for x in off)
 
 

@@ -88,5 +88,5 @@ def test_what_they_do_on_real_recordings_is_written_down() -> None:
     )
 
 
-def _pair(before: float | None, after: float | None) -> str:
-    return "–" if before is None or after is None else f"{before:.2f} → {after:.2f}"
+def _pair(earlier: float | None, later: float | None) -> str:
+    return "–" if earlier is None or later is None else f"{earlier:.2f} → {later:.2f}"

@@ -21,11 +21,14 @@ WORN: dict[str, tuple[Segment, ...]] = {"lower back": ("pelvis",), "both feet": 
 EDGE_S = 0.2
 
 
-def edge_errors(worn: str) -> Floats:
+def edge_errors(segments: str) -> Floats:
     """(walks, 2) begin and end of the turn minus those of the people, s."""
     errors = []
     for walk in WALKS:
-        measured, off = ipol_analysis(walk, *WORN[worn]).measured, first_s(ipol_recording(walk, *WORN[worn]))
+        measured, off = (
+            ipol_analysis(walk, *WORN[segments]).measured,
+            first_s(ipol_recording(walk, *WORN[segments])),
+        )
         assert measured is not None
         true = np.array(checked_events(walk).turn_s)
         result = [np.array((t.start_s, t.end_s)) + off for t in measured.turns]
@@ -33,9 +36,9 @@ def edge_errors(worn: str) -> Floats:
     return np.array(errors)
 
 
-def stops(worn: str) -> int:
+def stops(segments: str) -> int:
     """Walks with a reported stop."""
-    measureds = [ipol_analysis(walk, *WORN[worn]).measured for walk in WALKS]
+    measureds = [ipol_analysis(walk, *WORN[segments]).measured for walk in WALKS]
     return sum(any(b.stops for b in m.bouts) for m in measureds if m is not None)
 
 

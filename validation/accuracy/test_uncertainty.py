@@ -100,12 +100,14 @@ def of_gaitmap() -> list[Pair]:
     return pairs
 
 
-def _of_side(side: Side, seen: dict[str, list[tuple[float, float]]], events: GaitEvents | None) -> list[Pair]:
+def _of_side(
+    side: Side, observations: dict[str, list[tuple[float, float]]], events: GaitEvents | None
+) -> list[Pair]:
     values = [
         summarise_values(name, side, [a for a, _ in pair], CATALOGUE[name].unit)
-        for name, pair in seen.items()
+        for name, pair in observations.items()
     ]
-    truth = [float(np.mean([b for _, b in pair])) for pair in seen.values()]
+    truth = [float(np.mean([b for _, b in pair])) for pair in observations.values()]
     return list(zip(state_uncertainty(values, events), truth, strict=True))
 
 

@@ -52,8 +52,8 @@ def true(truth: WalkTruth, side: Side) -> Told:
     return Told(*(float(np.mean(x)) for x in (steps, stances, peaks, times)))
 
 
-def told(found: TakeAnalysis, side: Side) -> Told:
-    named = {p.name: p.mean for p in found.parameters if p.side == side}
+def told(result: TakeAnalysis, side: Side) -> Told:
+    named = {p.name: p.mean for p in result.parameters if p.side == side}
     values = []
     for name in ("step_length_m", "stance_pct", "knee_flexion_max_swing_deg", "stride_time_s"):
         value = named[name]

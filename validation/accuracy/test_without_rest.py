@@ -140,10 +140,10 @@ WORN: tuple[tuple[Segment, ...], ...] = (
 
 
 @cache
-def given(worn: tuple[Segment, ...]) -> frozenset[tuple[str, str | None]]:
+def given(segment_names: tuple[Segment, ...]) -> frozenset[tuple[str, str | None]]:
     """Parameters with a value of qmt_fullbody without rests and with some of its sensors."""
     recording = without_rest(read_take("qmt_fullbody"))
-    segments = {d: s if s in worn else None for d, s in recording.segments.items()}
+    segments = {d: s if s in segment_names else None for d, s in recording.segments.items()}
     analysis = analyse(replace(recording, segments=segments))
     return frozenset((p.name, p.side) for p in analysis.parameters if p.mean is not None)
 

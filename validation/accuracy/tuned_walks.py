@@ -103,17 +103,17 @@ def trial(person: Person, placement: BodyPlace) -> ReferenceTrial:
     return ReferenceTrial(person.name, stream.rate_hz, gyr, stream.acc, stream.mag, q, moving)
 
 
-def trial_file(made: ReferenceTrial) -> bytes:
+def trial_file(result: ReferenceTrial) -> bytes:
     """The trial as an .npz of the BROAD layout."""
     file = BytesIO()
     np.savez(
         file,
-        imu_gyr=made.gyr,
-        imu_acc=made.acc,
-        imu_mag=made.mag,
-        opt_quat=made.reference,
-        movement=made.moving,
-        sampling_rate=np.array(made.rate_hz),
+        imu_gyr=result.gyr,
+        imu_acc=result.acc,
+        imu_mag=result.mag,
+        opt_quat=result.reference,
+        movement=result.moving,
+        sampling_rate=np.array(result.rate_hz),
     )
     return file.getvalue()
 

@@ -77,13 +77,13 @@ def begun(size: int, segments: tuple[Segment, ...] = ()) -> tuple[OnlineSession,
     return online, list(remainder), took
 
 
-def quickest(online: OnlineSession, rest: Sequence[SampleBatch], parts: int = 6) -> float:
+def quickest(online: OnlineSession, remainder: Sequence[SampleBatch], parts: int = 6) -> float:
     """Time per push of the fastest of several equal parts, s."""
-    edges = np.linspace(0, len(rest), parts + 1).astype(int).tolist()
+    edges = np.linspace(0, len(remainder), parts + 1).astype(int).tolist()
     values: list[float] = []
     for a, b in pairwise(edges):
         began = time.process_time()
-        for batch in rest[a:b]:
+        for batch in remainder[a:b]:
             online.push(batch)
         values.append((time.process_time() - began) / (b - a))
     return min(values)
@@ -149,9 +149,9 @@ def test_a_stride_is_measured_in_two_milliseconds(monkeypatch: pytest.MonkeyPatc
     assert ms <= BUSY * STRIDE_MS
 
 
-def endless(rest: Sequence[SampleBatch], count: int) -> Iterator[SampleBatch]:
+def endless(remainder: Sequence[SampleBatch], count: int) -> Iterator[SampleBatch]:
     """The same walking repeated, on a continuing clock."""
-    part = rest[100:1300]
+    part = remainder[100:1300]
     span_us = part[-1].t0_us + 100_000 - part[0].t0_us
     for k in range(count):
         lap, batch = k // len(part), part[k % len(part)]

@@ -43,9 +43,9 @@ def moves() -> list[tuple[float, float]]:
     return list(pairwise(places))
 
 
-def measure_with(tracks: Tracks, at: float, to: float) -> None:
+def measure_with(tracks: Tracks, position: float, to: float) -> None:
     """Measure the whole take with one contact moved."""
-    gait = measure_gait(tracks, [Edit("move_event", "left", at, "ic", to)])
+    gait = measure_gait(tracks, [Edit("move_event", "left", position, "ic", to)])
     assert len(gait.strides.strides) > 1000
 
 

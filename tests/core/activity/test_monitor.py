@@ -42,8 +42,8 @@ def simulate_chest(day: Day, seed: int = 0, style: ChestStyle | None = None) -> 
     return simulate_day(day, seed=seed, setup=replace(ON_SKIN, rate_hz=50.0), style=style)
 
 
-def watch(made: ChestSimulation) -> ActivityResult:
-    (stream,) = made.recording.streams.values()
+def watch(result: ChestSimulation) -> ActivityResult:
+    (stream,) = result.recording.streams.values()
     return monitor_activity(as_long_stream(stream), "chest", 1.75)
 
 

@@ -6,8 +6,8 @@ from sagittal.core.activity.postures import FixedStretch, decide_postures
 from sagittal.core.activity.result import PosturalTransition, TransitionCandidate, TransitionKind
 
 
-def rise(kind: TransitionKind, at: float) -> PosturalTransition:
-    return PosturalTransition(kind, at, at - 1.0, at + 1.0, 30.0, 0.4)
+def rise(kind: TransitionKind, position: float) -> PosturalTransition:
+    return PosturalTransition(kind, position, position - 1.0, position + 1.0, 30.0, 0.4)
 
 
 WALKS = (FixedStretch(0.0, 10.0, "walking", "steps"), FixedStretch(90.0, 100.0, "walking", "steps"))

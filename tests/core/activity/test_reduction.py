@@ -39,8 +39,8 @@ def resting(seconds: float) -> tuple[Floats, Floats]:
     return t_s, np.tile([0.0, 3.0, 4.0], (len(t_s), 1))
 
 
-def reduce(given: LongStream) -> list[Slab]:
-    return list(reduce_stream(given, "chest", PARAMS))
+def reduce(inputs: LongStream) -> list[Slab]:
+    return list(reduce_stream(inputs, "chest", PARAMS))
 
 
 def test_a_resting_sensor_gives_its_own_gravity_in_slabs_of_one_length() -> None:

@@ -25,9 +25,9 @@ WORN = WearParams()
 UPRIGHT = UprightParams()
 
 
-def laid_down(minutes: int, first: int = 10, of: int = 60) -> Frames:
+def laid_down(minutes: int, first: int = 10, source: int = 60) -> Frames:
     """An hour with the sensor removed for so many minutes."""
-    frames = make_frames(of * PER_MINUTE)
+    frames = make_frames(source * PER_MINUTE)
     frames.sd[first : first + minutes] = frames.wobble[first : first + minutes] = 0.0
     return frames
 

@@ -26,9 +26,9 @@ def wrong(swap: Swap) -> UniformRecording:
     return replace(walk(), sensors=undo_exchange(swap, walk().sensors))
 
 
-def pairs(found: Agreement) -> set[frozenset[str]]:
-    assert found.exchange is not None
-    return {frozenset(pair) for pair in found.exchange.swap}
+def pairs(result: Agreement) -> set[frozenset[str]]:
+    assert result.exchange is not None
+    return {frozenset(pair) for pair in result.exchange.swap}
 
 
 def test_a_right_walk_fits_best_as_it_is() -> None:

@@ -31,8 +31,8 @@ def clean() -> Agreement:
     return check_agreement(walk())
 
 
-def codes(found: Agreement) -> list[str]:
-    return [n.code for n in found.recording.notices if n not in walk().notices]
+def codes(result: Agreement) -> list[str]:
+    return [n.code for n in result.recording.notices if n not in walk().notices]
 
 
 def test_a_clean_walk_is_the_same_recording() -> None:

@@ -29,7 +29,7 @@ def walk() -> UniformRecording:
     return only(simulation, *(s for s in simulation.sensors if s != "chest"))
 
 
-def followed(one: UniformRecording, other: UniformRecording, at_s: float) -> UniformRecording:
+def followed(one: UniformRecording, second: UniformRecording, at_s: float) -> UniformRecording:
     """One take up to a moment, the other one from there on."""
     k = round(at_s * one.rate_hz)
 
@@ -37,7 +37,7 @@ def followed(one: UniformRecording, other: UniformRecording, at_s: float) -> Uni
         acc, gyr = (np.concatenate((x[:k], y[k:])) for x, y in ((a.acc, b.acc), (a.gyr, b.gyr)))
         return replace(a, acc=acc, gyr=gyr, mag=None)
 
-    return replace(one, sensors={s: joined(x, other.sensors[s]) for s, x in one.sensors.items()})
+    return replace(one, sensors={s: joined(x, second.sensors[s]) for s, x in one.sensors.items()})
 
 
 def first_sentence(notice: Notice) -> str:

@@ -71,16 +71,16 @@ def feet_alone() -> TakeAnalysis:
     return analyse(worn(simulate_scenario("comfortable", 0).recording, None, "foot_l", "foot_r"))
 
 
-def at_the_bound(found: TakeAnalysis) -> TakeAnalysis:
+def at_the_bound(result: TakeAnalysis) -> TakeAnalysis:
     """The same with legs too short for the way their feet go: knees rest at their bound through stance."""
-    assert found.angles is not None
-    assert found.tracks is not None
-    ends = {name: bound + np.radians(12.0) for name, bound in found.angles.bounds.items()}
+    assert result.angles is not None
+    assert result.tracks is not None
+    ends = {name: bound + np.radians(12.0) for name, bound in result.angles.bounds.items()}
     assert len(ends) == 2
-    held = {name: np.maximum(found.angles.angles[name], end) for name, end in ends.items()}
-    angles = replace(found.angles, angles={**found.angles.angles, **held}, bounds=ends)
-    tracks = replace(found.tracks, angles=angles)
-    return replace(found, angles=angles, tracks=tracks, measured=measure_gait(tracks))
+    held = {name: np.maximum(result.angles.angles[name], end) for name, end in ends.items()}
+    angles = replace(result.angles, angles={**result.angles.angles, **held}, bounds=ends)
+    tracks = replace(result.tracks, angles=angles)
+    return replace(result, angles=angles, tracks=tracks, measured=measure_gait(tracks))
 
 
 @pytest.mark.slow

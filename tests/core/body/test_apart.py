@@ -50,8 +50,8 @@ def test_the_figure_stands_as_wide_as_measured(width: float) -> None:
 
 @pytest.mark.slow
 def test_steps_are_wider_by_what_standing_was_wider() -> None:
-    def width(of: TakeAnalysis, side: Side) -> float:
-        mean = next(p.mean for p in of.parameters if (p.name, p.side) == ("step_width_m", side))
+    def width(source: TakeAnalysis, side: Side) -> float:
+        mean = next(p.mean for p in source.parameters if (p.name, p.side) == ("step_width_m", side))
         assert mean is not None
         return mean
 

@@ -120,11 +120,11 @@ def test_legs_end_side_by_side_as_far_as_motion_lets_them(monkeypatch: pytest.Mo
     assert abs(ahead_of(measure_arms(*walk(), BODY, WHOLE))) < 1e-3
 
 
-def assert_as_usual(found: MeasuredArms) -> None:
-    for sensor in found.sensors.values():
+def assert_as_usual(result: MeasuredArms) -> None:
+    for sensor in result.sensors.values():
         np.testing.assert_array_equal(sensor.place, sensor.guess)
         assert not sensor.taken.any()
-    for joint in found.joints.values():
+    for joint in result.joints.values():
         np.testing.assert_allclose(joint.centre, joint.guess, atol=1e-12)
         assert not joint.asked
 

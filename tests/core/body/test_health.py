@@ -33,12 +33,12 @@ def changed(recording: UniformRecording, segment: Segment, **signals: object) ->
     return replace(recording, sensors={**recording.sensors, segment: replace(was, **signals)})  # type: ignore[arg-type]
 
 
-def codes(made: PoseEstimate) -> set[str]:
-    return {n.code for n in made.poses.notices}
+def codes(result: PoseEstimate) -> set[str]:
+    return {n.code for n in result.poses.notices}
 
 
-def residuals(made: PoseEstimate) -> dict[str | None, float]:
-    return {f.of: f.value for f in made.poses.health if f.name == "joint_residual_mm"}
+def residuals(result: PoseEstimate) -> dict[str | None, float]:
+    return {f.of: f.value for f in result.poses.health if f.name == "joint_residual_mm"}
 
 
 def test_a_verdict_follows_the_limits() -> None:

@@ -38,17 +38,17 @@ def right_words(truth: WalkTruth, segment: Segment) -> tuple[str, Way, float]:
     return f"strap, {best[1]} {best[2]}", best[2], best[0]
 
 
-def turn_words(text: str, way: Way, by: int) -> str:
+def turn_words(text: str, way: Way, key: int) -> str:
     ways: tuple[Way, ...] = get_args(Way)
-    return say_other_way(text, ways[(ways.index(way) + by) % 4])
+    return say_other_way(text, ways[(ways.index(way) + key) % 4])
 
 
-def declare(take: UniformRecording, truth: WalkTruth, by: int) -> UniformRecording:
+def declare(take: UniformRecording, truth: WalkTruth, key: int) -> UniformRecording:
     """Every mounting declared, `by` quarter turns wrong."""
     message: dict[str, str] = {}
     for segment in take.sensors:
         text, way, _ = right_words(truth, segment)
-        message[segment] = turn_words(text, way, by)
+        message[segment] = turn_words(text, way, key)
     return replace(take, mounting=message)
 
 

@@ -11,9 +11,9 @@ from sagittal.core.frames import Side
 from sagittal.core.parameters.catalogue import CATALOGUE
 
 
-def change(name: str, side: Side | None, by: float, verdict: Verdict | None = "real_change") -> Change:
+def change(name: str, side: Side | None, key: float, verdict: Verdict | None = "real_change") -> Change:
     return Change(
-        name, side, "", 50.0, 50.0 + by, by, verdict, 4.2, "a table", None, None, None, None, None, None
+        name, side, "", 50.0, 50.0 + key, key, verdict, 4.2, "a table", None, None, None, None, None, None
     )
 
 

@@ -28,10 +28,10 @@ def parameter(name: str, mean: float | None, side: Side | None = None, unit: str
 
 
 def one(
-    name: str, before: float | None, after: float | None, side: Side | None = None, **more: object
+    name: str, earlier: float | None, later: float | None, side: Side | None = None, **more: object
 ) -> Change:
     unit = "m/s" if name.endswith("_mps") else "deg" if name.endswith("_deg") else "m"
-    pair = parameter(name, before, side, unit), parameter(name, after, side, unit)
+    pair = parameter(name, earlier, side, unit), parameter(name, later, side, unit)
     (change,) = parameter_changes([pair[0]], [pair[1]], **more)  # type: ignore[arg-type]
     return change
 

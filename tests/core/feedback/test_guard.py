@@ -25,11 +25,11 @@ def curves(added_deg: float = 0.0) -> Mapping[str, Floats]:
 
 
 def walk(
-    other: list[float], gps: list[float] | None = None, baseline: Baseline = OPEN, **changes: Any
+    second: list[float], gps: list[float] | None = None, baseline: Baseline = OPEN, **changes: Any
 ) -> FeedbackEngine:
     """Left and right in turn; the right, untrained one has these values."""
     engine = FeedbackEngine(prescription(**changes), baseline)
-    for i, value in enumerate(other):
+    for i, value in enumerate(second):
         shape = {} if gps is None else curves(gps[i])
         engine.push(walked(2 * i, 0.4, curves=shape))
         engine.push(walked(2 * i + 1, value, "right", curves=shape))

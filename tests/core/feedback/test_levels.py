@@ -24,11 +24,11 @@ def ladder(
     return result
 
 
-def walk(made: Ladder, *zones: Zone) -> int:
+def walk(result: Ladder, *zones: Zone) -> int:
     for zone in zones:
-        made.add_stride(zone)
-    made.follow_rule()
-    return made.level
+        result.add_stride(zone)
+    result.follow_rule()
+    return result.level
 
 
 @pytest.mark.parametrize(

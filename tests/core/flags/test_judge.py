@@ -40,8 +40,8 @@ def sides(
     ]
 
 
-def flag(found: tuple[Flag, ...], name: str, side: Side | None) -> Flag:
-    (one,) = (f for f in found if f.name == name and f.side == side)
+def flag(result: tuple[Flag, ...], name: str, side: Side | None) -> Flag:
+    (one,) = (f for f in result if f.name == name and f.side == side)
     return one
 
 

@@ -175,7 +175,7 @@ def test_a_person_corrects_start_and_end() -> None:
     assert means(view.result) == pytest.approx(means(file), abs=REFINED_S, rel=0.01)
 
 
-def still(seconds: float, seed: int = 1, *worn: Segment) -> UniformRecording:
+def still(seconds: float, seed: int = 1, *segments: Segment) -> UniformRecording:
     """Person standing with a little sway."""
     n = round(seconds * RATE)
     draw = np.random.default_rng(seed)
@@ -188,7 +188,7 @@ def still(seconds: float, seed: int = 1, *worn: Segment) -> UniformRecording:
         base.sensors["pelvis"], acc=acc, gyr=0.002 * draw.standard_normal((n, 3)), mag=None, valid=mask,
         interpolated=~mask,
     )  # fmt: skip
-    sensors = {s: replace(x, device_id=s) for s in worn or ("pelvis",)}
+    sensors = {s: replace(x, device_id=s) for s in segments or ("pelvis",)}
     return replace(base, t_s=t_s, rate_hz=RATE, sensors=sensors)
 
 

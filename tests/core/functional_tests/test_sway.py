@@ -20,9 +20,9 @@ QUIET = RecordingSetup(noise=None)
 
 
 def measure(
-    made: SwaySimulation, segment: Segment = "pelvis", limits: GivenLimits | None = None
+    result: SwaySimulation, segment: Segment = "pelvis", limits: GivenLimits | None = None
 ) -> FunctionalTest:
-    take = synchronise(made.recording)
+    take = synchronise(result.recording)
     return measure_sway(replace(take, sensors={segment: take.sensors[segment]}), limits)
 
 

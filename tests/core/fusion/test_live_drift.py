@@ -40,8 +40,8 @@ def test_headings_are_held_over_five_minutes_and_turns_are_not_taken_for_drift()
     HeadingHold(("pelvis", "foot_l", "foot_r"), RATE, MOVING).push(held, gyr, valid)
     np.testing.assert_array_equal(held[:, 0], q[:, 0])
 
-    def apart(x: Floats, i: int, at: slice) -> float:
-        return float(np.degrees(np.angle(np.mean(np.exp(1j * (yaw(x[at, i]) - yaw(x[at, 0])))))))
+    def apart(x: Floats, i: int, position: slice) -> float:
+        return float(np.degrees(np.angle(np.mean(np.exp(1j * (yaw(x[position, i]) - yaw(x[position, 0])))))))
 
     first, last = slice(200, 1600), slice(n - 1600, n - 200)
     for i, rate in ((1, 6.0), (2, -4.0)):

@@ -41,8 +41,8 @@ def standing(angle: float, variables: tuple[str, ...] = SAGITTAL) -> dict[str, f
     return {f"{v}_{s}": angle for v in variables for s in "lr"}
 
 
-def value(found: Scores, name: str, mode: str, side: Side | None = None) -> float | None:
-    return found.find(name, mode, side).value  # type: ignore[arg-type]
+def value(result: Scores, name: str, mode: str, side: Side | None = None) -> float | None:
+    return result.find(name, mode, side).value  # type: ignore[arg-type]
 
 
 def test_the_norm_scores_zero() -> None:

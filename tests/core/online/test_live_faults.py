@@ -37,9 +37,9 @@ ARC: Script = (
 
 
 @cache
-def take(walk: str, worn: str) -> UniformRecording:
+def take(walk: str, segments: str) -> UniformRecording:
     whole = scripted(ARC)[0] if walk == "arc" else cut(simulated(walk, 1)[0], 0.0, 34.0)
-    return only(whole, *SETS[worn])
+    return only(whole, *SETS[segments])
 
 
 def strides_of(recording: UniformRecording) -> list[LiveStride]:
@@ -48,8 +48,8 @@ def strides_of(recording: UniformRecording) -> list[LiveStride]:
 
 
 @cache
-def undisturbed(walk: str, worn: str) -> list[LiveStride]:
-    return strides_of(take(walk, worn))
+def undisturbed(walk: str, segments: str) -> list[LiveStride]:
+    return strides_of(take(walk, segments))
 
 
 def disturbed(
@@ -73,10 +73,10 @@ def disturbed(
     return replace(recording, sensors=sensors)
 
 
-def find_wrong(found: list[LiveStride], whole: list[LiveStride]) -> list[tuple[object, ...]]:
+def find_wrong(result: list[LiveStride], whole: list[LiveStride]) -> list[tuple[object, ...]]:
     """Counted parameters beyond `TOLERANCE`, and counted strides that do not exist."""
     wrong: list[tuple[object, ...]] = []
-    for s in (s for s in found if s.counted):
+    for s in (s for s in result if s.counted):
         same = [x for x in whole if x.side == s.side and abs(x.end_s - s.end_s) < SAME_S]
         if not same:
             wrong.append((s.side, s.start_s, s.end_s))

@@ -93,9 +93,9 @@ def _daily_life() -> Recording:
     return replace(simulate_day(day, setup=RecordingSetup(rate_hz=50.0)).recording, protocol="activity")
 
 
-def keep_segments(recording: Recording, worn: tuple[Segment, ...]) -> Recording:
+def keep_segments(recording: Recording, segments: tuple[Segment, ...]) -> Recording:
     """The same trial with sensors on these segments alone."""
-    retained = {d: s for d, s in recording.segments.items() if s in worn}
+    retained = {d: s for d, s in recording.segments.items() if s in segments}
     return replace(recording, streams={d: recording.streams[d] for d in retained}, segments=retained)
 
 
@@ -194,7 +194,7 @@ PATTERNS: Final[tuple[Pattern, ...]] = (
 )  # fmt: skip
 
 
-def lose_samples(stream: ImuStream, kept: Bools, how: str) -> ImuStream:
+def lose_samples(stream: ImuStream, retained: Bools, how: str) -> ImuStream:
     """One sensor with samples lost.
 
     Parameters
@@ -202,11 +202,11 @@ def lose_samples(stream: ImuStream, kept: Bools, how: str) -> ImuStream:
     how : "missing" rows are not there, "acc", "gyr" or "both" are NaN, "frozen" rows repeat the last one,
         "zero" rows hold zeros.
     """
-    acc, gyr, gone = stream.acc.copy(), None if stream.gyr is None else stream.gyr.copy(), ~kept
-    if how == "missing" and kept.any():
-        mag, quat = (None if x is None else x[kept] for x in (stream.mag, stream.quat))
-        gyr = None if gyr is None else gyr[kept]
-        return replace(stream, t_s=stream.t_s[kept], acc=acc[kept], gyr=gyr, mag=mag, quat=quat)
+    acc, gyr, gone = stream.acc.copy(), None if stream.gyr is None else stream.gyr.copy(), ~retained
+    if how == "missing" and retained.any():
+        mag, quat = (None if x is None else x[retained] for x in (stream.mag, stream.quat))
+        gyr = None if gyr is None else gyr[retained]
+        return replace(stream, t_s=stream.t_s[retained], acc=acc[retained], gyr=gyr, mag=mag, quat=quat)
     if how == "frozen":
         for start, stop in find_runs(gone):
             at = max(start - 1, 0)

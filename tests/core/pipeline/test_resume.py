@@ -20,13 +20,13 @@ OTHER = PipelineConfig(strides=StrideParams(edge_strides=2))
 
 
 @cache
-def take(*worn: Segment) -> Recording:
-    return simulate_scenario("comfortable", 1, worn=worn or None).recording
+def take(*segments: Segment) -> Recording:
+    return simulate_scenario("comfortable", 1, worn=segments or None).recording
 
 
 @cache
-def whole(*worn: Segment) -> TakeAnalysis:
-    return analyse(take(*worn))
+def whole(*segments: Segment) -> TakeAnalysis:
+    return analyse(take(*segments))
 
 
 def same(x: Any, y: Any) -> bool:

@@ -22,8 +22,8 @@ from tests.helpers.mobgap import TRIALS, recording
 
 
 @cache
-def analysis(*worn: Segment, name: str = "fast_with_turns") -> TakeAnalysis:
-    return analyse(simulate_scenario(name, 1, worn=worn).recording)
+def analysis(*segments: Segment, name: str = "fast_with_turns") -> TakeAnalysis:
+    return analyse(simulate_scenario(name, 1, worn=segments).recording)
 
 
 def figures(a: TakeAnalysis) -> dict[str, Parameter]:

@@ -33,10 +33,10 @@ def moved(shaking_m: float = 0.004) -> SensorSignals:
     return SensorSignals("a", acc, gyr, None, mask, ~mask)
 
 
-def with_gyroscope(times: Floats, of: SensorSignals | None = None) -> SensorSignals:
+def with_gyroscope(times: Floats, source: SensorSignals | None = None) -> SensorSignals:
     """The same sensor whose gyroscope has to be multiplied by this."""
-    of = of or moved()
-    return of.change(gyr=of.gyr @ np.linalg.inv(times).T)
+    source = source or moved()
+    return source.change(gyr=source.gyr @ np.linalg.inv(times).T)
 
 
 def test_every_way_to_name_and_sign_three_axes_is_tried_once_and_the_stated_one_first() -> None:

@@ -29,9 +29,9 @@ def told(
     return simulation, analyse(simulation.recording, config)
 
 
-def error_deg(made: Simulation, found: TakeAnalysis, name: str) -> float:
-    assert found.angles is not None
-    truth, angles = made.truth, found.angles.angles[name]
+def error_deg(result: Simulation, actual: TakeAnalysis, name: str) -> float:
+    assert actual.angles is not None
+    truth, angles = result.truth, actual.angles.angles[name]
     walking = (truth.t_s > truth.stands[0][1]) & (truth.t_s < truth.stands[-1][0])
     n = min(len(angles), len(truth.t_s))
     difference = (angles[:n] - truth.subtract_standing()[name][:n])[walking[:n]]

@@ -14,9 +14,9 @@ BESIDE = Dipole((3.0, 0.6, 0.4), (0.0, 0.05, 0.0))
 """Something like a steel cabinet beside the walkway: 0.2 to 0.5 of the Earth's field at the nearest leg."""
 
 
-def _world_field(made: Simulation, segment: Segment) -> Floats:
-    q = multiply(made.truth.q[segment], made.truth.mounts[segment].q_segment_sensor)
-    return rotate(q, made.ideal[segment].mag)
+def _world_field(result: Simulation, segment: Segment) -> Floats:
+    q = multiply(result.truth.q[segment], result.truth.mounts[segment].q_segment_sensor)
+    return rotate(q, result.ideal[segment].mag)
 
 
 def test_the_earth_field_points_down_in_the_north() -> None:

@@ -25,8 +25,8 @@ class Sent:
     gyr: Floats
 
 
-def _stream(made: Simulation, segment: Segment) -> Sent:
-    stream = made.recording.streams[next(d for d, s in made.recording.segments.items() if s == segment)]
+def _stream(result: Simulation, segment: Segment) -> Sent:
+    stream = result.recording.streams[next(d for d, s in result.recording.segments.items() if s == segment)]
     assert stream.gyr is not None
     return Sent(stream.t_s, stream.acc, stream.gyr)
 

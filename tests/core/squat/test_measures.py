@@ -73,8 +73,8 @@ def test_repetitions_and_measures_are_the_true_ones(side: Side) -> None:
     assert measurement.values["squat_duration_s"] == pytest.approx(total)
 
 
-def _at_holds(made: SquatSimulation, name: str) -> Floats:
-    truth = made.truth
+def _at_holds(result: SquatSimulation, name: str) -> Floats:
+    truth = result.truth
     middles = [0.5 * (p.start_s + p.end_s) for p in truth.phases if p.kind == "hold"]
     return np.interp(middles, truth.t_s, truth.subtract_standing()[name])
 

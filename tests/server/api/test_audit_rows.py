@@ -202,11 +202,11 @@ class Visits:
         if path.startswith(f"{API}/filter-runs"):
             names["files"] = "filters.csv"
 
-        def value(found: re.Match[str]) -> str:
-            name = found[1]
+        def value(result: re.Match[str]) -> str:
+            name = result[1]
             if name == "session_id" and path.endswith("/sensitivities"):
                 return self.squats
-            return names[path[: found.start()].split("/")[-2]] if name == "name" else self.values[name]
+            return names[path[: result.start()].split("/")[-2]] if name == "name" else self.values[name]
 
         return re.sub(r"\{(\w+)(?::path)?\}", value, path) + QUERY.get(route, "")
 

@@ -66,8 +66,8 @@ async def change(clinic: Clinic, code: str, **values: Any) -> None:
         assert answer.status_code == 200
 
 
-def row(found: dict[str, Any], name: str) -> dict[str, Any]:
-    return next(r for r in found["parameters"] if r["name"] == name)
+def row(result: dict[str, Any], name: str) -> dict[str, Any]:
+    return next(r for r in result["parameters"] if r["name"] == name)
 
 
 async def test_what_no_table_compares_is_held_against_own_controls(clinic: Clinic) -> None:

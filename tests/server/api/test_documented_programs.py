@@ -54,10 +54,10 @@ async def test_the_programs_upload_analyse_and_download(tmp_path: Path) -> None:
     assert (tmp_path / "python" / "angles.parquet").stat().st_size > 1000
 
 
-async def _run(command: list[str], here: Path, url: str, take: Path) -> None:
+async def _run(command: list[str], place: Path, url: str, take: Path) -> None:
     env = {**os.environ, "URL": url, "NAME": "clinician", "PASSWORD": PASSWORD, "FILES": str(take)}
     process = await asyncio.create_subprocess_exec(
-        *command, cwd=here, env=env, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
+        *command, cwd=place, env=env, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
     )
     output, _ = await asyncio.wait_for(process.communicate(), 300)
     assert process.returncode == 0, output.decode()

@@ -34,21 +34,21 @@ async def _prescribe(clinic: Clinic, patient: str) -> str:
     return str(answer.json()["id"])
 
 
-def _live(clinic: Clinic, session: str, given: Prescription, baseline: Baseline) -> tuple[list[Cue], str]:
+def _live(clinic: Clinic, session: str, inputs: Prescription, baseline: Baseline) -> tuple[list[Cue], str]:
     """The cues that the strides of a session's analysis would have got, and its recording."""
     reviewed = clinic.app.state.reviewed
     with clinic.db.read() as c:
         analysis = analyses.get_shown(c, session)
         edits = edit_log.edits_of(c, analysis.id)
     strides = reviewed.read_bundle(analysis, edits).strides.strides
-    column = reviewed.read_columns(analysis, edits)[given.parameter]
-    engine = FeedbackEngine(given, baseline)
+    column = reviewed.read_columns(analysis, edits)[inputs.parameter]
+    engine = FeedbackEngine(inputs, baseline)
     cues = []
     for n, (s, value) in enumerate(zip(strides, column, strict=True)):
         counted_strides = s.excluded_reason is None
         notices = None if value is None else value + TOLD
         stride = Walked(
-            n, s.side, s.start_s - 0.03, s.end_s, s.end_s, {given.parameter: notices}, {}, counted_strides
+            n, s.side, s.start_s - 0.03, s.end_s, s.end_s, {inputs.parameter: notices}, {}, counted_strides
         )
         cue = engine.push(stride)
         if cue is not None:

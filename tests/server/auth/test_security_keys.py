@@ -46,9 +46,9 @@ async def ask(client: httpx.AsyncClient, codes: list[str]) -> dict[str, Any]:
     return options
 
 
-async def set_up(client: httpx.AsyncClient, codes: list[str], at: str = HERE) -> SoftKey:
+async def set_up(client: httpx.AsyncClient, codes: list[str], position: str = HERE) -> SoftKey:
     key = SoftKey()
-    body = {"name": "blue", "key": key.create(await ask(client, codes), at)}
+    body = {"name": "blue", "key": key.create(await ask(client, codes), position)}
     answer = await client.post(f"{API}/account/security-keys", json=body)
     assert answer.status_code == 201, answer.text
     return key

@@ -57,12 +57,12 @@ def visit(clinic: Clinic, *, code: str = CODE, days_ago: int = 0) -> str:
 
 
 def publish(
-    clinic: Clinic, sid: str, worn: Mapping[str, str], *, exchanged: bool = False, bias_dps: float = 0.0
+    clinic: Clinic, sid: str, segments: Mapping[str, str], *, exchanged: bool = False, bias_dps: float = 0.0
 ) -> None:
     """Publish an analysis's device checks."""
     result = [
         {**check(d, bias_dps).to_json(), "segment": segment, "exchanged": exchanged}
-        for d, segment in worn.items()
+        for d, segment in segments.items()
     ]
     with clinic.db.write() as c:
         devices.keep_checks(c, recordings.require_current(c, sid).id, result)

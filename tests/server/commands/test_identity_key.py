@@ -18,11 +18,11 @@ def keep_name(clinic: Clinic) -> None:
 
 def ask(
     clinic: Clinic,
-    what: Literal["make", "change", "discard"],
+    label: Literal["make", "change", "discard"],
     really: bool = False,
     without_key: bool = False,
 ) -> int:
-    return identity_key(what, really=really, without_key=without_key, data_dir=clinic.folder)
+    return identity_key(label, really=really, without_key=without_key, data_dir=clinic.folder)
 
 
 def test_a_key_is_made_once(clinic: Clinic, capsys: pytest.CaptureFixture[str]) -> None:

@@ -56,10 +56,10 @@ def test_a_stride_that_a_person_left_out_is_told_and_counts_in_no_mean() -> None
     assert {row["parameter"] for row in rows} == set(content.columns)
     assert {(row["side"], row["counted"]) for row in rows} == {(edit.side, "0")}
 
-    def n(found: dict[str, list[dict[str, str]]]) -> int:
+    def n(result: dict[str, list[dict[str, str]]]) -> int:
         return next(
             int(r["n"])
-            for r in found["parameters.csv"]
+            for r in result["parameters.csv"]
             if (r["parameter"], r["side"]) == ("stride_time_s", edit.side)
         )
 

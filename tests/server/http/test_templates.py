@@ -66,9 +66,9 @@ def test_an_upgrade_below_a_running_process_is_not_mixed_with_what_it_has_read(
     result: list[object] = []
     compile_plainly = Environment.compile
 
-    def note(env: Environment, *given: Any, **others: Any) -> Any:
-        result.append(given)
-        return compile_plainly(env, *given, **others)
+    def note(env: Environment, *inputs: Any, **others: Any) -> Any:
+        result.append(inputs)
+        return compile_plainly(env, *inputs, **others)
 
     monkeypatch.setattr(Environment, "compile", note)
     templates.load_templates("en").env.get_template(PAGE)

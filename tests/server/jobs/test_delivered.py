@@ -54,9 +54,9 @@ class Office:
         )
         return {pid for (pid,) in run_sql(message, self.url)}
 
-    def await_listeners(self, count: int, known: frozenset[int] = frozenset()) -> None:
+    def await_listeners(self, count: int, reference: frozenset[int] = frozenset()) -> None:
         limit = time.monotonic() + PATIENCE_S
-        while len(self.listeners() - known) < count:
+        while len(self.listeners() - reference) < count:
             assert time.monotonic() < limit
             time.sleep(0.05)
 

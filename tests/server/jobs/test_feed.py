@@ -30,9 +30,9 @@ def test_two_watchers_see_every_state_and_the_end(db: Database) -> None:
     feed = JobFeed(db)
     observations: list[list[str]] = [[], []]
 
-    async def watch(who: int, job_id: str) -> None:
+    async def watch(user: int, job_id: str) -> None:
         async for view in feed.watch(job_id):
-            observations[who].append(view.state)
+            observations[user].append(view.state)
 
     async def story() -> None:
         view = submit(db, queue)
@@ -79,9 +79,9 @@ def test_a_watch_ends_when_the_job_is_erased_unknown_or_the_feed_closes(db: Data
     asyncio.run(asyncio.wait_for(story(), 60))
 
 
-async def collect(feed: JobFeed, job_id: str, seen: list[JobView]) -> None:
+async def collect(feed: JobFeed, job_id: str, observations: list[JobView]) -> None:
     async for view in feed.watch(job_id):
-        seen.append(view)  # noqa: PERF401 - filled while it is watched
+        observations.append(view)  # noqa: PERF401 - filled while it is watched
 
 
 async def reached(look: object) -> None:

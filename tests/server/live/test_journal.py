@@ -83,8 +83,8 @@ def test_what_a_busy_database_refuses_is_written_later_before_what_came_meanwhil
         journal = Journal(mine)
         note_refusal = DiskLog.note_refusal
 
-        def tell(disk: DiskLog, error: BaseException, what: str) -> None:
-            note_refusal(disk, error, what)
+        def tell(disk: DiskLog, error: BaseException, label: str) -> None:
+            note_refusal(disk, error, label)
             journal.add(take, "notice", 2.0, {})
 
         monkeypatch.setattr(DiskLog, "note_refusal", tell)

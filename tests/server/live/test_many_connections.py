@@ -27,9 +27,9 @@ def descriptors() -> int:
     return len(list(Path("/proc/self/fd").iterdir()))
 
 
-async def come_and_go(v: Visit, how: str) -> None:
+async def come_and_go(v: Visit, mode: str) -> None:
     async with connect(v.socket, compression=None, proxy=None) as ws:
-        match how:
+        match mode:
             case "silent":
                 ws.transport.abort()
             case "hello, then gone":

@@ -168,13 +168,13 @@ def vars_of(begin: FollowTake) -> tuple[Any, ...]:
     return tuple(getattr(begin, name) for name in begin.__struct_fields__[1:])
 
 
-def follow_until_closed(line: Channel, web: Channel, said: list[EstimateFailed]) -> None:
+def follow_until_closed(line: Channel, web: Channel, message: list[EstimateFailed]) -> None:
     """Follow until the first report, then close the web's side."""
 
     def read() -> None:
         report = decode_report(web.receive())
         assert isinstance(report, EstimateFailed)
-        said.append(report)
+        message.append(report)
         web.close()
 
     reader = threading.Thread(target=read)

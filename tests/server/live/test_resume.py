@@ -75,9 +75,9 @@ class Tablet:
         self.at, self.online = next_seq, True
         self.acked = next_seq
 
-    def heard(self, below: int) -> None:
-        assert below <= self.reached
-        self.acked = max(self.acked, below)
+    def heard(self, limit: int) -> None:
+        assert limit <= self.reached
+        self.acked = max(self.acked, limit)
 
     def lost(self) -> None:
         self.online = False

@@ -47,10 +47,10 @@ def findings(settings: Settings) -> list[str]:
     return [f"{f.area}: {f.message}" for f in result]
 
 
-def flip(path: Path, at: int) -> bytes:
+def flip(path: Path, position: int) -> bytes:
     """Flip one bit of a file and return its new content."""
     content = bytearray(path.read_bytes())
-    content[at] ^= 1
+    content[position] ^= 1
     path.write_bytes(content)
     return bytes(content)
 

@@ -36,8 +36,8 @@ async def gone(log: Path) -> None:
             await asyncio.sleep(0.01)
 
 
-async def acknowledged(ws: ClientConnection, below: int) -> None:
-    while (await heard(ws, "ack"))["ack"] < below:
+async def acknowledged(ws: ClientConnection, limit: int) -> None:
+    while (await heard(ws, "ack"))["ack"] < limit:
         pass
 
 

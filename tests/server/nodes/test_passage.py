@@ -35,10 +35,10 @@ def ask(client: str = "192.0.2.7") -> Scope:
     }
 
 
-def pass_on(asked: Scope, line: bytes) -> Scope:
+def pass_on(requests: Scope, line: bytes) -> Scope:
     """What arrives: from the address of the other server, by plain HTTP."""
-    headers = [*asked["headers"], (HEADER, line)]
-    return {**asked, "client": ("10.0.0.2", 50000), "scheme": "http", "headers": headers}
+    headers = [*requests["headers"], (HEADER, line)]
+    return {**requests, "client": ("10.0.0.2", 50000), "scheme": "http", "headers": headers}
 
 
 async def see(scope: Scope) -> Scope | int:

@@ -86,11 +86,11 @@ def open_take_at(pair: NodePair, node: RunningNode, code: str) -> TakeThere:
     return next(take for number in range(50) if (take := open_take(pair, f"{code}-{number}")).owner is node)
 
 
-async def heard(ws: ClientConnection, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+async def heard(ws: ClientConnection, expected: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
     async with asyncio.timeout(PATIENCE_S):
         async for text in ws:
             message: dict[str, Any] = json.loads(text)
-            if wanted(message):
+            if expected(message):
                 return message
     pytest.fail(f"the line ended with {ws.close_code}")
 

@@ -71,10 +71,10 @@ def pages(monkeypatch: pytest.MonkeyPatch) -> dict[str, Shown]:
     result: dict[str, Shown] = {}
 
     def look(
-        request: Request, template: str, context: Mapping[str, Any], *rest: Any, **others: Any
+        request: Request, template: str, context: Mapping[str, Any], *remainder: Any, **others: Any
     ) -> Response:
         result[template] = Shown(template, {**context, "request": request})
-        return render(request, template, context, *rest, **others)
+        return render(request, template, context, *remainder, **others)
 
     monkeypatch.setattr(shell, "render", look)
     return result
@@ -139,14 +139,14 @@ def speak(rule: Rule, flags: Sequence[Flag], sides: Sequence[Side]) -> HeadlineS
     return own[0] if own else second
 
 
-def fill_headline(before: Headline, sentence: HeadlineSentence, rank: int) -> Headline:
+def fill_headline(earlier: Headline, sentence: HeadlineSentence, rank: int) -> Headline:
     """A headline of as many sentences as there are ranks, this one at its rank."""
-    there = [*before.stands_out]
+    there = [*earlier.stands_out]
     while len(there) < len(RANKS):
         there.append(
             HeadlineSentence("step_length_m", "left", "step", "sides", 2.0, "The ", "left", " step", "sides")
         )
-    return replace(before, stands_out=(*there[:rank], sentence, *there[rank : len(RANKS) - 1]))
+    return replace(earlier, stands_out=(*there[:rank], sentence, *there[rank : len(RANKS) - 1]))
 
 
 def list_cases(*, whole: bool) -> list[tuple[Rule, int, tuple[Side, ...]]]:

@@ -139,18 +139,18 @@ class Hostile:
             c.execute(update(table).where(*mine).values({k.name: self.make(name_column(k)) for k in columns}))
 
 
-def add_missing(c: Connection, known: dict[str, str], others: Mapping[str, dict[str, Any]]) -> None:
+def add_missing(c: Connection, reference: dict[str, str], rest_of: Mapping[str, dict[str, Any]]) -> None:
     """Add a row to every table with user text that has none."""
     for table in metadata.sorted_tables:
         if not any(column in ENTERED for column in table.c) or c.execute(select(table)).first() is not None:
             continue
-        values = {column.name: find_value(column, known) for column in table.c if not column.nullable}
-        c.execute(insert(table).values(values | others.get(table.name, {})))
+        values = {column.name: find_value(column, reference) for column in table.c if not column.nullable}
+        c.execute(insert(table).values(values | rest_of.get(table.name, {})))
 
 
-def find_value(column: Column[Any], known: Mapping[str, str]) -> Any:
+def find_value(column: Column[Any], reference: Mapping[str, str]) -> Any:
     if column.foreign_keys:
-        return known[next(iter(column.foreign_keys)).column.table.name]
+        return reference[next(iter(column.foreign_keys)).column.table.name]
     kind = getattr(column.type, "impl_instance", column.type).python_type
     now = dt.datetime.now(dt.UTC)
     result: dict[type, Any] = {

@@ -39,8 +39,8 @@ def take(
     return StudyTake(name, labels, 2, {"walk.txt": f"hash of {name}"}, error, analysis, lambda: strides)
 
 
-def rows(made: StudyTables, name: str) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO(made.files[name].decode())))
+def rows(result: StudyTables, name: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(result.files[name].decode())))
 
 
 REFUSED = InputError("missing_acc", "No acceleration.")

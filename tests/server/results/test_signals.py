@@ -33,9 +33,9 @@ def found(stored: Clinic) -> AnalysisRecord:
 
 
 def window(
-    stored: Clinic, found: AnalysisRecord, name: str, start_s: float, end_s: float, points: int
+    stored: Clinic, result: AnalysisRecord, name: str, start_s: float, end_s: float, points: int
 ) -> SignalWindow:
-    return read_window(stored.app.state.reviewed, found, name, start_s, end_s, points)
+    return read_window(stored.app.state.reviewed, result, name, start_s, end_s, points)
 
 
 def test_feet_come_first_then_joints_then_sensors(stored: Clinic, found: AnalysisRecord) -> None:

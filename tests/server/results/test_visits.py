@@ -45,8 +45,8 @@ def take(name: str, days: int = 0, minute: int = 0, **walked: Any) -> AnalysedSe
     return AnalysedSession(session, analysis_record, EditHistory())
 
 
-def names(found: list[ClinicVisit]) -> list[list[str]]:
-    return [[t.session.id for t in v.takes] for v in found]
+def names(result: list[ClinicVisit]) -> list[list[str]]:
+    return [[t.session.id for t in v.takes] for v in result]
 
 
 def test_takes_of_one_day_that_were_walked_alike_are_one_visit_in_the_order_they_were_made() -> None:

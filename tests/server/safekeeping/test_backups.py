@@ -91,15 +91,17 @@ def make(clinic: Clinic, key: ClinicKey | None = None) -> MadeBackup:
     return make_backup(clinic.db, clinic.settings, clinic.folder.parent / "disk", key)
 
 
-def put_back(clinic: Clinic, made: MadeBackup, key: ClinicKey | None = None) -> tuple[RestoredClinic, Clinic]:
+def put_back(
+    clinic: Clinic, result: MadeBackup, key: ClinicKey | None = None
+) -> tuple[RestoredClinic, Clinic]:
     """Restore into a folder next to the clinic, and open the result."""
-    return put_back_into(find_room(clinic, "again"), made, key)
+    return put_back_into(find_room(clinic, "again"), result, key)
 
 
 def put_back_into(
-    home: Settings, made: MadeBackup, key: ClinicKey | None = None
+    home: Settings, recording: MadeBackup, key: ClinicKey | None = None
 ) -> tuple[RestoredClinic, Clinic]:
-    result = restore(made.path, home, key)
+    result = restore(recording.path, home, key)
     repeat = object.__new__(Clinic)
     repeat.settings, repeat.folder = home, home.data_dir
     repeat.db, repeat.blobs = Database(home.database_source), FolderBlobs(home.blobs)

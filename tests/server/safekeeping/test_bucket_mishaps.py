@@ -319,11 +319,11 @@ def test_who_is_erased_while_a_sweep_copies_leaves_no_copy(
     prepare = BucketTrash.prepare
     copied: list[str] = []
 
-    def prepare_late(self: BucketTrash, found: Collection[Address], at: Any) -> None:
+    def prepare_late(self: BucketTrash, result: Collection[Address], position: Any) -> None:
         """The copies are done after the erasure has looked into the trash."""
-        prepare(self, found, at)
+        prepare(self, result, position)
         erase(clinic)
-        copied.extend(f"trash/{name_stamp(at)}/{space}/{name}" for space, name in found)
+        copied.extend(f"trash/{name_stamp(position)}/{space}/{name}" for space, name in result)
         for key in copied:
             bucket.write(key, b"of nobody")
 
@@ -346,8 +346,8 @@ def test_a_copy_of_what_an_erased_session_had_goes_too(
     retained = bucket.objects() - {f"blobs/{clinic.patient.id}/{stray.sha256}"}
     prepare = BucketTrash.prepare
 
-    def prepare_and_remove(self: BucketTrash, found: Collection[Address], at: Any) -> None:
-        prepare(self, found, at)
+    def prepare_and_remove(self: BucketTrash, result: Collection[Address], position: Any) -> None:
+        prepare(self, result, position)
         assert len(bucket.objects()) == 3
         references.discard(clinic.db, clinic.blobs, clinic.patient.id, [stray.sha256])
 

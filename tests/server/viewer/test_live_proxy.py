@@ -177,10 +177,10 @@ async def test_the_last_picture_is_there_for_who_opens_the_page_later(ward: Ward
             assert the_view(ward, dark).figure._t_s == pytest.approx(40 / 30)
 
 
-async def _come(what: Callable[[], bool]) -> None:
+async def _come(label: Callable[[], bool]) -> None:
     """Wait for something."""
     async with asyncio.timeout(5):
-        while not what():
+        while not label():
             await asyncio.sleep(0.02)
 
 

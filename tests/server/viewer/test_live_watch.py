@@ -150,10 +150,10 @@ def reference(trained: Side | None = None, norm: dict[str, np.ndarray] = NORM) -
     return LiveReference(walk.BODY, lambda _: norm, lambda: trained)
 
 
-def knee(found: ReferenceWalk | None, phase: float) -> float:
+def knee(result: ReferenceWalk | None, phase: float) -> float:
     """Knee flexion of both legs at one phase."""
-    assert found is not None
-    posed = found.at(dict.fromkeys(SIDES, phase), (0.0, 0.0), 0.0)
+    assert result is not None
+    posed = result.at(dict.fromkeys(SIDES, phase), (0.0, 0.0), 0.0)
     assert posed is not None
     q = {s: posed[0][k] for k, s in enumerate(SEGMENTS)}
     left, right = (-cardan_zxy(multiply(conjugate(q[THIGH[side]]), q[SHANK[side]]))[0] for side in SIDES)

@@ -41,8 +41,8 @@ def test_a_face_looks_at_who_sees_it_turn_left() -> None:
     assert find_front(values, mesh).tolist() == [True, False, False]
 
 
-def area(line: list[int], seen: Floats) -> float:
-    x, y = seen[line].T
+def area(line: list[int], observations: Floats) -> float:
+    x, y = observations[line].T
     return float(0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
 
 

@@ -29,7 +29,7 @@ def clinic(tmp_path: Path) -> Iterator[Clinic]:
     new_clinic.db.close()
 
 
-def quiet(*said: object) -> None:
+def quiet(*message: object) -> None:
     """Worker without notifications."""
 
 

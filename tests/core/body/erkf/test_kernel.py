@@ -108,9 +108,9 @@ def test_a_lost_sample_is_doubted_wholly_and_a_patched_one_more() -> None:
     assert Q[[18, 21]] == pytest.approx([(0.2**2 + 9.0) * dt**2, (0.02**2 + 16.0) * dt**2])
 
 
-def judge(given: ErkfMemory, data: ErkfSamples, p: Noise) -> tuple[list[bool], list[bool], ErkfScratch]:
+def judge(inputs: ErkfMemory, data: ErkfSamples, p: Noise) -> tuple[list[bool], list[bool], ErkfScratch]:
     room, refused = scratch(), np.zeros(N, np.bool_)
-    kernel.judge_contacts(given, data, 0, p, room, np.zeros(len(given.P)), refused)
+    kernel.judge_contacts(inputs, data, 0, p, room, np.zeros(len(inputs.P)), refused)
     return room.taken.tolist(), refused.tolist(), room
 
 

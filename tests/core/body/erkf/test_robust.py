@@ -40,12 +40,12 @@ def shuffled(take: Take, order: list[int]) -> Take:
     return replace(take, tree=tree, inputs=ErkfInputs(x.step_s, x.acc[:, order], x.gyr[:, order], *flags))
 
 
-def remounted(take: Take, by: Floats) -> Take:
+def remounted(take: Take, key: Floats) -> Take:
     """Every sensor turned on its segment by a rotation (n, 4)."""
     t, x = take.tree, take.inputs
 
     def end(i: int, r: Floats) -> Floats:
-        return np.asarray(rotate(by[i], r))
+        return np.asarray(rotate(key[i], r))
 
     joints = [
         replace(
@@ -57,8 +57,8 @@ def remounted(take: Take, by: Floats) -> Take:
         )
         for j in t.joints
     ]
-    tree = replace(t, joints=tuple(joints), q_mount=multiply(t.q_mount, conjugate(by)))
-    return replace(take, tree=tree, inputs=replace(x, acc=rotate(by, x.acc), gyr=rotate(by, x.gyr)))
+    tree = replace(t, joints=tuple(joints), q_mount=multiply(t.q_mount, conjugate(key)))
+    return replace(take, tree=tree, inputs=replace(x, acc=rotate(key, x.acc), gyr=rotate(key, x.gyr)))
 
 
 @pytest.mark.slow

@@ -58,9 +58,9 @@ def mixed_walk(seed: int = 2) -> Take:
     return take_of(simulate(MIXED, seed=seed, setup=RecordingSetup()))
 
 
-def take_of(made: Simulation) -> Take:
+def take_of(result: Simulation) -> Take:
     """Inputs with the true mounts and places; gyroscope bias from the first standing."""
-    recording, truth = synchronise(made.recording), made.truth
+    recording, truth = synchronise(result.recording), result.truth
     mounts = {s: to_matrix(truth.mounts[s].q_segment_sensor) for s in SEGMENTS}
     places = {s: truth.mounts[s].position_m for s in SEGMENTS}
     tree = person_tree(truth.body, mounts, SEGMENTS, places)

@@ -54,12 +54,12 @@ def right(estimator: Estimator, name: str = "fast_with_turns") -> PoseEstimate:
     return run(take(estimator, name), estimator)
 
 
-def codes(made: PoseEstimate) -> set[str]:
-    return {n.code for n in made.poses.notices}
+def codes(result: PoseEstimate) -> set[str]:
+    return {n.code for n in result.poses.notices}
 
 
-def finding(made: PoseEstimate, name: str, of: str | None = None) -> tuple[float, Verdict]:
-    (result,) = (f for f in made.poses.health if (f.name, f.of) == (name, of))
+def finding(recording: PoseEstimate, name: str, source: str | None = None) -> tuple[float, Verdict]:
+    (result,) = (f for f in recording.poses.health if (f.name, f.of) == (name, source))
     return result.value, result.verdict
 
 

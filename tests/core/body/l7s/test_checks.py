@@ -37,12 +37,12 @@ def walk(turn_per_s: float = 0.0, *, pelvis: bool = False) -> SeenWalk:
     return SeenWalk(step, forward, feet, np.zeros((N, 3)) if pelvis else None)
 
 
-def check(seen: SeenWalk) -> dict[str, float]:
-    return walking_checks(seen, MODEL, RATE)
+def check(observations: SeenWalk) -> dict[str, float]:
+    return walking_checks(observations, MODEL, RATE)
 
 
-def exchanged(seen: SeenWalk) -> SeenWalk:
-    return replace(seen, step=seen.step[:, ::-1], feet=seen.feet[:, ::-1])
+def exchanged(observations: SeenWalk) -> SeenWalk:
+    return replace(observations, step=observations.step[:, ::-1], feet=observations.feet[:, ::-1])
 
 
 def test_a_straight_walk_has_its_feet_in_place_and_in_turn() -> None:
@@ -130,10 +130,10 @@ def test_rise_and_tilt_of_the_pelvis_are_those_of_its_movement() -> None:
     assert result["pelvis_tilt_sd_rad"] == pytest.approx(0.02 / np.sqrt(2.0), rel=0.01)
 
 
-def inputs(turned: Floats, worn: str) -> L7sInputs:
+def inputs(turned: Floats, segments: str) -> L7sInputs:
     acc = np.zeros((2, 3, 3))
     acc[:, 0] = (1.0, 2.0, 3.0)
-    return L7sInputs(np.broadcast_to(turned, (2, 3, 3, 3)), acc, np.ones((2, 2), np.bool_), worn)  # type: ignore[arg-type]
+    return L7sInputs(np.broadcast_to(turned, (2, 3, 3, 3)), acc, np.ones((2, 2), np.bool_), segments)  # type: ignore[arg-type]
 
 
 def test_a_block_is_seen_level_and_in_the_axes_of_the_pelvis() -> None:

@@ -16,8 +16,8 @@ from tests.core.body.live_standing import BODY, NEUTRAL, RATE, mounted, stand
 THREE: tuple[Segment, ...] = ("foot_r", "pelvis", "foot_l")
 
 
-def figure(*worn: Segment) -> LiveL7s:
-    column, reference = {s: i for i, s in enumerate(worn)}, mounted(*worn)
+def figure(*segments: Segment) -> LiveL7s:
+    column, reference = {s: i for i, s in enumerate(segments)}, mounted(*segments)
     feet = FootPaths(FilteredSensors(("foot_l", "foot_r"), column, reference, BODY, RATE, live_params()))
     return LiveL7s(column, reference, BODY, RATE, feet)
 

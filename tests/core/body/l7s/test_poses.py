@@ -55,10 +55,10 @@ def walk() -> tuple[CalibratedRecording, Orientations, dict[Side, Bools], WalkTr
     return calibrated, estimate_orientations(calibrated), still_feet(calibrated), truth
 
 
-def poses_of(worn: Worn, params: L7sParams | None = None, *, both_ways: bool = True) -> Poses:
+def poses_of(segments: Worn, params: L7sParams | None = None, *, both_ways: bool = True) -> Poses:
     calibrated, orientations, steps, truth = walk()
     acceleration = free_acceleration(calibrated, orientations)
-    return l7s_poses(orientations, acceleration, steps, truth.body, params, worn, both_ways=both_ways)
+    return l7s_poses(orientations, acceleration, steps, truth.body, params, segments, both_ways=both_ways)
 
 
 def random_state(seed: int) -> tuple[Floats, Floats, Floats]:

@@ -36,8 +36,8 @@ def walk(worn: Worn) -> tuple[L7sInputs, L7sTrack, LegModel, Floats]:
     return inputs, track, model, places
 
 
-def whole(worn: Worn) -> WholeTrack:
-    inputs, track, model, _ = walk(worn)
+def whole(segments: Worn) -> WholeTrack:
+    inputs, track, model, _ = walk(segments)
     return smooth_track(track, inputs, np.ones((len(inputs.step), 3), bool), model, 100.0)
 
 

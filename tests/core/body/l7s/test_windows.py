@@ -22,9 +22,9 @@ def short_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(windows, "LONG", 1000)
 
 
-def compare(found: Poses, whole: Poses) -> tuple[float, float]:
+def compare(result: Poses, whole: Poses) -> tuple[float, float]:
     """Largest difference in m of any place, and of a knee from its ankle."""
-    apart = {s: found.p[s] - whole.p[s] for s in whole.p}
+    apart = {s: result.p[s] - whole.p[s] for s in whole.p}
     legs = (np.abs(apart[SHANK[side]] - apart[FOOT[side]]).max() for side in SIDES)
     return max(float(np.abs(x).max()) for x in apart.values()), float(max(legs))
 

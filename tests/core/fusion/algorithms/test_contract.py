@@ -304,8 +304,8 @@ def test_the_process_noise_of_guo_follows_the_innovations() -> None:
     l1, l2, m1, m2, m3, m4, h1, h2 = shape.tolist()
     corners: Corners = (l1, l2, m1, m2, m3, m4, h1, h2)
 
-    def scaled(by: float) -> Corners:
-        a, b, c, d, e, f, g, h = (by * x for x in corners)
+    def scaled(key: float) -> Corners:
+        a, b, c, d, e, f, g, h = (key * x for x in corners)
         return a, b, c, d, e, f, g, h
 
     for sigma in (0.01, 1.5):

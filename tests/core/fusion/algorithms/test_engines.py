@@ -73,8 +73,8 @@ def test_every_algorithm_starts_at_the_orientations_it_is_given(algorithm: Algor
 def test_without_a_magnetometer_no_bias_about_the_vertical_is_learnt(monkeypatch: pytest.MonkeyPatch) -> None:
     requests: list[list[float]] = []
 
-    def listen(*given: object) -> None:
-        requests.append(list(given[7]))  # type: ignore[call-overload]
+    def listen(*inputs: object) -> None:
+        requests.append(list(inputs[7]))  # type: ignore[call-overload]
 
     monkeypatch.setattr(complementary, "run_complementary", listen)
     none = np.empty((0, 2, 3))

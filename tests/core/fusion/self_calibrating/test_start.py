@@ -58,8 +58,8 @@ def measured(n: int, rate: float = 0.0) -> tuple[Floats, Floats, Floats]:
     return rotate(conjugate(q), np.array([0.0, 0.0, rate])), up, field
 
 
-def level(found: Start, acc: Floats) -> Floats:
-    return np.asarray(found.turn_to_world(acc / np.linalg.norm(acc)))
+def level(result: Start, acc: Floats) -> Floats:
+    return np.asarray(result.turn_to_world(acc / np.linalg.norm(acc)))
 
 
 @pytest.mark.parametrize(

@@ -21,9 +21,14 @@ T = np.arange(101) / 10.0
 RISE, DOWN = ChairChange("sit_to_stand", 2.0, 4.0), ChairChange("stand_to_sit", 6.0, 8.0)
 
 
-def at(found: SeatMotion, time_s: float) -> tuple[float, float, float, float]:
+def at(result: SeatMotion, time_s: float) -> tuple[float, float, float, float]:
     k = round(10.0 * time_s)
-    return float(found.drop[k]), float(found.back[k]), float(found.pelvis_rad[k]), float(found.chest_rad[k])
+    return (
+        float(result.drop[k]),
+        float(result.back[k]),
+        float(result.pelvis_rad[k]),
+        float(result.chest_rad[k]),
+    )
 
 
 SITS = pytest.approx((DROP, BACK, SEATED_TILT, SEATED_CHEST), abs=1e-12)

@@ -36,16 +36,16 @@ def made() -> SquatSimulation:
     return simulate_squats(squats, HEIGHT_M, 0, setup, place_as_agreed(HEIGHT_M, squats.sides))
 
 
-async def visit(clinic: Clinic, made: SquatSimulation, code: str, protocol: str = "squat") -> str:
+async def visit(clinic: Clinic, result: SquatSimulation, code: str, protocol: str = "squat") -> str:
     async with clinic.client("clinician") as client:
         patient = (await client.post(f"{API}/patients", json={"code": code})).json()["id"]
         requests = {"title": "Squats", "protocol": protocol}
         session: str = (await client.post(f"{API}/patients/{patient}/sessions", json=requests)).json()["id"]
-    analysed.finish(clinic, patient, session, analysis_files(analyse(made.recording)))
+    analysed.finish(clinic, patient, session, analysis_files(analyse(result.recording)))
     return session
 
 
-def work(clinic: Clinic, session: str, made: SquatSimulation, *others: SourceFile) -> list[str]:
+def work(clinic: Clinic, session: str, result: SquatSimulation, *rest_of: SourceFile) -> list[str]:
     """Run the next job like a worker and its child, in this process; return the reported stages."""
     state, notices = clinic.app.state, list[str]()
     claim = state.queue.claim("tester", [SENSITIVITY])
@@ -53,7 +53,7 @@ def work(clinic: Clinic, session: str, made: SquatSimulation, *others: SourceFil
     def say(stage: str, share: float, message: str | None = None) -> None:
         notices.append(stage)
 
-    files = [SourceFile.of_bytes("recording.parquet", write_recording(made.recording)), *others]
+    files = [SourceFile.of_bytes("recording.parquet", write_recording(result.recording)), *rest_of]
     results = sensitivities.run(files, claim.params, Attempt(say, lambda content: None))
     with clinic.db.read() as c:
         patient = sessions.get(c, session).patient_id

@@ -156,17 +156,17 @@ async def share(clinic: Clinic, name: str, report: str) -> dict[str, Any]:
         return dict(response.json())
 
 
-def leads(clinic: Clinic, made: dict[str, Any]) -> bool:
+def leads(clinic: Clinic, result: dict[str, Any]) -> bool:
     with clinic.db.read() as c:
         try:
-            return report_links.find_by_token(c, made["url"].rsplit("/", 1)[1]).is_open
+            return report_links.find_by_token(c, result["url"].rsplit("/", 1)[1]).is_open
         except report_links.LinkNotFound:
             return False
 
 
-def is_revoked(clinic: Clinic, made: dict[str, Any]) -> bool:
+def is_revoked(clinic: Clinic, result: dict[str, Any]) -> bool:
     with clinic.db.read() as c:
-        return report_links.get(c, made["link"]["id"]).revoked_at is not None
+        return report_links.get(c, result["link"]["id"]).revoked_at is not None
 
 
 @pytest.mark.slow

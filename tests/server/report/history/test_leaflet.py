@@ -11,9 +11,9 @@ def knee(degrees: float, *, estimated: bool = False) -> Parameter:
     return Parameter("knee_flexion_rom_deg", "left", 40, degrees, 1.0, "deg", estimated=estimated)
 
 
-def tell(before: Parameter | None, after: Parameter) -> LeafletFigure:
-    changes = () if before is None else parameter_changes([before], [after], "left")
-    (result,) = list_figures([after, Parameter("step_length_m", "left", 0, None, None, "m")], changes, "left")
+def tell(earlier: Parameter | None, later: Parameter) -> LeafletFigure:
+    changes = () if earlier is None else parameter_changes([earlier], [later], "left")
+    (result,) = list_figures([later, Parameter("step_length_m", "left", 0, None, None, "m")], changes, "left")
     return result
 
 

@@ -24,8 +24,8 @@ def take(cues: list[Cue], values: list[float]) -> FeedbackSplit:
     return split(strides, cues)
 
 
-def view(found: FeedbackSplit) -> FeedbackView:
-    return feedback_view(prescription(), found, GuardState())
+def view(result: FeedbackSplit) -> FeedbackView:
+    return feedback_view(prescription(), result, GuardState())
 
 
 TRAINED = take(

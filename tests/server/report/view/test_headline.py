@@ -230,9 +230,9 @@ def test_short_and_quick_steps_are_one_sentence() -> None:
     ]
 
 
-def change(name: str, side: Side | None, by: float, limit: float, verdict: Verdict | None) -> Change:
+def change(name: str, side: Side | None, key: float, limit: float, verdict: Verdict | None) -> Change:
     return Change(
-        name, side, "", 1.0, 1.0 + by, by, verdict, limit, "a table", None, None, None, None, None, None
+        name, side, "", 1.0, 1.0 + key, key, verdict, limit, "a table", None, None, None, None, None, None
     )
 
 

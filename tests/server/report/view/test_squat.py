@@ -34,8 +34,8 @@ def angles(**changes: Floats) -> JointAngles:
     return JointAngles(t, out, dict.fromkeys(out, 0.1))
 
 
-def view(bundle: Bundle, *found: StoredRepetition, moved: JointAngles | None = None) -> SquatView:
-    visible_rows = squat_view(replace(bundle, repetitions=found, angles=moved))
+def view(bundle: Bundle, *result: StoredRepetition, moved: JointAngles | None = None) -> SquatView:
+    visible_rows = squat_view(replace(bundle, repetitions=result, angles=moved))
     assert visible_rows is not None
     return visible_rows
 

@@ -18,8 +18,8 @@ from sagittal.server.report.words.estimator import (
 from tests.server.report.conftest import MakeBundle
 
 
-def finding(name: str, of: str | None, value: float | None, verdict: str = "good") -> dict[str, Any]:
-    return {"name": name, "of": of, "value": value, "warn": 25.0, "bad": 80.0, "verdict": verdict}
+def finding(name: str, source: str | None, value: float | None, verdict: str = "good") -> dict[str, Any]:
+    return {"name": name, "of": source, "value": value, "warn": 25.0, "bad": 80.0, "verdict": verdict}
 
 
 def section(**changes: Any) -> dict[str, Any]:
