@@ -99,7 +99,7 @@ def run_unit(unit: Unit, store: Path, code: str, *, whole: bool) -> UnitResult:
     figures.unlink(missing_ok=True)
     environment = {**os.environ, STORE: str(figures), "SAGITTAL_VALIDATION": "whole" if whole else "sample"}
     command = [sys.executable, "-m", "pytest", "-n", "0", "-q", *unit.arguments]
-    began, at = time.monotonic(), datetime.now(UTC).isoformat(timespec="seconds")
+    began, position = time.monotonic(), datetime.now(UTC).isoformat(timespec="seconds")
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
     stored.with_suffix(".log").write_text(done.stdout + done.stderr, encoding="utf-8")
     lines = [line for line in done.stdout.splitlines() if line.strip()]
@@ -112,7 +112,7 @@ def run_unit(unit: Unit, store: Path, code: str, *, whole: bool) -> UnitResult:
         lines[-1].strip("= ") if lines else "",
         time.monotonic() - began,
         code,
-        at,
+        position,
         whole,
         [json.loads(line) for line in recorded],
     )

@@ -116,18 +116,18 @@ def judge(tree: Path, mutation: Mutation, marks: str) -> str:
     """Try the tests on one mutation: noticed, survived, or absent where the tree does not have that line."""
     path = tree / mutation.path
     lines = path.read_text("utf-8").splitlines(keepends=True) if path.exists() else []
-    at = next((i for i, line in enumerate(lines) if line.rstrip("\n") == mutation.before), None)
+    index = next((i for i, line in enumerate(lines) if line.rstrip("\n") == mutation.before), None)
     near = mutation.line - 1
     if near < len(lines) and lines[near].rstrip("\n") == mutation.before:
-        at = near
-    if at is None:
+        index = near
+    if index is None:
         return "absent"
     tests = list_tests(tree, mutation.path)
     if not tests:
         return "survived"
     source = "".join(lines)
     try:
-        path.write_text("".join([*lines[:at], mutation.after + "\n", *lines[at + 1 :]]), "utf-8")
+        path.write_text("".join([*lines[:index], mutation.after + "\n", *lines[index + 1 :]]), "utf-8")
         command = [sys.executable, "-m", "pytest", "-n", "0", "-q", "-x", "-m", marks, *tests]
         done = subprocess.run(command, cwd=tree, capture_output=True, timeout=LONGEST_S, check=False)
     except subprocess.TimeoutExpired:

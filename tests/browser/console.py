@@ -49,8 +49,8 @@ class Console:
             self._messages.append(f"{message.type} at {address}: {message.text}")
 
     def _hear_error(self, error: WebError) -> None:
-        where = error.page.url if error.page else ""
-        self._messages.append(f"uncaught at {where}: {error.error}")
+        location = error.page.url if error.page else ""
+        self._messages.append(f"uncaught at {location}: {error.error}")
 
 
 def is_expected(text: str, address: str) -> bool:

@@ -259,8 +259,8 @@ def test_what_is_left_when_the_take_was_closed_can_be_saved(
     left = recording.streams["00B40C55"].acc.astype(np.float32)
     np.testing.assert_array_equal(left, acc[5 * acknowledged : 5 * acknowledged + len(left)])
     # nothing is missing between what the server has and what was saved
-    there = sum(read_batch_header(r.body).n_samples for r in scan(clinic.log(running))[0] if r.kind == "B")
-    assert 5 * acknowledged <= there < 5 * acknowledged + len(left)
+    target = sum(read_batch_header(r.body).n_samples for r in scan(clinic.log(running))[0] if r.kind == "B")
+    assert 5 * acknowledged <= target < 5 * acknowledged + len(left)
     assert len(left) > 150
 
 

@@ -130,8 +130,8 @@ def test_pointing_at_a_curve_moves_the_cursor_of_all_charts(opened: Opener, fill
     box = plot.bounding_box()
     assert box is not None
     page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 20)
-    (at,) = _cursors(page)
-    assert abs(at - 600) < 10
+    (position,) = _cursors(page)
+    assert abs(position - 600) < 10
 
 
 def _segments(page: Page) -> list[str]:

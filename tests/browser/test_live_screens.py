@@ -141,11 +141,11 @@ def test_the_current_stride_grows_without_a_norm_of_another_zero_and_follows_the
 
 def test_charts_follow_the_theme(told: Opener, trained: tuple[str, str, str]) -> None:
     page = _therapist(told, trained[0])
-    drawn, of = f"(of) => ({PIXELS.strip()})(of) > 100", ["stride-chart", "left"]
-    page.wait_for_function(drawn, arg=of)
+    drawn, source = f"(of) => ({PIXELS.strip()})(of) > 100", ["stride-chart", "left"]
+    page.wait_for_function(drawn, arg=source)
     page.emulate_media(color_scheme="dark")
-    page.wait_for_function(drawn, arg=of)
-    assert page.evaluate(PIXELS, of) > 100
+    page.wait_for_function(drawn, arg=source)
+    assert page.evaluate(PIXELS, source) > 100
 
 
 def test_left_against_right_is_said_of_four_strides_that_tell_them_apart_only(

@@ -11,11 +11,11 @@ WHO = "keyed"
 
 
 def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: RunningServer) -> None:
-    here = running.url.replace("127.0.0.1", "localhost")
+    place = running.url.replace("127.0.0.1", "localhost")
     with running.client() as client:
         response = client.post("/api/v1/users", json={"name": WHO, "role": "viewer", "password": PASSWORD})
         response.raise_for_status()
-    context = flat.new_context(base_url=here, locale="en-US")
+    context = flat.new_context(base_url=place, locale="en-US")
     try:
         page = context.new_page()
         session = context.new_cdp_session(page)
@@ -31,7 +31,7 @@ def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: Running
             page.get_by_role("button", name="Sign in", exact=True).click()
 
         sign_in()
-        page.wait_for_url(f"{here}/account")  # loaded, with its scripts
+        page.wait_for_url(f"{place}/account")  # loaded, with its scripts
         page.get_by_label("Present password").nth(1).fill(PASSWORD)
         page.get_by_role("button", name="Set up a second factor").click()
         dialog = page.locator("dialog[open]")
@@ -56,7 +56,7 @@ def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: Running
         context.clear_cookies()
         sign_in()
         page.get_by_role("button", name="Use a security key").click()
-        page.wait_for_url(f"{here}/account")
+        page.wait_for_url(f"{place}/account")
         expect(keys).not_to_contain_text("never")
 
         # the key is at home

@@ -296,14 +296,14 @@ def test_a_redo_is_refused_when_somebody_else_changed_something(
 def test_an_event_is_added_where_the_cursor_is(timeline: Page, running: RunningServer, walked: str) -> None:
     event = handle(timeline, "tc")
     event.focus()
-    at = event.get_attribute("aria-valuenow")
+    position = event.get_attribute("aria-valuenow")
     timeline.keyboard.press("Delete")
     done(timeline, "deleted")
     timeline.keyboard.press("a")
     dialog = timeline.locator("dialog[open]")
     expect(dialog.locator("#add-side")).to_have_value("left")
     expect(dialog.locator("#add-kind")).to_have_value("tc")
-    expect(dialog.locator("#add-time")).to_have_value(at or "")
+    expect(dialog.locator("#add-time")).to_have_value(position or "")
     dialog.get_by_role("button", name="Add").click()
     done(timeline, "foot-off added")
     added = [e for e in review(running, walked)["events"] if e["source"] == "manual"]
@@ -402,9 +402,9 @@ def test_the_value_beside_a_lane_is_the_signals_own(
 ) -> None:
     timeline.locator("#lane-0").select_option("knee_flexion")
     handle(timeline, "ic").focus()
-    at = float(timeline.evaluate("document.activeElement.ariaValueNow"))
+    position = float(timeline.evaluate("document.activeElement.ariaValueNow"))
     with running.client() as client:
-        query = {"start_s": max(at - 0.005, 0), "end_s": at + 0.005, "points": 10}
+        query = {"start_s": max(position - 0.005, 0), "end_s": position + 0.005, "points": 10}
         piece = client.get(f"/api/v1/sessions/{walked}/signals/knee_flexion", params=query).json()
     near = [v for v in piece["low"]["left"] if v is not None]
     timeline.wait_for_timeout(600)
@@ -448,9 +448,11 @@ def test_the_figure_comes_when_asked_for_and_stands_where_the_event_is(
     page.get_by_role("button", name="Show the figure").click()
     page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
     page.locator("[data-side=left] .ev.ic").first.focus()
-    at = float(page.evaluate("document.activeElement.ariaValueNow"))
+    position = float(page.evaluate("document.activeElement.ariaValueNow"))
     page.wait_for_function(
-        "t => Math.abs(document.querySelector('gait-view').dataset.shown - t) < 0.02", arg=at, timeout=30_000
+        "t => Math.abs(document.querySelector('gait-view').dataset.shown - t) < 0.02",
+        arg=position,
+        timeout=30_000,
     )
 
 

@@ -224,10 +224,10 @@ def _replays(page: Page, url: str) -> None:
     visible_attribute = view.get_attribute("data-shown")
     page.keyboard.press("j")
     expect(view).not_to_have_attribute("data-shown", visible_attribute or "", timeout=10_000)
-    at = float(page.locator("time-bar input").input_value())
+    position = float(page.locator("time-bar input").input_value())
     expect(page.locator("[data-chart] .cursor").first).not_to_have_attribute("hidden", "hidden")
     page.wait_for_function(
-        "at => Math.abs(Number(document.querySelector('gait-view').dataset.shown) - at) < 0.05", arg=at
+        "at => Math.abs(Number(document.querySelector('gait-view').dataset.shown) - at) < 0.05", arg=position
     )
     assert url == page.url
 

@@ -192,13 +192,13 @@ async def test_a_disk_that_became_read_only_is_said_and_can_be_read(disk: Path, 
         async with open_clinic(disk, min_free_bytes=0) as clinic:
             v = Visit(clinic)
             # the same folder, seen read-only; the write-ahead log is there, as when a disk is remounted
-            there = Database(frozen / clinic.settings.database.name)
+            target = Database(frozen / clinic.settings.database.name)
             engines = clinic.db._reader, clinic.db._writer
-            clinic.db._reader, clinic.db._writer = there._reader, there._writer
+            clinic.db._reader, clinic.db._writer = target._reader, target._writer
             blobs = clinic.app.state.blobs
             blobs.root, blobs.incoming = frozen / "blobs", frozen / "blobs" / "incoming"
             await _use_read_only(v)
-            there.close()
+            target.close()
             clinic.db._reader, clinic.db._writer = engines
     finally:
         subprocess.run(["umount", "--lazy", str(frozen)], check=False)

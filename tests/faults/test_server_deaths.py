@@ -151,8 +151,8 @@ def _dying(
     server: ForkedServer, content: bytes, start: int, kill_at: int | None, part: Path
 ) -> Iterator[bytes]:
     """Bytes from a position on; kills the server midway once the earlier bytes are stored."""
-    for at in range(start, len(content), 250_000):
-        if kill_at and at >= kill_at:
+    for index in range(start, len(content), 250_000):
+        if kill_at and index >= kill_at:
             until(lambda: part.exists() and part.stat().st_size >= kill_at - 1_000_000)
             server.kill()
-        yield content[at : at + 250_000]
+        yield content[index : index + 250_000]

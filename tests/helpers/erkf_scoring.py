@@ -106,9 +106,13 @@ def steps(take: Take, track: ErkfTrack, from_s: float) -> tuple[Floats, Floats]:
         k = np.round(times * take.rate_hz).astype(int)
         if stride.start_s < from_s or k.max() >= len(origin):
             continue
-        here, there = FOOT[stride.side], FOOT[other_item]
-        true = [take.truth.p[here][k[0]], take.truth.p[here][k[1]], *(take.truth.p[there][x] for x in k[2:])]
-        i, j = SEGMENTS.index(here), SEGMENTS.index(there)
+        place, target = FOOT[stride.side], FOOT[other_item]
+        true = [
+            take.truth.p[place][k[0]],
+            take.truth.p[place][k[1]],
+            *(take.truth.p[target][x] for x in k[2:]),
+        ]
+        i, j = SEGMENTS.index(place), SEGMENTS.index(target)
         ours = [origin[k[0], i], origin[k[1], i], *(origin[x, j] for x in k[2:])]
         lengths.append(_length(ours) - _length(true))
         if len(inside):

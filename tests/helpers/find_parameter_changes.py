@@ -118,7 +118,7 @@ def search(names: list[str]) -> None:
             continue
         new_rows = []
         for stage in only.split(",") if only else stages:
-            read, missing, found = find_reads(take, stage), [], 0
+            read, missing, outcome = find_reads(take, stage), [], 0
             for parameter in list_parameters():
                 if parameter.name in rows or parameter.name.partition("[")[0] not in read:
                     continue
@@ -128,9 +128,9 @@ def search(names: list[str]) -> None:
                     continue
                 new_rows.append(Row(parameter.name, name, stage, new))
                 rows[parameter.name] = new_rows[-1]
-                found += 1
-            if found or missing:
-                print(f"{name} {stage}: {found} found, unmoved: {' '.join(missing)}", flush=True)
+                outcome += 1
+            if outcome or missing:
+                print(f"{name} {stage}: {outcome} found, unmoved: {' '.join(missing)}", flush=True)
         write_rows({row.parameter: row for row in (*read_rows(), *new_rows)}.values())
 
 

@@ -119,5 +119,5 @@ def _up_in_foot(toe: Floats, heel: Floats, side: Floats) -> Floats:
 
     ahead = unit(toe - heel)
     upper = unit(np.cross(ahead, side - heel))
-    across = np.cross(upper, ahead)
-    return np.stack([ahead[:, 2], across[:, 2], upper[:, 2]], axis=1)
+    lateral = np.cross(upper, ahead)
+    return np.stack([ahead[:, 2], lateral[:, 2], upper[:, 2]], axis=1)

@@ -105,15 +105,15 @@ def detect_swings(config: PipelineConfig) -> object:
 def follow_a_day_s_turns(config: PipelineConfig) -> object:
     """Turns of a trunk: quick and slow, cut in two, too small."""
     rate = np.zeros(len(T))
-    for at, lasts, angle in (
+    for position, lasts, angle in (
         (1.0, 1.0, 50.0),
         (3.0, 2.0, 120.0),
         (6.0, 0.4, 60.0),
         (6.5, 0.4, 60.0),
         (8.0, 5.0, 170.0),
     ):
-        inside = (at <= T) & (at + lasts > T)
-        rate[inside] += radians(angle) / lasts * 2.0 * np.sin(np.pi * (T[inside] - at) / lasts) ** 2
+        inside = (position <= T) & (position + lasts > T)
+        rate[inside] += radians(angle) / lasts * 2.0 * np.sin(np.pi * (T[inside] - position) / lasts) ** 2
     return find_turns(rate, np.ones(len(T), np.bool_), RATE, config.activity.turns)
 
 
@@ -191,15 +191,15 @@ def sway_while_standing(config: PipelineConfig) -> object:
 def walk_in_pieces(segment: Segment, seed: int) -> UniformRecording:
     """A trunk that takes some steps, pauses, and continues at another pace."""
     rng, rate = np.random.default_rng(seed), 50.0
-    phase, moving, at = [], [], 0.0
+    phase, moving, position = [], [], 0.0
     for _ in range(8):
         step_s, steps = rng.uniform(0.45, 0.8), int(rng.choice((2, 3, 5, 7, 12, 25)))
         own = np.arange(round(steps * step_s * rate)) / (step_s * rate)
         own = own + rng.uniform(0.0, 0.12) * np.sin(rng.uniform(1.0, 3.0) * own)
         still = np.zeros(round(rng.choice((0.4, 0.9, 1.4, 2.5, 4.0)) * rate))
-        phase += [at + own, at + steps + still]
+        phase += [position + own, position + steps + still]
         moving += [np.ones(len(own)), still]
-        at += steps
+        position += steps
     return make_trunk(segment, np.concatenate(phase), np.concatenate(moving), rng, rate)
 
 
@@ -208,10 +208,11 @@ def make_trunk(
 ) -> UniformRecording:
     """A trunk that has made `turned` (n,) steps; on (n,) 1 while it walks."""
     n, noise = len(on), rng.normal(0.0, 0.15, (6, len(on)))
-    across = 0.6 * on * np.sin(np.pi * turned)
-    acc = np.stack((across, 0.3 * across, GRAVITY + 2.0 * on * np.cos(2.0 * np.pi * turned)), axis=1)
+    lateral = 0.6 * on * np.sin(np.pi * turned)
+    acc = np.stack((lateral, 0.3 * lateral, GRAVITY + 2.0 * on * np.cos(2.0 * np.pi * turned)), axis=1)
     gyr = (
-        np.stack((0.2 * across, 0.0 * across, 0.5 * on * np.cos(np.pi * turned)), axis=1) + 0.2 * noise[:3].T
+        np.stack((0.2 * lateral, 0.0 * lateral, 0.5 * on * np.cos(np.pi * turned)), axis=1)
+        + 0.2 * noise[:3].T
     )
     if segment == "chest":
         gyr = np.zeros((n, 3))

@@ -77,8 +77,8 @@ def replace_value(config: Any, path: Path, new: object) -> Any:
         key = first[1:-1]
         return type(config)({**config, key: replace_value(config[key], remainder, new)})  # type: ignore[call-arg]
     if isinstance(config, tuple):
-        at = int(first[1:-1])
-        return (*config[:at], replace_value(config[at], remainder, new), *config[at + 1 :])
+        index = int(first[1:-1])
+        return (*config[:index], replace_value(config[index], remainder, new), *config[index + 1 :])
     return dataclasses.replace(config, **{first: replace_value(getattr(config, first), remainder, new)})
 
 

@@ -50,7 +50,7 @@ def find_checking_names(trees: Iterable[ast.Module]) -> set[str]:
     result = [f for tree in trees for f in functions(tree)]
     names = EXPECT | {f.name for f in result if asserts(f)}
     calls = [(f.name, called(f)) for f in result]
-    while more := {name for name, of in calls if name not in names and of & names}:
+    while more := {name for name, source in calls if name not in names and source & names}:
         names |= more
     return names
 

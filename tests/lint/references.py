@@ -106,9 +106,9 @@ def cited(text: str, position: int) -> Iterator[str]:
 def mentions(root: Path) -> list[str]:
     """Mentions of files outside the repository, with the file that contains them."""
     return [
-        f"{path}: {what}, {m.group()}"
+        f"{path}: {label}, {m.group()}"
         for path, text in texts(root)
-        for what, pattern in OUTSIDE.items()
+        for label, pattern in OUTSIDE.items()
         for m in pattern.finditer(text)
     ]
 

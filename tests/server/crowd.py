@@ -72,29 +72,29 @@ def fill(
 
 def _visit(rows: Rows, person: str, day: int, stored: Mapping[str, Blob]) -> str:
     sid, rid, jid, aid = (new_id() for _ in range(4))
-    at = MORNING + dt.timedelta(days=day)
+    position = MORNING + dt.timedelta(days=day)
     mapped = {"sensors": {"A1": "pelvis"}}
     rows[session].append(
         {"id": sid, "patient_id": person, "title": "Walk", "performed_on": FIRST_DAY + dt.timedelta(days=day),
-         "protocol": "walk", "note": "", "created_at": at}
+         "protocol": "walk", "note": "", "created_at": position}
     )  # fmt: skip
     rows[recording].append(
-        {"id": rid, "session_id": sid, "manifest": mapped, "wanted_key": rid, "created_at": at}
+        {"id": rid, "session_id": sid, "manifest": mapped, "wanted_key": rid, "created_at": position}
     )
     rows[recording_file].append(
-        {"recording_id": rid, "name": "walk.txt", "size": 9, "sha256": "0" * 64, "added_at": at}
+        {"recording_id": rid, "name": "walk.txt", "size": 9, "sha256": "0" * 64, "added_at": position}
     )
     rows[job].append(
         {"id": jid, "key": rid, "kind": "analyse", "recording_id": rid, "params": {}, "priority": 0,
-         "state": "done", "attempt": 1, "deaths": 0, "cancel_requested": False, "created_at": at,
-         "started_at": at, "finished_at": at}
+         "state": "done", "attempt": 1, "deaths": 0, "cancel_requested": False, "created_at": position,
+         "started_at": position, "finished_at": position}
     )  # fmt: skip
     rows[analysis].append(
         {"id": aid, "recording_id": rid, "job_id": jid, "input_sha256": "0" * 64, "config_sha256": "0" * 64,
-         "code_version": CODE_VERSION, "manifest": mapped, "config": {}, "created_at": at}
+         "code_version": CODE_VERSION, "manifest": mapped, "config": {}, "created_at": position}
     )  # fmt: skip
     rows[device_check] += [
-        {"recording_id": rid, "device_id": device, "segment": segment, "exchanged": False, "at": at,
+        {"recording_id": rid, "device_id": device, "segment": segment, "exchanged": False, "at": position,
          "content": DeviceCheck(device, 100.0, reason="no_rest").to_json()}
         for device, segment in zip(DEVICES, SEGMENTS, strict=False)
     ]  # fmt: skip

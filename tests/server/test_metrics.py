@@ -59,7 +59,9 @@ def test_methods_that_nobody_serves_are_one() -> None:
         metrics.observe(method, "none", 405, 0.0)
     content = read(metrics)
     assert content["sagittal_requests_total", labels(method="other", route="none", status="405")] == 3
-    assert {dict(of)["method"] for name, of in content if name == "sagittal_requests_total"} == {"other"}
+    assert {dict(source)["method"] for name, source in content if name == "sagittal_requests_total"} == {
+        "other"
+    }
 
 
 @pytest.fixture
@@ -85,7 +87,7 @@ def ask(settings: Settings, db: Database) -> dict[tuple[str, Labels], float]:
 
 def test_an_empty_clinic_has_figures_of_everything_but_backups(settings: Settings, db: Database) -> None:
     answer = ask(settings, db)
-    assert {of for name, of in answer if name == "sagittal_jobs"} == {
+    assert {source for name, source in answer if name == "sagittal_jobs"} == {
         labels(state=s) for s in ("queued", "running", "done", "failed", "cancelled")
     }
     for name in ("oldest_job_wait_seconds", "live_takes_open", "sessions", "audit_rows"):

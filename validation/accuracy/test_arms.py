@@ -94,10 +94,10 @@ def test_write_down_what_arms_from_motion_gain() -> None:
     for name, (usual, ours) in simulated_scores().items():
         cells = [f"{a:.2f} → {b:.2f}" for a, b in zip(usual[0], ours[0], strict=True)]
         rows.append([name, *cells, f"{usual[1]:+.1f} → {ours[1]:+.1f}"])
-    both = [scores(x.angles_deg)[1] for x in real_chains()]
+    pair_of = [scores(x.angles_deg)[1] for x in real_chains()]
     cells = []
     for name in ANGLES:
-        pair = ["/".join(f"{x[f'{name}_{s}'].offset_removed:.1f}" for s in "rl") for x in both]
+        pair = ["/".join(f"{x[f'{name}_{s}'].offset_removed:.1f}" for s in "rl") for x in pair_of]
         cells.append(" → ".join(pair))
     ways = ["/".join(f"{x.strides_cm()[s].mean():+.1f}" for s in reversed(SIDES)) for x in real_chains()]
     rows.append(["neura_walk, right/left", *cells, " → ".join(ways)])
@@ -118,7 +118,7 @@ def test_write_down_what_arms_from_motion_gain() -> None:
     bias = [float(np.sqrt(np.mean([x[k][1] ** 2 for x in simulated_scores().values()]))) for k in (0, 1)]
     assert bias[1] < 0.7 * bias[0]
     for key in (f"{name}_{s}" for name in ANGLES for s in "rl"):
-        assert both[1][key].offset_removed < both[0][key].offset_removed + 0.15, key
+        assert pair_of[1][key].offset_removed < pair_of[0][key].offset_removed + 0.15, key
 
 
 def ends_apart_mm(mounted: MountedSensors, arms: MeasuredArms | None) -> float:

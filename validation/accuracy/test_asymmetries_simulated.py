@@ -61,16 +61,16 @@ def test_sides_differ_as_they_really_do(
     walks: dict[str, tuple[dict[str, float], dict[str, float]]], name: str
 ) -> None:
     true, result = walks[name]
-    for what, limit in LIMITS.items():
-        assert result[what] == pytest.approx(true[what], abs=limit), what
-        if abs(true[what]) > limit:
-            assert result[what] * true[what] > 0.0, what
+    for label, limit in LIMITS.items():
+        assert result[label] == pytest.approx(true[label], abs=limit), label
+        if abs(true[label]) > limit:
+            assert result[label] * true[label] > 0.0, label
 
 
 def test_write_the_table(walks: dict[str, tuple[dict[str, float], dict[str, float]]]) -> None:
     rows = []
     for name, (true, result) in walks.items():
-        cells = (f"{result[what]:+.3g} ({true[what]:+.3g})" for what in SHOWN)
+        cells = (f"{result[label]:+.3g} ({true[label]:+.3g})" for label in SHOWN)
         rows.append([name, *cells])
     record(
         "Sides of virtual people compared",

@@ -52,8 +52,8 @@ def ways(walk: str, side: Side) -> tuple[float, float, float]:
     off, p = first_s(ipol_recording(walk, *FEET)), feet.p[side][:, :2]
     times = (events.walk_s[0] - BEFORE_S, float(np.mean(events.turn_s)), events.walk_s[1] + AFTER_S)
     first, turn, last = (p[int(np.clip((t - off) * RATE, 0, len(p) - 1))] for t in times)
-    there, back, apart = turn - first, last - turn, last - first
-    return tuple(float(np.linalg.norm(x)) for x in (there, back, apart))  # type: ignore[return-value]
+    target, back, apart = turn - first, last - turn, last - first
+    return tuple(float(np.linalg.norm(x)) for x in (target, back, apart))  # type: ignore[return-value]
 
 
 @cache

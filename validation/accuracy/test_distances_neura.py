@@ -67,7 +67,7 @@ def figures() -> tuple[Mapping[str, Floats], Mapping[str, Floats]]:
 
 
 def errors_cm(name: str) -> np.ndarray:
-    ours, vicon = (of[name] for of in figures())
+    ours, vicon = (source[name] for source in figures())
     result = 100 * (ours - vicon)
     return np.asarray(result[np.isfinite(result)])
 

@@ -80,8 +80,8 @@ def run(
     tree = tree or take.tree
     first = start_state(tree, take.inputs, params, take.rest)
     if turn_deg:
-        by = [about(2, radians(turn_deg if i % 2 else -turn_deg)) for i in range(len(SEGMENTS))]
-        q = multiply(np.array(by), first.nominal[:, 6:10])
+        by_key = [about(2, radians(turn_deg if i % 2 else -turn_deg)) for i in range(len(SEGMENTS))]
+        q = multiply(np.array(by_key), first.nominal[:, 6:10])
         first = start_state(tree, take.inputs, params, take.rest, q=q)
     track, _ = (smooth if smoothed else filter_block)(first, take.inputs, tree, params)
     return score(replace(take, tree=tree), track)

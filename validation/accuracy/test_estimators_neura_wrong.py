@@ -238,8 +238,8 @@ def test_write_down_the_figures() -> None:
         sizes = (x.residual_max, x.residual_rms, x.live_rms, x.refused, x.turned)
         vicon = [f"{x.flexion_r:.2f}", f"{x.adduction:.1f}", f"{x.stride:+.1f}"]
         rows.append([name, *(f"{size:.0f}" for size in sizes), *vicon, ", ".join(x.caught) or "–"])
-    for name, by in (("healthy", {}), ("right shank turned 30°", {"shank_r": radians(30.0)})):
-        cells, _, heading = lazy(by)  # type: ignore[arg-type]
+    for name, by_key in (("healthy", {}), ("right shank turned 30°", {"shank_r": radians(30.0)})):
+        cells, _, heading = lazy(by_key)  # type: ignore[arg-type]
         caught = f"strides, heading (right leg {heading:.0f}° off Vicon)"
         rows.append([f"six filters without joints, {name}", "", "", "", "", "", *cells, caught])
     record(

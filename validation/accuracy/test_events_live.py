@@ -36,11 +36,11 @@ def streamed(place: Orientations, side: Side, block: int) -> list[tuple[str, flo
 @pytest.mark.parametrize("name", WALKS)
 @pytest.mark.parametrize("block", [1, 7, 100])
 def test_a_stream_gives_the_same_bits_as_the_file(name: str, block: int) -> None:
-    here = take(name)
-    offline = detect(here).events
+    address = take(name)
+    offline = detect(address).events
     for side in SIDES:
         expected = [(e.kind, e.time_s, e.detected_s) for e in offline if e.side == side]
-        assert sorted(streamed(here, side, block), key=lambda e: e[1]) == expected
+        assert sorted(streamed(address, side, block), key=lambda e: e[1]) == expected
 
 
 def test_the_delay_is_written_down() -> None:

@@ -74,27 +74,27 @@ def test_the_cadence_agrees_with_the_insoles(trial: tuple[str, str]) -> None:
 
 
 def test_a_foot_that_is_told_is_the_right_one() -> None:
-    told = right = 0
+    is_reported = right = 0
     for trial, period, _ in scores():
         for step in found(trial).steps:
             nearest = int(np.argmin(np.abs(period.contacts - step.time_s)))
             if step.side is not None and abs(period.contacts[nearest] - step.time_s) <= WINDOW_S:
-                told += 1
+                is_reported += 1
                 right += step.side == period.sides[nearest]
-    assert told >= 30
-    assert right == told
+    assert is_reported >= 30
+    assert right == is_reported
 
 
 def test_the_feet_of_neura_walk_are_told_right() -> None:
     steps = detect_steps(only(neura_walk(), "pelvis")).steps
     heels = [(t, side) for side in SIDES for t in heel_stops(side)]
-    told = 0
+    is_reported = 0
     for step in steps:
         time, side = min(heels, key=lambda h: abs(h[0] - step.time_s))
         if step.side is not None and abs(time - step.time_s) <= WINDOW_S:
-            told += 1
+            is_reported += 1
             assert step.side == side
-    assert told >= 10
+    assert is_reported >= 10
 
 
 def test_every_walk_of_the_reference_is_in_a_bout() -> None:

@@ -251,8 +251,8 @@ def test_force_and_motion_capture_lie_on_both_sides(kind: EventKind) -> None:
 def test_neither_the_sample_rate_nor_the_mounting_moves_a_contact(copy: str, rate_hz: float) -> None:
     result = run(recording_of(resampled(copy, rate_hz), rate_hz)).events["foot_contact"]
     for side, kind in product(SIDES, KINDS):
-        here = against(result, side, kind, mocap(side, kind))
-        clear = here.ms[here.stated_ms < 40.0]
+        address = against(result, side, kind, mocap(side, kind))
+        clear = address.ms[address.stated_ms < 40.0]
         assert abs(clear.mean()) <= 26
         assert clear.std(ddof=1) <= 11
         assert abs(clear.mean() - errors(f"gaitmap_foot {side}", "foot_contact", kind).mean) <= 8

@@ -84,13 +84,13 @@ def test_the_cadence_is_that_of_the_feet(place: str) -> None:
 @pytest.mark.parametrize("place", ["hip", "lower_back"])
 def test_the_feet_are_told_right(place: str) -> None:
     steps = detect_steps(take(((PLACES[place], place),))).steps
-    told = 0
+    is_reported = 0
     for step in steps:
         time, side = min(contacts(), key=lambda c: abs(c[0] - step.time_s))
         if step.side is not None and abs(time - step.time_s) <= WINDOW_S:
-            told += 1
+            is_reported += 1
             assert step.side == side
-    assert told >= 80
+    assert is_reported >= 80
 
 
 @pytest.mark.parametrize("place", PLACES)

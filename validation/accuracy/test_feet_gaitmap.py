@@ -90,9 +90,9 @@ def test_parts_of_stance_are_those_of_the_markers() -> None:
         lifted = np.array([lift_pct(side, t, s) for s in strides(side)])
         error = ours - same
         rows += [
-            [side, what, f"{len(ours)}", f"{ours[:, i].mean():.1f}", spread(error[:, i], ".1f"),
+            [side, label, f"{len(ours)}", f"{ours[:, i].mean():.1f}", spread(error[:, i], ".1f"),
              spread(ours[:, i] - lifted[:, k], ".1f")]
-            for what, i, k in (("loading_pct", 0, 0), ("push_pct", 2, 1))
+            for label, i, k in (("loading_pct", 0, 0), ("push_pct", 2, 1))
         ]  # fmt: skip
         assert np.abs(error.mean(axis=0)).max() < 1.5
         assert error.std(axis=0).max() < 2.0

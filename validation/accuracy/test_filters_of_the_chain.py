@@ -50,8 +50,8 @@ def self_calibrated(calibrated: CalibratedRecording, *, both_ways: bool) -> Orie
         )
         start = mounted.start_q
         start = from_matrix(R_NEUTRAL @ mounted.R_segment_sensor) if start is None else start
-        at = min(round(0.5 * sum(calibration.zero) * recording.rate_hz), len(result) - 1)
-        heading = multiply(start, conjugate(result[at])) * [1.0, 0.0, 0.0, 1.0]
+        index = min(round(0.5 * sum(calibration.zero) * recording.rate_hz), len(result) - 1)
+        heading = multiply(start, conjugate(result[index])) * [1.0, 0.0, 0.0, 1.0]
         sensor = multiply(normalise(heading), result)
         q[segment] = multiply(sensor, conjugate(from_matrix(mounted.R_segment_sensor)))
         valid[segment] = signals.valid

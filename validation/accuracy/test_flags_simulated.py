@@ -42,8 +42,8 @@ Judged = tuple[dict[tuple[str, Side | None], Flag], Scores]
 def _judged(curves: CycleCurves, source: MeasuredGait, standing: dict[str, float]) -> Judged:
     flags = judge_flags(curves, source.parameters, standing, HEIGHT_M)
     # a ratio has no fixed side: its own name is enough
-    by = {(f.name, None if f.kind == "ratio" else f.side): f for f in flags}
-    return by, score_curves(curves, standing)
+    by_key = {(f.name, None if f.kind == "ratio" else f.side): f for f in flags}
+    return by_key, score_curves(curves, standing)
 
 
 @cache
@@ -101,8 +101,8 @@ def test_scores_are_near_those_of_the_truth() -> None:
                 assert abs(a - b) < SCORE_DEG, (name, mode, side)
                 view.append(f"{a:.1f} / {b:.1f}")
         raised = [
-            {f"{k[0]} {k[1] or ''}".strip() for k, f in by.items() if f.exceeded}
-            for by in (by_truth, by_chain)
+            {f"{k[0]} {k[1] or ''}".strip() for k, f in by_key.items() if f.exceeded}
+            for by_key in (by_truth, by_chain)
         ]
         pair = ", ".join(sorted(raised[0] & raised[1])).replace("_", " ") or "none"
         second = ", ".join(sorted(raised[0] ^ raised[1])).replace("_", " ") or "none"

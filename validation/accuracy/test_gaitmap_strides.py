@@ -223,12 +223,12 @@ def test_write_down_the_figures() -> None:
             ("plain integration between stances", naive(side, False), RATE, None),
             ("plain integration, linear de-drift", naive(side, True), RATE, None),
         ]
-        for name, p, rate, of in paths:
+        for name, p, rate, owner in paths:
             result = errors(p, side, rate)
             notices = ["", ""]
-            if of is not None:
-                height = of.track.p[-1, 0, 2] - of.track.p[0, 0, 2]
-                notices = [f"{100 * refused_share(of):.1f}", f"{height:+.2f}"]
+            if owner is not None:
+                height = owner.track.p[-1, 0, 2] - owner.track.p[0, 0, 2]
+                notices = [f"{100 * refused_share(owner):.1f}", f"{height:+.2f}"]
             rows.append([side, name, *result.row, *notices])
         lengths, speeds = reported(side)
         notices = [

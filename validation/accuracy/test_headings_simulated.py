@@ -44,8 +44,8 @@ def errors(walk: tuple[str, int], wrong: str, agree: bool) -> dict[str, float]:
     """RMS error of each angle while walking, degrees, the worse side."""
     recording, truth = simulated(*walk)
     calibrated = calibrate(recording)
-    by = {s: radians(x) for s, x in WRONG[wrong].items()}
-    calibrated, orientations = turn_forward_axes(calibrated, estimate_orientations(calibrated), by)
+    by_key = {s: radians(x) for s, x in WRONG[wrong].items()}
+    calibrated, orientations = turn_forward_axes(calibrated, estimate_orientations(calibrated), by_key)
     body, _ = nominal_body(recording.subject.height_m)
     whole, params = PRESETS["lower_body7"], ErkfParams.offline()
     if agree:

@@ -78,9 +78,9 @@ def scored(name: str, adjoint: Adjoint) -> Floats:
     """RMSE without offset and correlation (3, 2) of hip, knee, ankle flexion over the whole walk."""
     projections, form, flipped = CASES[name]
     params = L7sParams(adjoint=adjoint, projections=projections)
-    of = trial("walk", 1.70, 2)
-    model = LegModel.of(of.truth.body)
-    inputs = take_of(of.orientations, of.acceleration, of.steps, model, "3I").part(slice(None))
+    owner = trial("walk", 1.70, 2)
+    model = LegModel.of(owner.truth.body)
+    inputs = take_of(owner.orientations, owner.acceleration, owner.steps, model, "3I").part(slice(None))
     # the ankle at +d/2 is a middle of the foot that lies behind the ankle
     used = replace(model, foot=-model.foot) if flipped else model
     if form is None:
@@ -88,7 +88,7 @@ def scored(name: str, adjoint: Adjoint) -> Floats:
         p, R = track.p, track.R
     else:
         p, R = textbook(inputs, used, params, RATE, form)
-    return trial_scores(of, poses_of(of, R, p, used))
+    return trial_scores(owner, poses_of(owner, R, p, used))
 
 
 def test_each_departure_from_print_pays_on_a_simulated_walk() -> None:

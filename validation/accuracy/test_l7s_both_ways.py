@@ -182,8 +182,8 @@ def figures(source: Take, angles: dict[str, Floats]) -> Floats:
 
 @cache
 def figure_errors(name: str, segments: Worn) -> Floats:
-    of = take(name)
-    return figures(of, estimated(name, segments, True)[0]) - figures(of, of.truth)
+    owner = take(name)
+    return figures(owner, estimated(name, segments, True)[0]) - figures(owner, owner.truth)
 
 
 @pytest.mark.parametrize("worn", get_args(Worn))
@@ -266,12 +266,12 @@ def floor_deg() -> Floats:
 
 def reach_errors(segments: Worn, both_ways: bool) -> tuple[Floats, Floats]:
     """Errors of hip to ankle in cm of a walking leg, of its full length: knee below 25°, and above."""
-    of = take("neura_walk")
+    owner = take("neura_walk")
     poses = l7s_poses(
-        of.orientations,
-        free_acceleration(of.calibrated, of.orientations),
-        steps_of(of.calibrated),
-        of.body,
+        owner.orientations,
+        free_acceleration(owner.calibrated, owner.orientations),
+        steps_of(owner.calibrated),
+        owner.body,
         worn=segments,
         both_ways=both_ways,
     )
@@ -288,12 +288,12 @@ def reach_errors(segments: Worn, both_ways: bool) -> tuple[Floats, Floats]:
 
 def per_stride(segments: Worn, both_ways: bool) -> Floats:
     """SD of the error (3,) within each straight stride of neura_walk, mean of all: the paper's measure."""
-    of, (result, _) = take("neura_walk"), estimated("neura_walk", segments, both_ways)
+    owner, (result, _) = take("neura_walk"), estimated("neura_walk", segments, both_ways)
     lag, _ = scores(result)
     rows = []
-    for side, a, b in of.cycles:
+    for side, a, b in owner.cycles:
         names = [f"{n}_{SUFFIX[side]}" for n in FLEXION]
-        rows.append([(np.roll(result[n], -lag) - of.truth[n])[a:b].std() for n in names])
+        rows.append([(np.roll(result[n], -lag) - owner.truth[n])[a:b].std() for n in names])
     return np.asarray(np.mean(rows, axis=0))
 
 

@@ -63,12 +63,12 @@ def steps(p: Paths, flats: Flats, strides: list[tuple[Side, int, int]], rate_hz:
     result = []
     for side, first, last in strides:
         other_side: Side = "left" if side == "right" else "right"
-        between = flats[other_side][(flats[other_side] > first) & (flats[other_side] < last)]
+        gap = flats[other_side][(flats[other_side] > first) & (flats[other_side] < last)]
         along = p[side][last, :2] - p[side][first, :2]
         length = float(np.linalg.norm(along))
         along = along / length
         outward = np.array([-along[1], along[0]]) * (1.0 if side == "left" else -1.0)
-        apart = p[side][last, :2] - p[other_side][between[-1], :2]
+        apart = p[side][last, :2] - p[other_side][gap[-1], :2]
         result.append(
             Step(side, length, float(apart @ along), float(apart @ outward), (last - first) / rate_hz)
         )

@@ -123,7 +123,9 @@ def test_write_down_the_figures() -> None:
     for plane in PLANES:
         for name in plane:
             pair = [scored()[f"{name}_{end}"] for end in "rl"]
-            cells = ["/".join(f"{getattr(x, of):.1f}" for x in pair) for of in ("zeroed", "offset_removed")]
+            cells = [
+                "/".join(f"{getattr(x, source):.1f}" for x in pair) for source in ("zeroed", "offset_removed")
+            ]
             cells.append("/".join(f"{x.r:.3f}" for x in pair))
             limit = LIMITS.get(name)
             visible_text = "none"

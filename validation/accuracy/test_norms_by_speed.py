@@ -155,9 +155,9 @@ def other_sets() -> dict[str, dict[str, Floats]]:
         with (data_folder("norms") / f"kinematics_{name}.csv").open(encoding="utf-8") as file:
             for r in csv.DictReader(file):
                 if keep is None or r["group"] == keep:
-                    at = result.setdefault(f"{name} {r['condition']}", {}).setdefault(r["variable"], [])
+                    position = result.setdefault(f"{name} {r['condition']}", {}).setdefault(r["variable"], [])
                     sign = -1.0 if (name, r["variable"]) == ("bovi2011", "pelvis_tilt") else 1.0
-                    at.append((float(r["pct_cycle"]), sign * float(r["mean_deg"])))
+                    position.append((float(r["pct_cycle"]), sign * float(r["mean_deg"])))
     return {
         condition: {
             variable: np.interp(np.arange(101), *np.array(sorted(points)).T)

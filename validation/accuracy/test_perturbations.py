@@ -113,8 +113,8 @@ def tilt_pelvis(by_deg: float) -> Make:
         acc = recording.sensors["pelvis"].acc
         up = np.median(acc, axis=0) / np.linalg.norm(np.median(acc, axis=0))
         level = acc - np.outer(acc @ up, up)
-        across = np.cross(up, np.linalg.eigh(np.cov(level.T))[1][:, -1])
-        return slip_sensor(recording, "pelvis", np.radians(by_deg), find_middle(recording), across)
+        lateral = np.cross(up, np.linalg.eigh(np.cov(level.T))[1][:, -1])
+        return slip_sensor(recording, "pelvis", np.radians(by_deg), find_middle(recording), lateral)
 
     return made
 

@@ -49,10 +49,10 @@ def test_the_stated_covariance_holds_the_errors_of_real_sensors() -> None:
         for k in range(0, len(t.gyr) - step, step):
             part = slice(k, k + step)
             q = run.advance(t.gyr[part, None], t.acc[part, None], t.mag[part, None])[-1, 0]
-            at = k + step - 1
-            if not t.moving[at] or not np.isfinite(t.reference[at]).all():
+            index = k + step - 1
+            if not t.moving[index] or not np.isfinite(t.reference[index]).all():
                 continue
-            e, P = log(multiply(t.reference[at], conjugate(q))), run.estimates.orientation_covariance[0]
+            e, P = log(multiply(t.reference[index], conjugate(q))), run.estimates.orientation_covariance[0]
             tilt.append(float(e[:2] @ np.linalg.solve(P[:2, :2], e[:2])) < 5.99)
             heading.append(e[2] ** 2 / P[2, 2] < 3.84)
         assert np.mean(tilt) >= 0.89, t.name

@@ -120,11 +120,11 @@ def errors_of_both_legs(squats: Squats) -> tuple[Floats, list[float], list[float
             names = [f"{joint}_{end}" for joint in MEASURED]
             off = np.degrees([a.angles.angles[x][inside] - truth[x][:n][inside] for x in names])
             angles_off.append(np.sqrt(np.mean(off**2, axis=1)))
-            at, start = [r.bottom for r in counted_strides], [r.first for r in counted_strides]
-            depths = np.degrees(truth[f"knee_flexion_{end}"][at])
+            index, start = [r.bottom for r in counted_strides], [r.first for r in counted_strides]
+            depths = np.degrees(truth[f"knee_flexion_{end}"][index])
             depths_off += (leg.values["squat_depth_deg"] - depths).tolist()
             inward = truth[f"hip_adduction_{end}"] + truth[f"hip_rotation_{end}"]
-            inward = np.degrees(inward[at] - inward[start])
+            inward = np.degrees(inward[index] - inward[start])
             valgus_off += (leg.values["squat_knee_valgus_bottom_deg"] - inward).tolist()
     return np.mean(angles_off, axis=0), depths_off, valgus_off
 

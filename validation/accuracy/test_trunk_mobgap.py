@@ -22,7 +22,7 @@ def test_a_straight_walk_is_more_regular_than_a_room() -> None:
     record(
         "Regularity of the trunk on mobgap_lowback",
         ["take", *(f"{name} (strides)" for name in SHOWN)],
-        [[take, *(f"{p.mean:.2f} ({p.n})" for p in of.values())] for take, of in result.items()],
+        [[take, *(f"{p.mean:.2f} ({p.n})" for p in source.values())] for take, source in result.items()],
         "One healthy older adult: two straight walks of 5 m and two minutes of daily life. No reference; "
         "held: the straight walks have a harmonic ratio above 2 and steps and strides alike by more than "
         "0.5, the room less of each.",

@@ -56,13 +56,13 @@ def test_the_figures_are_in_the_document() -> None:
     for segments in WORN:
         e = edge_errors(segments)
         subjects = [w.split("-")[0] for w in WALKS]
-        by = [e[[s == x for x in subjects]].mean(axis=0) for s in sorted(set(subjects))]
+        by_key = [e[[s == x for x in subjects]].mean(axis=0) for s in sorted(set(subjects))]
         rows.append([
             segments,
             *(f"{e[:, i].mean():+.2f} ± {e[:, i].std(ddof=1):.2f}" for i in range(2)),
             f"{np.diff(e, axis=1).mean():+.2f}",
             f"{np.abs(e).max():.2f}",
-            f"{np.abs(by).max():.2f}",
+            f"{np.abs(by_key).max():.2f}",
             str(stops(segments)),
         ])  # fmt: skip
     record(

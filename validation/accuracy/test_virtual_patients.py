@@ -75,13 +75,13 @@ def test_what_is_told_of_each_person_is_what_the_person_did() -> None:
             assert abs(says[side].stance_pct - did[side].stance_pct) < STANCE_PCT, (name, side)
             assert abs(says[side].knee_deg - did[side].knee_deg) < KNEE_DEG, (name, side)
             assert abs(says[side].time_s - did[side].time_s) < TIME_S, (name, side)
-        for what in ("step_m", "stance_pct"):
-            ratio, real = (getattr(x["left"], what) / getattr(x["right"], what) for x in (says, did))
-            assert abs(ratio - real) < RATIO, (name, what)
+        for label in ("step_m", "stance_pct"):
+            ratio, real = (getattr(x["left"], label) / getattr(x["right"], label) for x in (says, did))
+            assert abs(ratio - real) < RATIO, (name, label)
         cells = [
-            f"{getattr(says['right'], what):{form}}/{getattr(says['left'], what):{form}} "
-            f"({getattr(did['right'], what):{form}}/{getattr(did['left'], what):{form}})"
-            for what, form in (
+            f"{getattr(says['right'], label):{form}}/{getattr(says['left'], label):{form}} "
+            f"({getattr(did['right'], label):{form}}/{getattr(did['left'], label):{form}})"
+            for label, form in (
                 ("step_m", ".2f"),
                 ("stance_pct", ".0f"),
                 ("knee_deg", ".0f"),

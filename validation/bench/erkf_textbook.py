@@ -139,8 +139,8 @@ class Textbook:
         if not self.inputs.contact[k, i]:
             self.refused[i] = 0
             return False
-        p, v, at = self.params, self.x[i, 3:6], self.at(i, 3)
-        S = self.P[at, at] + p.zero_velocity_sd**2 * EYE
+        p, v, index = self.params, self.x[i, 3:6], self.at(i, 3)
+        S = self.P[index, index] + p.zero_velocity_sd**2 * EYE
         if p.gate is None or v @ np.linalg.solve(S, v) <= p.gate:
             self.refused[i] = 0
             return True
@@ -148,7 +148,7 @@ class Textbook:
         if self.refused[i] < self.reaccept:
             return False
         self.P[self.at(i, 0), self.at(i, 0)] += p.reaccept_m**2 * EYE
-        self.P[at, at] += v @ v * EYE
+        self.P[index, index] += v @ v * EYE
         return True
 
     def inject(self, d: Floats) -> None:

@@ -221,13 +221,13 @@ def test_a_live_session_costs_no_more_among_others() -> None:
         gc.collect()
         initial = resident_mb()
         sessions = [OnlineSession(hello_of(take), take.subject) for _ in range(count)]
-        at = 0
+        index = 0
         while any(s.chain is None for s in sessions):
             for s in sessions:
-                s.push(items[at])
-            at += 1
+                s.push(items[index])
+            index += 1
         took = []
-        for batch in items[at : at + PUSHES]:
+        for batch in items[index : index + PUSHES]:
             for s in sessions:
                 began = time.process_time()
                 s.push(batch)

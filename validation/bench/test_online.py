@@ -190,10 +190,10 @@ def test_comparing_the_sensors_costs_little_once_a_second() -> None:
     for batch in batches(take, 10):
         began = time.process_time()
         online.push(batch)
-        between = time.process_time()
+        gap = time.process_time()
         online.compare_sensors()
-        pushed.append(between - began)
-        compared.append(time.process_time() - between)
+        pushed.append(gap - began)
+        compared.append(time.process_time() - gap)
     # a second has ten pushes; those until the sensors are calibrated are another matter
     second = np.add.reduceat(compared, np.arange(0, len(compared), 10))[30:-1]
     walked = second[second > 0.25 * second.max()]

@@ -128,12 +128,12 @@ def test_eight_users_at_once_wait_for_each_other_and_for_nothing_else(analysed: 
         ("what", "goal", "ours", "met"),
         [
             [
-                what,
+                label,
                 "" if goal is None else f"≤ {goal:g} ms",
                 f"{1e3 * ours:.1f} ms",
                 "" if goal is None else "yes" if 1e3 * ours <= goal else "no",
             ]
-            for what, goal, ours in goals
+            for label, goal, ours in goals
         ],
         f"{PAGES} pages by each user, each asked for as soon as the one before is there, over loopback. The "
         "web process computes one page at a time, so eight wait some eight times as long as one.",
@@ -194,8 +194,8 @@ def test_the_drawing_of_the_figure_comes_with_the_page(analysed: AnalysedWalk) -
             "A session page in the browser",
             ("first seen", "median", "range", "goal"),
             [
-                [what, f"{middle(times, name):.2f} s", spread(times, name), goal]
-                for what, times, name, goal in view
+                [label, f"{middle(times, name):.2f} s", spread(times, name), goal]
+                for label, times, name, goal in view
             ],
             f"From the request on, by a browser that was never there, {LOADS} loads, the bench {initial} the "
             f"other work of the machine (load {os.getloadavg()[0]:.0f}). The drawing is in the page and "

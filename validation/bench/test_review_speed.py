@@ -76,8 +76,8 @@ async def test_an_edit_and_all_its_numbers_cost_little_more_than_measuring_once(
         review = await client.get(f"{path}/edits")
         assert opened.is_success
         tracks, steps, rows = walk.tracks(TAKE_S), moves(), []
-        for at, to in steps:
-            body = {"kind": "move_event", "side": "left", "event": "ic", "time_s": at, "to_s": to}
+        for moment, to in steps:
+            body = {"kind": "move_event", "side": "left", "event": "ic", "time_s": moment, "to_s": to}
             single = cpu_s(functools.partial(measure_with, tracks, steps[0][0], to))
             edit = await spent("POST", f"{path}/edits", json=body)
             numbers = await spent(

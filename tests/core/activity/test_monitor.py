@@ -185,8 +185,8 @@ def test_a_sensor_on_the_table_and_a_hole_are_told_apart_from_sitting() -> None:
 
     def open_blocks() -> Iterator[SampleBlock]:
         for b in life.stream.open_blocks():
-            there = (b.t_s < hole[0]) | (b.t_s >= hole[1])
-            yield SampleBlock(b.t_s[there], b.acc[there], None)
+            target = (b.t_s < hole[0]) | (b.t_s >= hole[1])
+            yield SampleBlock(b.t_s[target], b.acc[target], None)
 
     activity = monitor_activity(replace(life.stream, open_blocks=open_blocks), "chest", 1.7)
     assert activity.minutes("gap") == pytest.approx(0.5, abs=0.02)

@@ -130,8 +130,8 @@ def lean(*tops_deg: tuple[float, float]) -> Singles:
 def test_forward_is_where_at_least_two_leans_go(
     leans: tuple[tuple[float, float], ...], forward: tuple[float, ...] | None, count: int
 ) -> None:
-    at = [(3 * i, 3 * i + 1, 3 * i + 2) for i in range(len(leans))]
-    result, observations = find_forward(lean(*leans), np.array([0.0, 0.0, 1.0]), at, UPRIGHT)
+    position = [(3 * i, 3 * i + 1, 3 * i + 2) for i in range(len(leans))]
+    result, observations = find_forward(lean(*leans), np.array([0.0, 0.0, 1.0]), position, UPRIGHT)
     assert observations == count
     assert result is None if forward is None else result == pytest.approx(forward, abs=1e-6)
 

@@ -98,8 +98,8 @@ def test_no_figure_rests_on_what_a_slipped_sensor_measured(segment: Segment, by_
 
 
 def test_a_turn_that_comes_back_is_no_slip() -> None:
-    there = slip_sensor(walk(), "shank_r", np.radians(15.0), 14.0)
-    assert check_agreement(slip_sensor(there, "shank_r", -np.radians(15.0), 19.0)).slips == ()
+    target = slip_sensor(walk(), "shank_r", np.radians(15.0), 14.0)
+    assert check_agreement(slip_sensor(target, "shank_r", -np.radians(15.0), 19.0)).slips == ()
 
 
 def test_the_main_axis_of_a_leg_is_what_it_turns_about() -> None:

@@ -50,9 +50,9 @@ def test_a_real_one_is_found_about_the_first_steps(segment: Segment, at_s: float
 @pytest.mark.slow
 def test_a_leg_that_stands_elsewhere_has_not_slipped() -> None:
     """Thigh and shank of a leg put forward rotate alike, also if only before the walk."""
-    there = slip_sensor(walk(), "thigh_l", np.radians(12.0), BEFORE_S)
-    forward = slip_sensor(there, "shank_l", np.radians(12.0), BEFORE_S)
-    backward = slip_sensor(there, "shank_l", -np.radians(12.0), BEFORE_S)
+    target = slip_sensor(walk(), "thigh_l", np.radians(12.0), BEFORE_S)
+    forward = slip_sensor(target, "shank_l", np.radians(12.0), BEFORE_S)
+    backward = slip_sensor(target, "shank_l", -np.radians(12.0), BEFORE_S)
     assert check_agreement(forward).slips == check_agreement(backward).slips == ()
 
 

@@ -28,11 +28,11 @@ def test_compiled_angles_are_those_of_the_decomposition() -> None:
     mapping = dict(zip(kernel.names, kernel.measure(q, known_rotation, zero).T, strict=True))
     column = {s: i for i, s in enumerate(SEGMENTS)}
     expected: dict[str, Floats] = {}
-    here = known_rotation[:, column["pelvis"]]
+    place = known_rotation[:, column["pelvis"]]
     for name, value in zip(
         ("pelvis_tilt", "pelvis_obliquity"), pelvis_angles(q[:, column["pelvis"]]), strict=True
     ):
-        expected[name] = np.where(here, value, np.nan)
+        expected[name] = np.where(place, value, np.nan)
     for side in SIDES:
         for joint, proximal, distal in list_leg_joints(side):
             i, j = column[proximal], column[distal]

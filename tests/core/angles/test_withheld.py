@@ -184,11 +184,11 @@ def test_distances_of_a_foot_that_refuses_its_own_rests_are_withheld_of_it_alone
     assert "sensors" not in REASONS["path_bad"]
     assert results.tracks is not None
     measured = measure_gait(replace(results.tracks, feet=result.feet))
-    of = {(p.name, p.side): p for p in measured.parameters}
-    assert of["stride_length_m", "left"].reason == "path_bad"
-    assert of["stride_length_m", "right"].mean is not None
-    assert of["gait_speed_mps", None].n == of["stride_length_m", "right"].n
-    assert of["total_distance_m", None].n == 1
+    source = {(p.name, p.side): p for p in measured.parameters}
+    assert source["stride_length_m", "left"].reason == "path_bad"
+    assert source["stride_length_m", "right"].mean is not None
+    assert source["gait_speed_mps", None].n == source["stride_length_m", "right"].n
+    assert source["total_distance_m", None].n == 1
 
 
 @pytest.mark.slow
@@ -242,7 +242,7 @@ def test_what_the_leg_model_holds_fixed_is_no_result(
 ) -> None:
     trial = take()
     assert trial.angles is not None
-    assert {n for n, why in trial.angles.withheld.items() if why == "fixed_by_model"} == fixed
+    assert {n for n, cause in trial.angles.withheld.items() if cause == "fixed_by_model"} == fixed
     assert not fixed & set(trial.angles.angles)
     # the others move
     assert all(np.nanstd(x) > np.radians(0.1) for x in trial.angles.angles.values())

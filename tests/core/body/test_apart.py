@@ -30,9 +30,9 @@ def apart_m(analysis: TakeAnalysis) -> Floats:
     """Distance of the ankles across the line from hip to hip, per sample."""
     assert analysis.poses is not None
     p = analysis.poses.p
-    across = p["thigh_l"] - p["thigh_r"]
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    return np.asarray(np.sum((p["foot_l"] - p["foot_r"]) * across, axis=1))
+    lateral = p["thigh_l"] - p["thigh_r"]
+    lateral /= np.linalg.norm(lateral, axis=1, keepdims=True)
+    return np.asarray(np.sum((p["foot_l"] - p["foot_r"]) * lateral, axis=1))
 
 
 def standing(analysis: TakeAnalysis) -> slice:

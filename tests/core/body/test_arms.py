@@ -112,10 +112,10 @@ def test_legs_end_side_by_side_as_far_as_motion_lets_them(monkeypatch: pytest.Mo
         centres = body_arms.centres
         return float(sum(c[0] if joint[1].endswith("_r") else -c[0] for joint, c in centres.items()))
 
-    beside = ahead_of(measure_arms(*walk(), BODY, WHOLE))
+    neighbour = ahead_of(measure_arms(*walk(), BODY, WHOLE))
     monkeypatch.setattr(arms, "BESIDE_SD_M", 10.0)
     anywhere = ahead_of(measure_arms(*walk(), BODY, WHOLE))
-    assert abs(beside) < 0.75 * abs(anywhere)
+    assert abs(neighbour) < 0.75 * abs(anywhere)
     monkeypatch.setattr(arms, "BESIDE_SD_M", 1e-4)
     assert abs(ahead_of(measure_arms(*walk(), BODY, WHOLE))) < 1e-3
 

@@ -220,7 +220,7 @@ def test_the_erkf_lets_go_of_orientations_that_nobody_else_reads_and_finds_the_s
     sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
     handed, watched = handed_on(sensors)
     result, whole = (estimate_poses(x, {}, PoseParams()) for x in (handed, sensors))
-    assert [s for s, there in watched.items() if there() is not None] == []
+    assert [s for s, target in watched.items() if target() is not None] == []
     assert list(result.orientations.q) == list(whole.orientations.q)
     for s, q in whole.orientations.q.items():
         np.testing.assert_array_equal(result.orientations.q[s], q)
@@ -234,7 +234,7 @@ def test_where_the_erkf_fails_the_next_estimator_still_reads_the_orientations() 
     handed, watched = handed_on(replace(sensors, failure=EstimationError("filter_diverged", "It diverged.")))
     result = estimate_poses(handed, {}, PoseParams())
     assert result.poses.method == "l7s_3i"
-    assert all(there() is not None for there in watched.values())
+    assert all(target() is not None for target in watched.values())
 
 
 def test_only_where_the_erkf_runs_forward_axes_are_turned_by_the_joints() -> None:

@@ -93,9 +93,9 @@ def test_sway_of_the_trunk_does_not_turn_the_axis() -> None:
     t = np.arange(2000) / RATE
     step = 0.55
     a = (np.sin(2 * np.pi * t / step) + 2.0j * np.sin(np.pi * t / step)) * np.exp(0.4j)
-    across = acceleration_axis(a, [(0, 2000)], [0.0], RATE, PARAMS)
+    lateral = acceleration_axis(a, [(0, 2000)], [0.0], RATE, PARAMS)
     along = acceleration_axis(a, [(0, 2000)], [0.0], RATE, PARAMS, [step])
-    assert abs(subtract_angles(nearest_sign(across.angle, 0.4), 0.4)) > np.radians(60.0)
+    assert abs(subtract_angles(nearest_sign(lateral.angle, 0.4), 0.4)) > np.radians(60.0)
     assert abs(subtract_angles(nearest_sign(along.angle, 0.4), 0.4)) < np.radians(1.0)
 
 

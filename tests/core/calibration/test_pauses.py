@@ -78,8 +78,8 @@ def test_a_stop_with_both_feet_side_by_side_is_a_standing(steps: int) -> None:
     recording, truth = scripted(
         (Stand(4.0), walk, *TOGETHER, Stand(4.0), Straight(8.06, 0.62, 0.55), Stand(3.0))
     )
-    within = cut(recording, truth.stands[0][1] + 1.0, truth.stands[-1][0] - 1.0)
-    assert calibrate(within).calibration.posture == "standing"
+    inside = cut(recording, truth.stands[0][1] + 1.0, truth.stands[-1][0] - 1.0)
+    assert calibrate(inside).calibration.posture == "standing"
 
 
 @pytest.mark.slow

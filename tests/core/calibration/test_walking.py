@@ -27,9 +27,9 @@ WALKS = (T >= 5.0) & (T < 15.0)
 
 def sensor(gyr: Floats | None = None, acc: Floats | None = None, valid: Bools | None = None) -> SensorSignals:
     still = np.tile([0.0, 0.0, GRAVITY], (N, 1))
-    there = np.ones(N, np.bool_) if valid is None else valid
+    target = np.ones(N, np.bool_) if valid is None else valid
     return SensorSignals(
-        "", still if acc is None else acc, np.zeros((N, 3)) if gyr is None else gyr, None, there, ~there
+        "", still if acc is None else acc, np.zeros((N, 3)) if gyr is None else gyr, None, target, ~target
     )
 
 

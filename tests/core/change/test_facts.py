@@ -55,6 +55,8 @@ def test_a_fact_is_real_where_any_figure_of_it_is() -> None:
 
 
 def test_only_figures_of_the_catalogue_are_the_same() -> None:
-    for name, (to, of) in SAME_AS.items():
+    for name, (to, source) in SAME_AS.items():
         assert {name, to} <= set(CATALOGUE)
-        assert name_fact(name, "left") == name_fact(to, {"own": "left", "other": "right", "take": None}[of])
+        assert name_fact(name, "left") == name_fact(
+            to, {"own": "left", "other": "right", "take": None}[source]
+        )

@@ -43,13 +43,13 @@ def test_the_values_are_those_of_the_analysis_and_the_difference_is_told() -> No
 def test_a_cue_takes_the_nearest_stride_of_its_side_once() -> None:
     cues, _ = train([0.45])
     start = cues[0].start_s
-    there = AnalysedStride("left", start + TOLERANCE_S, 0.46, counted=True)
-    assert split([there], cues).strides[0].value == 0.46
-    assert split([replace(there, side="right")], cues).unmatched == 1
-    assert split([replace(there, start_s=start + TOLERANCE_S + 0.001)], cues).unmatched == 1
+    target = AnalysedStride("left", start + TOLERANCE_S, 0.46, counted=True)
+    assert split([target], cues).strides[0].value == 0.46
+    assert split([replace(target, side="right")], cues).unmatched == 1
+    assert split([replace(target, start_s=start + TOLERANCE_S + 0.001)], cues).unmatched == 1
     second_variant = replace(cues[0], n=1)
-    assert split([there], [cues[0], second_variant]).unmatched == 1
-    assert split([there], [cues[0], cues[0]]).unmatched == 0, "a cue that was written down twice is one"
+    assert split([target], [cues[0], second_variant]).unmatched == 1
+    assert split([target], [cues[0], cues[0]]).unmatched == 0, "a cue that was written down twice is one"
 
 
 def test_strides_that_do_not_count_in_the_analysis_are_left_out_and_counted() -> None:

@@ -94,8 +94,8 @@ def test_two_filters_are_half_their_range_apart_and_the_phases_are_of_the_same_s
 
 
 def test_all_begin_where_the_analysis_stands() -> None:
-    at = two().t_s < 2.0
-    assert all(np.nanmax(s.range[at]) < np.radians(1.0) for s in two().spreads)
+    index = two().t_s < 2.0
+    assert all(np.nanmax(s.range[index]) < np.radians(1.0) for s in two().spreads)
 
 
 def test_what_needs_a_magnetometer_says_so_and_the_others_are_compared() -> None:

@@ -38,7 +38,7 @@ def session(name: str, seed: int = 5) -> tuple[CycleCurves, tuple[Parameter, ...
             output.append(Stride(side, s.start_s, s.release_s, s.end_s, first, last, s.turn_rad, turned))
     strides = Strides(tuple(output))
     angles = JointAngles(truth.t_s, truth.subtract_standing(), truth.zero_offset)
-    p, q = ({s: of[FOOT[s]] for s in SIDES} for of in (truth.p, truth.q))
+    p, q = ({s: source[FOOT[s]] for s in SIDES} for source in (truth.p, truth.q))
     mask = np.ones(len(truth.t_s), np.bool_)
     feet = FootTracks(
         truth.t_s, truth.rate_hz, p, q, truth.flat, dict.fromkeys(SIDES, mask), True, "truth", truth.body

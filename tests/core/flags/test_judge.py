@@ -163,10 +163,10 @@ def test_a_difference_that_the_strides_leave_open_is_beyond_no_limit() -> None:
         judge_flags(None, sides("step_length_m", 0.50, 0.60, sd=0.2)), "step_length_asymmetry", "right"
     )
     assert (open_.exceeded, open_.marked, open_.reason) == (None, False, "sides_alike")
-    within = flag(
+    inside = flag(
         judge_flags(None, sides("step_length_m", 0.50, 0.52, sd=0.2)), "step_length_asymmetry", "right"
     )
-    assert within.exceeded is False
+    assert inside.exceeded is False
 
 
 def test_a_step_of_no_length_has_no_ratio() -> None:
@@ -220,9 +220,9 @@ def test_limits_of_healthy_adults_are_not_applied_at_a_speed_at_which_none_walke
         if rule.adults != "limit":
             continue
         for side in SIDES:
-            of = flag(result, rule.name, side)
-            assert (of.exceeded, of.limit, of.certain) == (None, None, False)
-            assert of.value is None or of.reason == "no_speed_matched_norm"
+            source = flag(result, rule.name, side)
+            assert (source.exceeded, source.limit, source.certain) == (None, None, False)
+            assert source.value is None or source.reason == "no_speed_matched_norm"
     stiff = flag(result, "stiff_knee", "left")
     assert (stiff.exceeded, stiff.note) == (True, "sides_stand_differently"), "its limit is of patients"
 

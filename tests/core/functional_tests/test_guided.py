@@ -269,9 +269,9 @@ def test_a_walk_ends_by_itself(protocol: Protocol, seconds: float, name: str, ex
     guided = GuidedTest(protocol, ("foot_l", "foot_r"), RATE)
     phases: list[str] = []
     for block in blocks(take, 10):
-        here = range(block.first, block.first + len(block))
-        new = [x for x in strides if round(x.detected_s * RATE) in here]
-        guided.push(block, new, [x for x in events if round(x.detected_s * RATE) in here])
+        place = range(block.first, block.first + len(block))
+        new = [x for x in strides if round(x.detected_s * RATE) in place]
+        guided.push(block, new, [x for x in events if round(x.detected_s * RATE) in place])
         view = guided.advance()
         if not phases or phases[-1] != view.phase:
             phases.append(view.phase)

@@ -102,12 +102,12 @@ def test_the_spread_of_a_figure_is_what_a_person_left_out_departs_from_it(
 
 def test_times_and_distances_agree_with_the_people_measured_at_that_speed() -> None:
     """Means of the bins of 0.1 m/s, for steps of 2.4 cm and cadence of 5/min at most; all within an sd."""
-    seen = 0
+    observations = 0
     for r in read_rows("spatiotemporal_by_speed_bin_rehazenter52"):
         v = float(r["dimensionless_speed_mean"])
         if not is_matched(v):
             continue
-        seen += 1
+        observations += 1
         sparse = int(r["n_subjects"]) < 10  # the gap between two conditions
         leg = (float(r["speed_mean"]) / v) ** 2 / GRAVITY
         result = walkway_values_at_speed(v, leg)
@@ -121,7 +121,7 @@ def test_times_and_distances_agree_with_the_people_measured_at_that_speed() -> N
             assert off <= float(r[f"{column}_std"]), (name, v)
             assert off <= least or sparse, (name, v)
             assert off <= result[name].sd * (1.5 if sparse else 0.7), (name, v)
-    assert seen >= 9
+    assert observations >= 9
 
 
 def test_steps_and_cadence_give_the_speed() -> None:

@@ -316,9 +316,9 @@ def test_a_sensor_turned_between_two_standings_makes_the_second_count() -> None:
         )
     )  # fmt: skip
     n = 700
-    by = exp(np.array([0.0, 0.0, 0.6]))
+    by_key = exp(np.array([0.0, 0.0, 0.6]))
     x = recording.sensors["shank_r"]
-    acc, gyr = (np.where(np.arange(len(v))[:, None] < n, rotate(by, v), v) for v in (x.acc, x.gyr))
+    acc, gyr = (np.where(np.arange(len(v))[:, None] < n, rotate(by_key, v), v) for v in (x.acc, x.gyr))
     initial_variant = replace(
         recording, sensors={**recording.sensors, "shank_r": replace(x, acc=acc, gyr=gyr, mag=None)}
     )

@@ -84,7 +84,7 @@ def told(frames: Sequence[LiveFrame]) -> Told:
 
 
 def _figure(f: LiveFrame) -> tuple[object, ...]:
-    bits = [{s: x.tobytes() for s, x in of.items()} for of in (f.q, f.p)]
+    bits = [{s: x.tobytes() for s, x in source.items()} for source in (f.q, f.p)]
     return (f.method, *bits, f.valid, dict(f.contact), np.array(list(f.angles.values())).tobytes())
 
 

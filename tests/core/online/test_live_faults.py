@@ -119,8 +119,8 @@ def test_a_hiccup_leaves_no_wrong_number_that_counts(
     strides = strides_of(disturbed(take(walk, worn), segment, fault, start_s, length_s, 1))
     assert find_wrong(strides, whole) == []
     for side in ("left", "right"):
-        there, left = (sum(s.counted for s in x if s.side == side) for x in (whole, strides))
-        assert left >= there - 3
+        target, left = (sum(s.counted for s in x if s.side == side) for x in (whole, strides))
+        assert left >= target - 3
 
 
 @pytest.mark.sweep

@@ -71,10 +71,10 @@ def test_a_lost_sensor_comes_back_into_the_figure(segment: Segment) -> None:
     """What hangs on it is withheld while it is away; a few steps later all is as if nothing had been."""
     whole, holed = walk(), lost(walk(), segment, 14.0, 15.5)
     expected, recording = recorded(whole), recorded(holed)
-    away = [f for f in recording.frames if 14.3 < f.t_s < 15.4]
-    assert away
-    assert not any(f.valid or segment in f.q for f in away)
-    assert all(np.isfinite(list(f.angles.values())).sum() >= 8 for f in away)
+    offset = [f for f in recording.frames if 14.3 < f.t_s < 15.4]
+    assert offset
+    assert not any(f.valid or segment in f.q for f in offset)
+    assert all(np.isfinite(list(f.angles.values())).sum() >= 8 for f in offset)
     # a foot is believed again from its next rest on
     back = [f for f in recording.frames if f.t_s > (16.6 if segment == "foot_r" else 15.7)]
     assert all(f.valid for f in back)
@@ -222,10 +222,10 @@ def test_one_foot_may_walk_on_while_the_other_is_away() -> None:
     complete = [s.n for s in run.strides if s.complete]
     assert len(complete) == len(set(complete))
     assert set(range(max(complete) - 1)) <= set(complete)
-    away = [s for s in run.strides if s.complete and 14.5 < s.start_s < 17.0]
-    assert away
-    assert {s.side for s in away} == {"left"}
-    assert all(s.values["stride_length_m"] is not None for s in away)
+    offset = [s for s in run.strides if s.complete and 14.5 < s.start_s < 17.0]
+    assert offset
+    assert {s.side for s in offset} == {"left"}
+    assert all(s.values["stride_length_m"] is not None for s in offset)
 
 
 def compared(take: UniformRecording, sizes: int | tuple[int, ...]) -> tuple[OnlineSession, list[Notice]]:

@@ -209,10 +209,10 @@ def lose_samples(stream: ImuStream, retained: Bools, how: str) -> ImuStream:
         return replace(stream, t_s=stream.t_s[retained], acc=acc[retained], gyr=gyr, mag=mag, quat=quat)
     if how == "frozen":
         for start, stop in find_runs(gone):
-            at = max(start - 1, 0)
-            acc[start:stop] = acc[at]
+            index = max(start - 1, 0)
+            acc[start:stop] = acc[index]
             if gyr is not None:
-                gyr[start:stop] = gyr[at]
+                gyr[start:stop] = gyr[index]
     if how == "zero":
         acc[gone] = 0.0
         gyr = None if gyr is None else np.where(gone[:, None], 0.0, gyr)
@@ -225,9 +225,9 @@ def lose_samples(stream: ImuStream, retained: Bools, how: str) -> ImuStream:
 
 def leap(stream: ImuStream, rng: np.random.Generator) -> ImuStream:
     """One sensor all of whose times from some sample on, or of a single packet, are later than they were."""
-    n, by = len(stream.t_s), float(rng.choice([0.3, 4.0, 60.0, 512.0]))
+    n, by_key = len(stream.t_s), float(rng.choice([0.3, 4.0, 60.0, 512.0]))
     t_s: Floats = stream.t_s.copy()
-    t_s[int(rng.integers(n)) :] += by
+    t_s[int(rng.integers(n)) :] += by_key
     return replace(stream, t_s=t_s)
 
 

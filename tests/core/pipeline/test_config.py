@@ -130,5 +130,5 @@ def test_stored_settings_that_name_a_removed_parameter_mean_the_same_without() -
     stored = {"contacts": {"stop_share": 0.3, "step_m": 0.2}, "quality": {"rest": {"bias": 0.1}}}
     chosen = override_config(PipelineConfig(), stored)
     assert chosen == override_config(PipelineConfig(), {"contacts": {"step_m": 0.2}})
-    there = {f"config.{p.name}".split("[")[0] for p in list_parameters()}
-    assert not [name for name in REMOVED if any(f"{x}.".startswith(f"{name}.") for x in there)]
+    target = {f"config.{p.name}".split("[")[0] for p in list_parameters()}
+    assert not [name for name in REMOVED if any(f"{x}.".startswith(f"{name}.") for x in target)]

@@ -75,9 +75,9 @@ def test_an_analysis_that_nobody_resumes_lets_go_of_earlier_orientations_and_fin
     assert result.mounted is not None
     assert result.posed is not None
     assert result.mounted.orientations is result.posed.orientations
-    for analysis, there in ((result, False), (retained, True)):
+    for analysis, target in ((result, False), (retained, True)):
         streams, sensors = analysis.source.streams.values(), analysis.recording.sensors.values()
-        assert {x.mag is not None for x in streams} == {there} == {x.mag is not None for x in sensors}
+        assert {x.mag is not None for x in streams} == {target} == {x.mag is not None for x in sensors}
 
 
 @pytest.mark.sweep

@@ -114,18 +114,18 @@ def test_both_legs_of_a_take_are_measured_and_compared(name: str) -> None:
     assert a.angles is not None
     result = {(p.name, p.side): p for p in a.parameters}
     depths = np.degrees(truth.depths_rad)
-    of = {"right": depths, "left": depths}
+    source = {"right": depths, "left": depths}
     if name == "squats_both_legs":
-        of = {"right": depths[:5], "left": depths[5:]}
-    for side, true in of.items():
+        source = {"right": depths[:5], "left": depths[5:]}
+    for side, true in source.items():
         depth = result["squat_depth_deg", side]  # type: ignore[index]
         assert depth.n == len(true)
         assert depth.mean == pytest.approx(true.mean(), abs=2.0)
         end = side[0]
-        at = [r.bottom for leg in a.squats if leg.side == side for r in leg.repetitions if not r.excluded]
+        index = [r.bottom for leg in a.squats if leg.side == side for r in leg.repetitions if not r.excluded]
         standing = truth.subtract_standing()
         for joint, most in (("knee_flexion", 2.0), ("hip_flexion", 2.0), ("hip_rotation", 4.0)):
-            off = a.angles.angles[f"{joint}_{end}"][at] - standing[f"{joint}_{end}"][at]
+            off = a.angles.angles[f"{joint}_{end}"][index] - standing[f"{joint}_{end}"][index]
             assert np.degrees(np.abs(off)).max() < most, joint
     compared = {s.name: s for s in compare_sides(a.parameters)}
     assert set(compared) == set(MEASURES)

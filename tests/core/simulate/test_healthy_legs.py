@@ -126,9 +126,9 @@ def test_healthy_people_step_and_support_as_healthy_adults_do(name: str) -> None
     speed, measurement = _measured(name)
     norms = walkway_values_at_speed(speed.norm_speed, speed.norm_leg_m)
     off = {
-        (what, side): f"{value:.2f}, {(value - norms[what].mean) / norms[what].sd:+.1f} SD"
-        for (what, side), value in measurement.items()
-        if what in norms and abs(value - norms[what].mean) > MOST_SD * norms[what].sd
+        (label, side): f"{value:.2f}, {(value - norms[label].mean) / norms[label].sd:+.1f} SD"
+        for (label, side), value in measurement.items()
+        if label in norms and abs(value - norms[label].mean) > MOST_SD * norms[label].sd
     }
     assert off == {}
 

@@ -55,11 +55,11 @@ def test_the_field_stays_finite_in_the_thing_itself() -> None:
 def test_the_field_bends_where_the_iron_is_and_nowhere_else() -> None:
     simulation = simulate(SCRIPT, seed=5, setup=RecordingSetup(noise=None, dipoles=(BESIDE,)))
     field = _world_field(simulation, "shank_l")
-    away = np.linalg.norm(simulation.truth.p["shank_l"] - BESIDE.position_m, axis=1)
+    offset = np.linalg.norm(simulation.truth.p["shank_l"] - BESIDE.position_m, axis=1)
     strength = np.abs(np.linalg.norm(field, axis=1) - 1.0)
-    assert strength[away < 0.9].max() > 0.1
-    assert strength[away > 2.5].max() < 0.01
-    assert np.corrcoef(away[away < 2.0], strength[away < 2.0])[0, 1] < -0.5
+    assert strength[offset < 0.9].max() > 0.1
+    assert strength[offset > 2.5].max() < 0.01
+    assert np.corrcoef(offset[offset < 2.0], strength[offset < 2.0])[0, 1] < -0.5
 
 
 def test_iron_in_the_room_leaves_the_other_signals_alone() -> None:

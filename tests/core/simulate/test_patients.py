@@ -145,7 +145,7 @@ def test_every_person_has_a_signature_and_a_script() -> None:
 def test_the_signature_shows(name: str, seed: int) -> None:
     truth = walked(name, seed)
     observations = SIGNATURES[name](features(truth, "right"), features(truth, "left"))
-    assert [what for what, shows in observations.items() if not shows] == []
+    assert [label for label, shows in observations.items() if not shows] == []
 
 
 @pytest.mark.parametrize("name", SIGNATURES)

@@ -36,8 +36,10 @@ def _lag_s(early: Floats, late: Floats, rate_hz: float) -> float:
     early, late = early - early.mean(), late - late.mean()
     match = np.correlate(late, early, "full")
     k = int(np.argmax(match))
-    initial, at, final = match[k - 1 : k + 2]
-    return float((k - len(early) + 1 + 0.5 * (initial - final) / (initial - 2.0 * at + final)) / rate_hz)
+    initial, position, final = match[k - 1 : k + 2]
+    return float(
+        (k - len(early) + 1 + 0.5 * (initial - final) / (initial - 2.0 * position + final)) / rate_hz
+    )
 
 
 @pytest.mark.slow

@@ -125,8 +125,8 @@ def test_instant_signals_are_derivatives_of_the_truth() -> None:
     dt = 1.0 / fine.truth.rate_hz
     q = _sensor_orientation(fine, "thigh_l")
     gyr = fine.ideal["thigh_l"].gyr
-    between = multiply(conjugate(q[:-2]), q[2:])
-    central = 2.0 * between[:, 1:] * np.sign(between[:, :1]) / (2.0 * dt)
+    gap = multiply(conjugate(q[:-2]), q[2:])
+    central = 2.0 * gap[:, 1:] * np.sign(gap[:, :1]) / (2.0 * dt)
     assert np.sqrt(np.mean((central - gyr[1:-1]) ** 2)) < 0.005 * np.sqrt(np.mean(gyr**2))
 
 

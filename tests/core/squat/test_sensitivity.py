@@ -95,8 +95,8 @@ def test_a_change_is_that_of_equation_1() -> None:
     turn = 0.05 * radians(45.0)
     mount = case().mounts["shank_r"]
     errors = []
-    for by in (turn, -turn):
-        off = replace(case(), mounts={**case().mounts, "shank_r": to_matrix(about(1, by)) @ mount})
+    for by_key in (turn, -turn):
+        off = replace(case(), mounts={**case().mounts, "shank_r": to_matrix(about(1, by_key)) @ mount})
         errors.append(analyse_errors(off))
     change = np.mean(np.abs(np.array(errors) - table().errors), axis=0)
     assert row.relative_rad == pytest.approx(change)

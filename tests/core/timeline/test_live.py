@@ -339,12 +339,12 @@ def test_a_sender_that_slept_leaves_a_gap() -> None:
 def test_no_clock_makes_more_samples_than_a_file_could_be_analysed_with() -> None:
     clean = device(0, 100.0, FEET, 2.0)
     axis = LiveAxis(send([clean]).hello)
-    made = 0
+    output = 0
     for k in range(60):
-        at = k * 599_000_000
-        block = axis.push(SampleBatch(0, k, at, at, clean.samples[:1]))
-        made += 0 if block is None else len(block)
-    assert made < 20 * 60 + 60_000
+        position = k * 599_000_000
+        block = axis.push(SampleBatch(0, k, position, position, clean.samples[:1]))
+        output += 0 if block is None else len(block)
+    assert output < 20 * 60 + 60_000
 
 
 def test_a_shared_clock_that_is_not_does_not_stop_the_others() -> None:

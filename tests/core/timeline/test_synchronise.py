@@ -40,12 +40,12 @@ def test_signals_without_a_hole_are_held_once() -> None:
         inputs = stream("a", acc, GYR, t_s=t_s)
         return inputs, synchronise(take({"pelvis": inputs})).sensors["pelvis"]
 
-    on_axis, between = np.arange(1000) / 100.0, np.arange(1000) / 100.0 + 0.002 * (np.arange(1000) > 500)
+    on_axis, gap = np.arange(1000) / 100.0, np.arange(1000) / 100.0 + 0.002 * (np.arange(1000) > 500)
     inputs, whole = laid(ACC, on_axis)
     assert inputs.gyr is not None
     assert np.shares_memory(whole.acc, inputs.acc)
     assert np.shares_memory(whole.gyr, inputs.gyr)
-    inputs, moved = laid(ACC.copy(), between)
+    inputs, moved = laid(ACC.copy(), gap)
     assert not np.shares_memory(moved.acc, inputs.acc)
     # by columns in memory: sums over the rows would round otherwise
     inputs, turned = laid(np.asfortranarray(ACC), on_axis)

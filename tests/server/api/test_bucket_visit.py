@@ -120,14 +120,14 @@ async def _use_while_away(
     for still in ("/patients", f"/patients/{patient}", f"/sessions/{session}/live"):
         assert (await client.get(still, headers=HTML)).status_code == 200, still
     requests: Any
-    for method, what, requests in (
+    for method, label, requests in (
         ("GET", f"{path}/report", {}),
         ("GET", f"{path}/video/content", {}),
         ("GET", f"{path}/archive.zip", {}),
         ("PUT", f"{path}/files/other.txt", {"content": b"walk"}),
     ):
-        answer = await client.request(method, what, **requests)
-        assert (answer.status_code, answer.json()["code"]) == (503, "store_away"), what
+        answer = await client.request(method, label, **requests)
+        assert (answer.status_code, answer.json()["code"]) == (503, "store_away"), label
     ready = await client.get("/health/ready")
     assert ready.status_code == 503
     assert ready.json()["checks"]["files"].startswith("The bucket of stored files cannot be reached;")

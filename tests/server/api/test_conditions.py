@@ -124,10 +124,10 @@ async def test_unlike_walks_side_by_side_say_so_and_claim_no_change(clinic: Clin
     assert value["comparable"] is False
     assert "own pace, then fast" in value["cautions"][0]
     assert [c["condition"]["pace"] for c in (value["before"], value["after"])] == ["comfortable", "fast"]
-    there = [c for c in value["changes"] if c["difference"] is not None]
-    assert there
-    assert {(c["verdict"], c["towards_norm"]) for c in there} == {(None, None)}
-    assert {c["words"] for c in there} == {"not judged, the conditions differ"}
+    target = [c for c in value["changes"] if c["difference"] is not None]
+    assert target
+    assert {(c["verdict"], c["towards_norm"]) for c in target} == {(None, None)}
+    assert {c["words"] for c in target} == {"not judged, the conditions differ"}
     page = await _get(clinic, f"/sessions/{fast}/compare/{own}")
     assert "No change is judged" in page
     assert "real change" not in page.lower()
@@ -263,16 +263,16 @@ async def test_the_take_that_counts_says_whether_there_was_feedback(clinic: Clin
     session, second = feedback.visit(clinic, patient, 0), feedback.visit(clinic, patient, 1, feedback=True)
     view = Cue(1, "left", 1.0, 2.0, 64.0, 0.0, "in", True, None, 0, 63.0, 65.0)
     hidden = replace(view, shown=False, why_not="probe")
-    for at, cue, noted in (
+    for position, cue, noted in (
         (session, hidden, False),
         (session, view, True),
         (session, hidden, False),  # recorded once more without feedback
         (second, hidden, True),  # somebody said so, and no take says otherwise
     ):
-        take = feedback.take(clinic, at, prescription, [cue])
+        take = feedback.take(clinic, position, prescription, [cue])
         with clinic.db.write() as c:
             live_training.settle_feedback(c, None, live.get(c, take))
-            assert sessions.get(c, at).feedback is noted
+            assert sessions.get(c, position).feedback is noted
     with clinic.db.write() as c:
         live_training.note_feedback(c, [take.id for take in live.takes_of(c, session)])
         assert sessions.get(c, session).feedback is True

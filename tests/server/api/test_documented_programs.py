@@ -43,9 +43,9 @@ async def test_the_programs_upload_analyse_and_download(tmp_path: Path) -> None:
         workers.start()
         try:
             for language, program in PROGRAMS.items():
-                here = tmp_path / language
-                here.mkdir()
-                await _run([*RUNNERS[language], program], here, f"http://127.0.0.1:{port}", take)
+                address = tmp_path / language
+                address.mkdir()
+                await _run([*RUNNERS[language], program], address, f"http://127.0.0.1:{port}", take)
         finally:
             workers.stop()
     assert "stride_time_s,left" in (tmp_path / "bash" / "parameters.csv").read_text()

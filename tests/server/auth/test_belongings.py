@@ -350,9 +350,9 @@ async def test_a_member_and_an_administrator_see_the_patient(guarded: Ward) -> N
             assert (await client.get(f"/patients/{guarded.one['pid']}")).status_code == 200
             assert (await client.get(f"/api/v1/jobs/{guarded.one['job_id']}")).status_code == 200
     async with guarded.clinic.client("viewer") as client:
-        here = f"/api/v1/patients/{guarded.one['pid']}/care-team"
-        assert [m["name"] for m in (await client.get(here)).json()["members"]] == ["viewer"]
-        assert (await client.put(here, json={"users": []})).status_code == 403
+        address = f"/api/v1/patients/{guarded.one['pid']}/care-team"
+        assert [m["name"] for m in (await client.get(address)).json()["members"]] == ["viewer"]
+        assert (await client.put(address, json={"users": []})).status_code == 403
         assert (await client.put("/api/v1/care-teams", json={"on": False})).status_code == 403
     await join(guarded, guarded.one)
     async with guarded.clinic.client("viewer") as client:
@@ -368,7 +368,7 @@ async def test_who_adds_a_patient_is_in_the_team(guarded: Ward) -> None:
 
 
 async def test_an_emergency_opens_a_patient_for_a_time_and_everybody_concerned_sees_it(guarded: Ward) -> None:
-    here, door = f"/api/v1/patients/{guarded.one['pid']}", "/api/v1/emergency-accesses"
+    address, door = f"/api/v1/patients/{guarded.one['pid']}", "/api/v1/emergency-accesses"
     reason = {"code": "Alder", "reason": "Fell in the corridor, Dr Elm asks for the last walk."}
     async with guarded.clinic.client("viewer") as client:
         assert (await client.post(door, json=reason)).status_code == 403
@@ -376,13 +376,13 @@ async def test_an_emergency_opens_a_patient_for_a_time_and_everybody_concerned_s
     async with guarded.clinic.client(headers=token) as client:
         assert (await client.post(door, json=reason)).status_code == 403  # a program is in no emergency
     async with guarded.clinic.client("clinician") as client:
-        assert (await client.get(here)).status_code == 404
+        assert (await client.get(address)).status_code == 404
         assert (await client.post(door, json=reason | {"reason": "     urgent        "})).status_code == 422
         assert (await client.post(door, json=reason | {"code": "alder"})).status_code == 404
-        assert (await client.get(here)).status_code == 404
+        assert (await client.get(address)).status_code == 404
         opened = await client.post(door, json=reason)
         assert opened.status_code == 201, opened.text
-        assert (await client.get(here)).status_code == 200
+        assert (await client.get(address)).status_code == 200
         assert "Alder" in (await client.get("/patients")).text
         assert (await client.post(door, json=reason)).json()["code"] == "seen_already"
         assert (await client.post(door, json=reason | {"code": "Birch"})).json()["code"] == "seen_already"
@@ -398,7 +398,7 @@ async def test_an_emergency_opens_a_patient_for_a_time_and_everybody_concerned_s
         long = {"opened_at": LONG_AGO, "ends_at": dt.datetime.now(dt.UTC)}
         c.execute(update(emergency_access).values(**long))
     async with guarded.clinic.client("clinician") as client:
-        assert (await client.get(here)).status_code == 404
+        assert (await client.get(address)).status_code == 404
         assert "Alder" not in (await client.get("/patients")).text
 
 

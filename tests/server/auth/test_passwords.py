@@ -91,8 +91,8 @@ def test_what_is_counted_together_is_found_by_an_index(tmp_path: Path) -> None:
 
         event.listen(Engine, "before_cursor_execute", explain)
         try:
-            at = throttle.begin("anna", "10.0.0.1")
-            throttle.withdraw("anna", "10.0.0.1", at)
+            position = throttle.begin("anna", "10.0.0.1")
+            throttle.withdraw("anna", "10.0.0.1", position)
             throttle.succeed("anna", "10.0.0.1")
             throttle.forgive("anna")
         finally:

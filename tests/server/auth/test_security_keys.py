@@ -156,23 +156,23 @@ async def test_another_service_on_this_host_gets_nothing_it_can_use(
     clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
 ) -> None:
     client, codes = person
-    key, there = await set_up(client, codes), "http://localhost:8443"
-    for requests, sent in ((HERE, there), (HERE, HERE)):
-        answer = key.get((await challenge(clinic, at=requests)).json()["options"], there)
+    key, target = await set_up(client, codes), "http://localhost:8443"
+    for requests, sent in ((HERE, target), (HERE, HERE)):
+        answer = key.get((await challenge(clinic, at=requests)).json()["options"], target)
         got = await sign_in(clinic, answer, at=sent)
         assert (got.status_code, got.json()["code"]) == (401, "key_refused"), (requests, sent)
-    assert (await challenge(clinic, at=there)).status_code == 404
+    assert (await challenge(clinic, at=target)).status_code == 404
     # a key set up at that port signs in there, and there alone
-    client.base_url = httpx.URL(there)
-    second = await set_up(client, codes, there)
+    client.base_url = httpx.URL(target)
+    second = await set_up(client, codes, target)
     assert [k["host"] for k in (await client.get(f"{API}/account/security-keys")).json()] == [
         "localhost",
         "localhost:8443",
     ]
-    options = (await challenge(clinic, at=there)).json()["options"]
+    options = (await challenge(clinic, at=target)).json()["options"]
     assert options["rpId"] == "localhost"
     assert len(options["allowCredentials"]) == 1
-    assert (await sign_in(clinic, second.get(options, there), at=there)).status_code == 200
+    assert (await sign_in(clinic, second.get(options, target), at=target)).status_code == 200
     options = (await challenge(clinic)).json()["options"]
     assert (await sign_in(clinic, second.get(options, HERE))).status_code == 401
     # a port nobody could keep is no place for keys
@@ -237,11 +237,11 @@ async def test_keys_of_another_port_do_not_make_keys_alone(
     clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
 ) -> None:
     client, codes = person
-    choose, keys, there = (
+    choose, keys, target = (
         f"{API}/account/second-factor/keys-only", f"{API}/account/security-keys", "http://localhost:8443"
     )  # fmt: skip
-    client.base_url = httpx.URL(there)
-    await set_up(client, codes, there)
+    client.base_url = httpx.URL(target)
+    await set_up(client, codes, target)
     client.base_url = httpx.URL(HERE)
     on: dict[str, Any] = {"on": True, "password": PASSWORD}
     refused = await client.put(choose, json=on | {"code": codes[-1]})
@@ -318,9 +318,9 @@ async def test_a_key_is_set_up_once_for_one_account_and_one_name(
     assert [row["user_name"] for row in tries] == ["clinician"] * 5
     # a challenge that was answered wrongly is spent
     options = await ask(client, codes)
-    for at in ("http://evil.example", HERE):
-        body = {"name": "x", "key": SoftKey().create(options, at)}
-        assert (await client.post(add, json=body)).json()["code"] == "key_refused", at
+    for moment in ("http://evil.example", HERE):
+        body = {"name": "x", "key": SoftKey().create(options, moment)}
+        assert (await client.post(add, json=body)).json()["code"] == "key_refused", moment
     client.base_url = httpx.URL("http://127.0.0.1")
     proofs = {"password": PASSWORD, "code": codes.pop()}
     refused = await client.post(f"{add}/options", json=proofs)

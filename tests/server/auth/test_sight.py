@@ -41,7 +41,8 @@ async def test_outside_the_team_nothing_is_seen_but_in_an_emergency(clinic: Clin
                 for user in everybody
             ]
             return [
-                (sight.may_open(c, user, parts), there) for user, there in zip(everybody, listed, strict=True)
+                (sight.may_open(c, user, parts), target)
+                for user, target in zip(everybody, listed, strict=True)
             ]
 
     assert seen() == [(True, True)] * 3, "without care teams everybody sees everybody"

@@ -77,10 +77,10 @@ def test_who_restores_without_the_key_of_names_is_told_where_it_has_to_be(
 
 def test_a_key_of_names_that_came_with_the_backup_goes_where_the_settings_have_it(tmp_path: Path) -> None:
     came, place = tmp_path / IDENTITY_KEY, tmp_path / "vault.key"
-    here, elsewhere = Settings(data_dir=tmp_path), Settings(data_dir=tmp_path, identity_key=str(place))
+    address, elsewhere = Settings(data_dir=tmp_path), Settings(data_dir=tmp_path, identity_key=str(place))
     assert _tell_names_key(elsewhere) == ""  # none came
     came.write_bytes(b"of the backup")
-    assert _tell_names_key(here) == ""
+    assert _tell_names_key(address) == ""
     move = f"The key of patients' names lies in {came}. Move it to {place}.\n"
     assert _tell_names_key(elsewhere) == move
     place.write_bytes(b"of the backup")

@@ -85,17 +85,17 @@ def test_the_models_axes_turned_by_the_coordinates_give_the_segments() -> None:
     assert np.ptp(angle_between(course, course[:1])) < 1e-6
     for side in SIDES:
         k, own = SUFFIX[side], 1.0 if side == "right" else -1.0
-        at = multiply(
+        position = multiply(
             multiply(about(2, result[f"hip_flexion_{k}"]), about(0, own * result[f"hip_adduction_{k}"])),
             about(1, own * result[f"hip_rotation_{k}"]),
         )
         legs = [s for _, _, s in list_leg_joints(side)]
-        turns = [at, about(2, -result[f"knee_angle_{k}"]), about(2, result[f"ankle_angle_{k}"])]
-        here = pelvis
+        turns = [position, about(2, -result[f"knee_angle_{k}"]), about(2, result[f"ankle_angle_{k}"])]
+        place = pelvis
         for segment, turn in zip(legs, turns, strict=True):
-            here = multiply(here, turn)
+            place = multiply(place, turn)
             expected = multiply(conjugate(course[:1]), multiply(TO_GROUND, q[segment]))
-            assert angle_between(here, expected).max() < 1e-6
+            assert angle_between(place, expected).max() < 1e-6
 
 
 def test_lost_moments_and_joints_without_sensors_are_left_out() -> None:

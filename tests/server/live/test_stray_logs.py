@@ -134,11 +134,11 @@ async def test_what_cannot_be_adopted_is_refused_with_a_sentence_and_left(
         put_stray(tmp_path)
         assert main([*data, STRAY, "--session", "c" * 32]) == 1
         assert "no session" in capsys.readouterr().err
-        here = (clinic.db, clinic.app.state.blobs, clinic.settings, clinic.app.state.queue, None)
-        live_logs.adopt(*here, STRAY, session)
+        place = (clinic.db, clinic.app.state.blobs, clinic.settings, clinic.app.state.queue, None)
+        live_logs.adopt(*place, STRAY, session)
         path = put_stray(tmp_path)
         with pytest.raises(Conflict, match="belongs to a session already"):
-            live_logs.adopt(*here, STRAY, session)
+            live_logs.adopt(*place, STRAY, session)
         assert path.read_bytes() == WHOLE
 
 
@@ -153,11 +153,11 @@ async def test_an_adoption_that_dies_half_way_is_finished_by_the_next_start(
     async with open_clinic(tmp_path, live_workers=0) as clinic:
         session = new_session(clinic)
         path = put_stray(tmp_path)
-        here = (clinic.db, clinic.app.state.blobs, clinic.settings, clinic.app.state.queue, None)
+        place = (clinic.db, clinic.app.state.blobs, clinic.settings, clinic.app.state.queue, None)
         with monkeypatch.context() as patch:
             patch.setattr(f"sagittal.server.live_takes.live_recordings._{broken}", dies)
             with pytest.raises(RuntimeError):
-                live_logs.adopt(*here, STRAY, session)
+                live_logs.adopt(*place, STRAY, session)
         assert path.read_bytes() == WHOLE
     async with open_clinic(tmp_path, live_workers=0) as clinic:
         assert not path.exists()

@@ -146,11 +146,11 @@ async def test_what_is_ours_or_of_one_that_is_away_is_answered_here(owners: list
 async def test_a_server_that_is_not_reached_is_suspected_and_the_question_asked_anew(
     owners: list[Owner | None],
 ) -> None:
-    nodes, away = Nodes(), node_at(unused_port())
+    nodes, offset = Nodes(), node_at(unused_port())
     async with other(b"HTTP/1.1 200 x\r\nContent-Length: 5\r\n\r\nthere") as (port, requests):
-        owners += [Owner("b", away, must=False), Owner("c", node_at(port, "c"), must=False)]
+        owners += [Owner("b", offset, must=False), Owner("c", node_at(port, "c"), must=False)]
         got = await ask(nodes, content=b"kept")
-    assert (got.text, nodes.suspected) == ("there", [away])
+    assert (got.text, nodes.suspected) == ("there", [offset])
     assert requests[0].endswith(b"\r\n\r\nkept")
 
 

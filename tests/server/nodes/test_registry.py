@@ -99,14 +99,14 @@ def test_all_agree_where_something_lives_and_it_moves_when_one_is_away(tmp_path:
         b._look()
         words = [new_id() for _ in range(40)]
         at_a, at_b = [[nodes.find_home(word) for word in words] for nodes in (a, b)]
-        assert [here is None for here in at_a] == [there is not None for there in at_b]
-        assert {here is None for here in at_a} == {True, False}
-        away = next(home for home in at_a if home is not None)
-        a.suspect(away)
+        assert [place is None for place in at_a] == [target is not None for target in at_b]
+        assert {place is None for place in at_a} == {True, False}
+        offset = next(home for home in at_a if home is not None)
+        a.suspect(offset)
         assert all(a.find_home(word) is None for word in words)
         b._write_beat(now())
         a._look()
-        assert a.find_home(words[at_a.index(away)]) is not None
+        assert a.find_home(words[at_a.index(offset)]) is not None
 
 
 def test_an_open_take_is_its_nodes_alone_and_one_that_is_over_anybodys_while_that_is_away(

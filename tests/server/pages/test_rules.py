@@ -141,12 +141,12 @@ def speak(rule: Rule, flags: Sequence[Flag], sides: Sequence[Side]) -> HeadlineS
 
 def fill_headline(earlier: Headline, sentence: HeadlineSentence, rank: int) -> Headline:
     """A headline of as many sentences as there are ranks, this one at its rank."""
-    there = [*earlier.stands_out]
-    while len(there) < len(RANKS):
-        there.append(
+    target = [*earlier.stands_out]
+    while len(target) < len(RANKS):
+        target.append(
             HeadlineSentence("step_length_m", "left", "step", "sides", 2.0, "The ", "left", " step", "sides")
         )
-    return replace(earlier, stands_out=(*there[:rank], sentence, *there[rank : len(RANKS) - 1]))
+    return replace(earlier, stands_out=(*target[:rank], sentence, *target[rank : len(RANKS) - 1]))
 
 
 def list_cases(*, whole: bool) -> list[tuple[Rule, int, tuple[Side, ...]]]:

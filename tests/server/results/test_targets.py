@@ -112,12 +112,12 @@ def test_without_a_norm_the_reason_is_told() -> None:
     def reason(norms: Norms) -> str | None:
         return offer(walk(norms=norms), "norm", NAME, "left").reason
 
-    other = " Choose another source, or enter a target."
-    assert reason(Norms(None, None)) == f"There is no norm of this parameter.{other}"
+    alternative = " Choose another source, or enter a target."
+    assert reason(Norms(None, None)) == f"There is no norm of this parameter.{alternative}"
     unknown = Norms(None, None, timing_reason="age_unknown", reason="no_norm_for_age")
-    assert reason(unknown) == f"{NO_NORM['age_unknown']}{other}"
+    assert reason(unknown) == f"{NO_NORM['age_unknown']}{alternative}"
     unlike = Norms(None, None, values={NAME: norm(comparable=False, note="Not comparable.")})
-    assert reason(unlike) == f"Not comparable.{other}"
+    assert reason(unlike) == f"Not comparable.{alternative}"
 
 
 def test_a_value_of_both_sides_is_the_takes_own_or_both_together() -> None:

@@ -34,13 +34,13 @@ def take(name: str, days: int = 0, minute: int = 0, **walked: Any) -> AnalysedSe
     known_fields: dict[str, Any] = {
         "pace": None, "aid": None, "orthosis": None, "shoes": None, "feedback": False, "protocol": "walk"
     }  # fmt: skip
-    at = dt.datetime(2026, 3, 2, 9, minute, tzinfo=dt.UTC) + dt.timedelta(days=days)
+    position = dt.datetime(2026, 3, 2, 9, minute, tzinfo=dt.UTC) + dt.timedelta(days=days)
     session = Session(
         id=name, patient_id="p", patient_code="P-1", title=name, performed_on=DAY + dt.timedelta(days=days),
-        height_m=None, note="", created_at=at, has_video=False, state="done", **(known_fields | walked),
+        height_m=None, note="", created_at=position, has_video=False, state="done", **(known_fields | walked),
     )  # fmt: skip
     analysis_record = AnalysisRecord(
-        f"analysis of {name}", "r", name, "p", "j", "", "", "1", None, {}, at, {}
+        f"analysis of {name}", "r", name, "p", "j", "", "", "1", None, {}, position, {}
     )
     return AnalysedSession(session, analysis_record, EditHistory())
 

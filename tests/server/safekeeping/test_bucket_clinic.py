@@ -77,9 +77,9 @@ def test_what_nothing_refers_to_goes_to_the_trash_and_comes_back(clinic: Clinic,
     bucket.write(key, b"of nobody")
     [expected] = [f for f in clinic.blobs.files() if f.space == clinic.patient.id]
     address = (expected.space, expected.name)
-    [at] = {one.since for one in clinic.blobs.trash.files()}
-    clinic.blobs.trash.prepare([address], at)
-    clinic.blobs.trash.take([address], at)
+    [position] = {one.since for one in clinic.blobs.trash.files()}
+    clinic.blobs.trash.prepare([address], position)
+    clinic.blobs.trash.take([address], position)
     assert "lies in the trash" in findings(clinic)[0]
     assert sweep.put_back(clinic.db, clinic.blobs) == 1
     assert findings(clinic) == []
@@ -153,14 +153,14 @@ def test_a_backup_has_the_bucket_and_goes_into_a_folder_and_into_an_empty_bucket
     disk.mkdir()
     backup = backups.make_backup(clinic.db, clinic.settings, disk, None)
     assert (backup.files, backup.missing) == (1, [])
-    there = bucket.url + "-again"
-    for name, url in (("folder", ""), ("bucket", there)):
+    target = bucket.url + "-again"
+    for name, url in (("folder", ""), ("bucket", target)):
         home = replace(clinic.settings, data_dir=tmp_path / name, bucket=url)
         assert restore(backup.path, home, None).files == 1
         with closing(Database(home.database)) as db:
             assert checks.check(db, open_blobs(home), home) == []
         assert not home.restoring.exists()
-    for selection in (bucket.url, there):
+    for selection in (bucket.url, target):
         home = replace(clinic.settings, data_dir=tmp_path / "another", bucket=selection)
         with pytest.raises(RestoreError, match="is not empty"):
             restore(backup.path, home, None)
@@ -218,8 +218,8 @@ def test_a_move_into_the_bucket_goes_on_where_it_was_cut_off(
     upload(clinic, "b.txt", b"more signals")
     clinic.blobs.put(clinic.patient.id, b"of nobody")
     assert sweep_now(clinic) == 1
-    there = replace(clinic.settings, bucket=bucket.url)
-    clinic.settings = there
+    target = replace(clinic.settings, bucket=bucket.url)
+    clinic.settings = target
     environment(clinic, monkeypatch)
     assert main(["check"]) == 2
     assert "Run `sagittal move-blobs` first" in capsys.readouterr().err
@@ -238,13 +238,13 @@ def test_a_move_into_the_bucket_goes_on_where_it_was_cut_off(
     assert main(["move-blobs"]) == 0
     assert "read back" in capsys.readouterr().out
     assert len(bucket.objects()) == 3
-    left = [p for p in (*there.blobs.rglob("*"), *there.trash.rglob("*")) if p.is_file()]
+    left = [p for p in (*target.blobs.rglob("*"), *target.trash.rglob("*")) if p.is_file()]
     assert sorted(p.name for p in left) == ["bucket.txt", "list.txt"]
     assert main(["check"]) == 0
-    late = FolderBlobs(there.blobs).put(clinic.patient.id, b"of a worker that nobody had stopped")
+    late = FolderBlobs(target.blobs).put(clinic.patient.id, b"of a worker that nobody had stopped")
     assert main(["move-blobs"]) == 0
     assert "1 stored files" in capsys.readouterr().out
-    clinic.blobs = open_blobs(there)
+    clinic.blobs = open_blobs(target)
     assert clinic.blobs.has(clinic.patient.id, late.sha256)
     assert findings(clinic) == []
     clinic.db.close()

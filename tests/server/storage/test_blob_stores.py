@@ -38,9 +38,9 @@ def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
     if request.param == "folder":
         folder = FolderBlobs(tmp_path / "blobs")
         return Store(folder, lambda space, name, content: _overwrite(folder.path(space, name), content))
-    there: Bucket = request.getfixturevalue("bucket")
-    blobs = BucketBlobs(there.url, tmp_path / "blobs" / INCOMING)
-    return Store(blobs, lambda space, name, content: there.write(f"blobs/{space}/{name}", content))
+    target: Bucket = request.getfixturevalue("bucket")
+    blobs = BucketBlobs(target.url, tmp_path / "blobs" / INCOMING)
+    return Store(blobs, lambda space, name, content: target.write(f"blobs/{space}/{name}", content))
 
 
 def _overwrite(path: Path, content: bytes) -> None:

@@ -284,10 +284,10 @@ def test_web_servers_of_different_names_share_a_database_and_a_duty_is_done_by_o
 def test_a_worker_elsewhere_needs_the_servers_folder_and_its_time(
     tmp_path: Path, postgres: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    here, elsewhere = tmp_path / "shared", tmp_path / "elsewhere"
-    here.mkdir()
+    place, elsewhere = tmp_path / "shared", tmp_path / "elsewhere"
+    place.mkdir()
     elsewhere.mkdir()
-    settings = Settings(data_dir=here, database_url=postgres)
+    settings = Settings(data_dir=place, database_url=postgres)
     with closing(Database(postgres)) as db:
         stop = threading.Event()
         threading.Timer(0.5, stop.set).start()

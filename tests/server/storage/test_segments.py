@@ -66,10 +66,10 @@ def test_a_log_cut_at_any_byte_recovers_its_longest_valid_prefix(tmp_path: Path)
 def test_a_log_with_any_byte_changed_recovers_what_is_before_it(tmp_path: Path) -> None:
     path = tmp_path / "t.log"
     whole_at = ends()
-    for at in range(len(HEAD), len(WHOLE)):
-        path.write_bytes(WHOLE[:at] + bytes([WHOLE[at] ^ 0x10]) + WHOLE[at + 1 :])
+    for index in range(len(HEAD), len(WHOLE)):
+        path.write_bytes(WHOLE[:index] + bytes([WHOLE[index] ^ 0x10]) + WHOLE[index + 1 :])
         recovered(path)
-        assert path.read_bytes() == WHOLE[: max(e for e in whole_at if e <= at)]
+        assert path.read_bytes() == WHOLE[: max(e for e in whole_at if e <= index)]
 
 
 def test_zeros_behind_the_last_record_are_cut_off(tmp_path: Path) -> None:
@@ -201,12 +201,12 @@ def test_an_end_torn_by_a_crash_is_no_damage_and_leaves_no_copy(tmp_path: Path) 
 def test_one_flipped_bit_in_a_log_keeps_the_whole_original(tmp_path: Path) -> None:
     path = tmp_path / "t.log"
     last = ends()[-3]  # of the last batch only a changed content can be told from a torn end
-    for at in range(len(HEAD), last):
+    for index in range(len(HEAD), last):
         for stored_path in tmp_path.glob("*.damaged"):
             stored_path.unlink()
-        hurt = WHOLE[:at] + bytes([WHOLE[at] ^ 0x10]) + WHOLE[at + 1 :]
+        hurt = WHOLE[:index] + bytes([WHOLE[index] ^ 0x10]) + WHOLE[index + 1 :]
         damage = damage_of(path, hurt)
-        start = max(e for e in ends() if e <= at)
+        start = max(e for e in ends() if e <= index)
         assert damage is not None
         assert (damage.start, damage.lost) == (start, len(WHOLE) - start)
         assert damage.original == tmp_path / "t.1.damaged"
@@ -216,8 +216,8 @@ def test_one_flipped_bit_in_a_log_keeps_the_whole_original(tmp_path: Path) -> No
 
 def test_a_second_damage_does_not_overwrite_the_first_original(tmp_path: Path) -> None:
     path = tmp_path / "t.log"
-    for at in (len(HEAD) + 60, len(HEAD) + 70):
-        damage_of(path, WHOLE[:at] + b"?" + WHOLE[at + 1 :])
+    for index in (len(HEAD) + 60, len(HEAD) + 70):
+        damage_of(path, WHOLE[:index] + b"?" + WHOLE[index + 1 :])
     assert sorted(p.name for p in tmp_path.glob("*.damaged")) == ["t.1.damaged", "t.2.damaged"]
 
 

@@ -86,9 +86,9 @@ def run(
 
 def split(n: int, sizes: Sequence[int]) -> list[slice]:
     """Blocks of these sizes in turn, over n samples."""
-    result, at, k = [], 0, 0
-    while at < n:
+    result, position, k = [], 0, 0
+    while position < n:
         size = sizes[k % len(sizes)]
-        result.append(slice(at, min(n, at + size)))
-        at, k = at + size, k + 1
+        result.append(slice(position, min(n, position + size)))
+        position, k = position + size, k + 1
     return result

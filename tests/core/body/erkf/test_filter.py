@@ -70,9 +70,9 @@ def boxminus(x: Floats, y: Floats) -> Floats:
 def dense_transition(F: Floats, dt: float) -> Floats:
     """F (15, 15) of one IMU from its blocks (module docstring of erkf_predict)."""
     full = np.eye(15)
-    for at, block in ((6, F[A]), (9, F[D]), (12, F[C])):
-        full[3:6, at : at + 3] = block
-        full[0:3, at : at + 3] = 0.5 * dt * block
+    for index, block in ((6, F[A]), (9, F[D]), (12, F[C])):
+        full[3:6, index : index + 3] = block
+        full[0:3, index : index + 3] = 0.5 * dt * block
     full[0:3, 3:6] = dt * np.eye(3)
     full[6:9, 6:9], full[6:9, 9:12] = F[S], F[GAMMA]
     return full
@@ -158,15 +158,15 @@ def test_propagation_and_correction_equal_the_textbook() -> None:
     full = np.zeros((n * m, n * m))
     for i in range(n):
         full[i * m : (i + 1) * m, i * m : (i + 1) * m] = dense_transition(blocks[i], dt)
-    here = with_spare_rows(P)
-    propagate(here, blocks, m, dt)
+    address = with_spare_rows(P)
+    propagate(address, blocks, m, dt)
     # on and below the diagonal
-    np.testing.assert_allclose(np.tril(here[:, : n * m]), np.tril(full @ P @ full.T), atol=1e-12)
+    np.testing.assert_allclose(np.tril(address[:, : n * m]), np.tril(full @ P @ full.T), atol=1e-12)
     unbiased = [e for e in range(n * m) if e % m < 9]
     P9, F9 = P[np.ix_(unbiased, unbiased)], full[np.ix_(unbiased, unbiased)]
-    here = with_spare_rows(P9)
-    propagate(here, blocks, 9, dt)
-    np.testing.assert_allclose(np.tril(here[:, : n * 9]), np.tril(F9 @ P9 @ F9.T), atol=1e-12)
+    address = with_spare_rows(P9)
+    propagate(address, blocks, 9, dt)
+    np.testing.assert_allclose(np.tril(address[:, : n * 9]), np.tril(F9 @ P9 @ F9.T), atol=1e-12)
     lam = rng.normal(0.0, 1.0, n * m)
     swept = lam.copy()
     propagate_back(swept, blocks, m, dt)
@@ -184,8 +184,8 @@ def test_propagation_and_correction_equal_the_textbook() -> None:
     for selection, (i, j) in enumerate(((0, 2), (1, 2))):
         joint_rows(x, R, m, i, j, rng.normal(0, 0.2, 3), rng.normal(0, 0.2, 3), True, place, H, y)
         dense = np.zeros((3, n * m))
-        for sign, at, turned in ((1.0, i * m, H[0]), (-1.0, j * m, H[1])):
-            dense[:, at : at + 3], dense[:, at + 6 : at + 9] = sign * np.eye(3), turned
+        for sign, index, turned in ((1.0, i * m, H[0]), (-1.0, j * m, H[1])):
+            dense[:, index : index + 3], dense[:, index + 6 : index + 9] = sign * np.eye(3), turned
         gain = expected @ dense.T @ np.linalg.inv(dense @ expected @ dense.T + sd**2 * np.eye(3))
         expected_dx = expected_dx + gain @ (y - dense @ expected_dx)
         expected = expected - gain @ dense @ expected

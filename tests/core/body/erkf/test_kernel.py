@@ -165,8 +165,8 @@ def test_a_correction_moves_state_and_orientation(states: int) -> None:
     assert nominal[0, 6:10] == pytest.approx([np.cos(0.1), 0.0, 0.0, np.sin(0.1)])
     assert nominal[1, :6] == pytest.approx(x[1, :6])
     # the vertical is z of both sensors
-    at = [8, states + 8]
-    assert heading_sd == pytest.approx(np.sqrt(available.P[at, at]))
+    index = [8, states + 8]
+    assert heading_sd == pytest.approx(np.sqrt(available.P[index, index]))
 
 
 def test_joints_are_as_far_apart_as_their_two_ends() -> None:

@@ -30,10 +30,12 @@ LIVE, OFFLINE = ErkfParams.live(), ErkfParams.offline()
 
 def shuffled(take: Take, order: list[int]) -> Take:
     """Sensors and joints in another order."""
-    t, x, at = take.tree, take.inputs, {old: new for new, old in enumerate(order)}
-    joints = tuple(replace(j, proximal=at[j.proximal], distal=at[j.distal]) for j in reversed(t.joints))
+    t, x, position = take.tree, take.inputs, {old: new for new, old in enumerate(order)}
+    joints = tuple(
+        replace(j, proximal=position[j.proximal], distal=position[j.distal]) for j in reversed(t.joints)
+    )
     tree = ImuTree(
-        tuple(t.imus[i] for i in order), joints, tuple(at[i] for i in t.feet),
+        tuple(t.imus[i] for i in order), joints, tuple(position[i] for i in t.feet),
         t.q_mount[order], t.place[order], t.origin[order],
     )  # fmt: skip
     flags = (x.valid[:, order], x.contact[:, order], x.still[:, order])
@@ -72,8 +74,8 @@ def test_the_order_of_sensors_and_joints_does_not_matter() -> None:
 
 def test_how_a_sensor_is_turned_on_its_segment_does_not_matter() -> None:
     take = mixed_walk()
-    by = normalise(np.random.default_rng(7).normal(size=(len(SEGMENTS), 4)))
-    repeat = remounted(take, by)
+    by_key = normalise(np.random.default_rng(7).normal(size=(len(SEGMENTS), 4)))
+    repeat = remounted(take, by_key)
     params = replace(OFFLINE, joint_axis_sd=0.2)
     one, second = filtered(take, params), filtered(repeat, params)
     np.testing.assert_allclose(second.p, one.p, atol=1e-10)

@@ -107,8 +107,8 @@ def test_a_common_turn_of_the_start_changes_no_joint_angle() -> None:
     P = first.P.copy()
     spin = to_matrix(turn)
     for i in range(len(SEGMENTS)):
-        for at in (0, 3):
-            k = slice(i * 9 + at, i * 9 + at + 3)
+        for position in (0, 3):
+            k = slice(i * 9 + position, i * 9 + position + 3)
             P[k] = spin @ P[k]
             P[:, k] = P[:, k] @ spin.T
     one = filter_block(first, take.inputs, take.tree, LIVE)[0]
@@ -153,9 +153,9 @@ def test_with_known_positions_they_come_together_at_the_first_step(
     nominal[:, 0:3] = [
         take.truth.p[s][0] + rotate(take.truth.q[s][0], take.tree.place[i]) for i, s in enumerate(SEGMENTS)
     ]
-    for at in range(0, len(P), 3):
-        k = slice(at, at + 3)
-        P[k, k] = start.P[k, k] if at % m else wide.start_position_sd**2 * np.eye(3)
+    for position in range(0, len(P), 3):
+        k = slice(position, position + 3)
+        P[k, k] = start.P[k, k] if position % m else wide.start_position_sd**2 * np.eye(3)
     first = replace(start, nominal=nominal, P=P)
     error = apart_deg(take, filter_block(first, take.inputs, take.tree, wide)[0])
     assert error[round((TOE_OFF_S + 0.6) * take.rate_hz) :].max() < 3.0

@@ -56,9 +56,9 @@ def all_known(valid: list[Bools], step: Bools) -> Bools:
     """Whole-take form: every sensor there, and each foot has rested since it was lost."""
     index = np.arange(len(step))
     reference = np.logical_and.reduce(valid)
-    for leg, there in enumerate(valid[-2:]):
-        lost = np.maximum.accumulate(np.where(there, -1, index))
-        rested = np.maximum.accumulate(np.where(there & step[:, leg], index, -1))
+    for leg, target in enumerate(valid[-2:]):
+        lost = np.maximum.accumulate(np.where(target, -1, index))
+        rested = np.maximum.accumulate(np.where(target & step[:, leg], index, -1))
         reference &= rested >= lost
     return np.asarray(reference)
 

@@ -43,8 +43,8 @@ def solve_densely(
 
     def add(weight: float, terms: dict[tuple[int, int], float], residual: float) -> None:
         row = np.zeros((T, SIZE))
-        for at, value in terms.items():
-            row[at] += value
+        for index, value in terms.items():
+            row[index] += value
         rows.append((weight, row.reshape(-1), residual))
 
     for k in range(T):

@@ -127,10 +127,10 @@ def test_the_reset_keeps_the_covariance_symmetric_and_positive() -> None:
     A = rng.normal(0.0, 1.0, (27, 27))
     P, dx, turn = np.zeros((28, 28)), np.zeros(28), np.eye(27)
     P[:27, :27], dx[:27] = A @ A.T + np.eye(27), rng.normal(0.0, 0.3, 27)
-    for at in (0, 6, 12):
+    for index in (0, 6, 12):
         same, cross = np.empty((3, 3)), np.empty((3, 3))
-        right_jacobian(dx, at, same, cross)
-        turn[at : at + 6, at : at + 6] = np.block([[same, cross], [np.zeros((3, 3)), same]])
+        right_jacobian(dx, index, same, cross)
+        turn[index : index + 6, index : index + 6] = np.block([[same, cross], [np.zeros((3, 3)), same]])
     turned = turn @ P[:27, :27] @ turn.T
     reset(P.reshape(-1), dx, np.empty((3, 2, 3, 3)))
     np.testing.assert_allclose(P[:27, :27], turned, rtol=1e-12, atol=1e-12)

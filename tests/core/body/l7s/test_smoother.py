@@ -108,24 +108,24 @@ class Problem:
 
 def test_a_pass_is_that_of_gauss_newton_on_what_is_made_small(monkeypatch: pytest.MonkeyPatch) -> None:
     """With derivatives by differences and all equations in one matrix."""
-    of = Problem.make(9)
-    assert of.still.any(axis=0).all()
-    assert not of.still.all(axis=1).all()
-    step, flat = 1e-6, of.x.reshape(-1)
+    source = Problem.make(9)
+    assert source.still.any(axis=0).all()
+    assert not source.still.all(axis=1).all()
+    step, flat = 1e-6, source.x.reshape(-1)
     ways = step * np.eye(flat.size)
-    J = np.stack([(of.rows(flat + way) - of.rows(flat - way)) / (2.0 * step) for way in ways], axis=1)
+    J = np.stack([(source.rows(flat + way) - source.rows(flat - way)) / (2.0 * step) for way in ways], axis=1)
     monkeypatch.setattr(smoother, "PASSES", 1)
-    result, passes, moved = of.solve()
+    result, passes, moved = source.solve()
     assert passes == 1
-    assert moved == pytest.approx(np.abs(result - of.x).max())
-    expected = of.x - np.linalg.solve(J.T @ J, J.T @ of.rows(flat)).reshape(of.x.shape)
+    assert moved == pytest.approx(np.abs(result - source.x).max())
+    expected = source.x - np.linalg.solve(J.T @ J, J.T @ source.rows(flat)).reshape(source.x.shape)
     np.testing.assert_allclose(result, expected, atol=1e-6)
 
 
 def test_places_that_are_no_numbers_are_refused() -> None:
-    of = Problem.make(9)
+    source = Problem.make(9)
     with pytest.raises(EstimationError, match="cannot be found"):
-        replace(of, R=np.full_like(of.R, np.nan)).solve()
+        replace(source, R=np.full_like(source.R, np.nan)).solve()
 
 
 @pytest.mark.slow

@@ -189,11 +189,11 @@ def test_blocks_of_any_length_and_sensors_alone_give_the_same_bits(algorithm: Al
     whole = start(algorithm, take).advance(take.gyr[:n], take.acc[:n], take.mag[:n])
     second = start(algorithm, take).advance(take.gyr[:n], take.acc[:n], take.mag[:n])
     assert np.array_equal(whole, second)
-    running, parts, at = start(algorithm, take), [], 0
+    running, parts, position = start(algorithm, take), [], 0
     for length in (1, 2, 0, 97, 300, 300):
-        part = slice(at, at + length)
+        part = slice(position, position + length)
         parts.append(running.advance(take.gyr[part], take.acc[part], take.mag[part]))
-        at += length
+        position += length
     assert np.array_equal(np.concatenate(parts), whole)
     remainder = take.rest()
     assert remainder.mag is not None

@@ -71,12 +71,12 @@ def test_the_derivative_of_a_measured_quaternion(kind: str) -> None:
     am = np.concatenate((rotate(conjugate(near), UP), rotate(conjugate(near), FIELD)))
     J = make(am)[1]
     # lengths are not part of these measurements
-    across = np.eye(6)
+    lateral = np.eye(6)
     if kind != "gd_disturbed":
-        across[:3, :3] -= np.outer(am[:3], am[:3])
-        across[3:, 3:] -= np.outer(am[3:], am[3:])
+        lateral[:3, :3] -= np.outer(am[:3], am[:3])
+        lateral[3:, 3:] -= np.outer(am[3:], am[3:])
     result = differences(lambda v: make(v)[0], am)
-    assert np.abs((result - J) @ across).max() < 1e-8
+    assert np.abs((result - J) @ lateral).max() < 1e-8
 
 
 @pytest.mark.parametrize("kind", ["wahba", "gd_recursive"])

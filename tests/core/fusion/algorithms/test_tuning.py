@@ -93,8 +93,10 @@ def test_without_a_magnetometer_its_gains_and_thresholds_are_left_out() -> None:
     assert len(space) == 1
     robust = GainSpace(Nazarahari2021Gains(), magnetometer=False)
     assert len(robust) == len({"p0", "sigma_g", "sigma_a", "c_a", "s_a"})
-    both = TwoLevelGain(0.1, 0.02, acc=0.1, mag=0.1)
-    assert GainSpace(MahonyGains(both), magnetometer=False).params == MahonyGains(replace(both, mag=inf))
+    pair_of = TwoLevelGain(0.1, 0.02, acc=0.1, mag=0.1)
+    assert GainSpace(MahonyGains(pair_of), magnetometer=False).params == MahonyGains(
+        replace(pair_of, mag=inf)
+    )
     three = ThreeLevelGain(1.0, 2.0, 3.0, acc=(0.1, 0.2), mag=(0.1, 0.2))
     left = GainSpace(MahonyGains(three), magnetometer=False).params
     assert left == MahonyGains(replace(three, mag=(inf, inf)))

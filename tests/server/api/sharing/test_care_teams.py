@@ -91,8 +91,8 @@ async def test_trying_a_patient_of_another_team_is_a_row_and_no_way_into_it(clin
     async with clinic.client("admin") as client:
         rows = (await client.get(f"{API}/audit")).json()
         assert "tried to open the patient, from outside the care team" in (await client.get("/audit")).text
-    here = [r for r in rows if r["resource_id"] in {hidden, "0" * 32}]
-    tried = [(r["user_name"], r["resource_id"]) for r in here if r["action"] == "patient.hidden"]
+    place = [r for r in rows if r["resource_id"] in {hidden, "0" * 32}]
+    tried = [(r["user_name"], r["resource_id"]) for r in place if r["action"] == "patient.hidden"]
     assert tried == [("viewer", hidden)]
     await switch(clinic, on=False)
     await switch(clinic, on=True, begin_with_past=True)

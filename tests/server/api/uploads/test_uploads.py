@@ -44,20 +44,20 @@ async def test_parts_in_any_order_and_twice_become_the_file_once(clinic: Clinic)
     content = chance.bytes(50_000)
     async with clinic.client("assistant") as client:
         path = await begin(client, session, len(content))
-        there = 0
-        while there < len(content):
-            offset = int(chance.choice([there, there, max(0, there - 900), there + 1]))
+        target = 0
+        while target < len(content):
+            offset = int(chance.choice([target, target, max(0, target - 900), target + 1]))
             part = content[offset : offset + int(chance.integers(1, 9000))]
             answer = await send(client, path, offset, part)
-            if offset == there:
+            if offset == target:
                 assert answer.status_code == 200
-                there += len(part)
+                target += len(part)
             else:
                 assert (answer.status_code, answer.json()["code"]) == (409, "upload_gap")
-                assert str(there) in answer.json()["detail"]
+                assert str(target) in answer.json()["detail"]
             notices = await client.head(path)
-            assert notices.headers["Upload-Offset"] == str(there)
-            if there < len(content):
+            assert notices.headers["Upload-Offset"] == str(target)
+            if target < len(content):
                 early = await finish(client, path, content)
                 assert (early.status_code, early.json()["code"]) == (409, "upload_incomplete")
         assert notices.headers["Upload-Length"] == str(len(content))

@@ -186,7 +186,7 @@ async def test_all_that_the_doctor_reads_stands_on_one_sheet_in_german(
         answer = await client.get(f"/sessions/{session}/report.pdf")
     pages = pypdfium2.PdfDocument(io.BytesIO(answer.content))
     first = plain(pages[0].get_textpage().get_text_range())
-    for there in ("Was auffällt", "Verändert seit", "Ganggeschwindigkeit", "Verlauf gleiche Bedingung",
+    for target in ("Was auffällt", "Verändert seit", "Ganggeschwindigkeit", "Verlauf gleiche Bedingung",
                   "Kein Wert: 11.03.2026", "Knieflexion", "Fußkontakt", "Abstand von der Norm", "Beurteilung",
                   "Unterschrift", "1 / 4"):  # fmt: skip
-        assert there in first, there
+        assert target in first, target

@@ -92,8 +92,8 @@ def test_the_mean_passes_through_its_values(bundle: Bundle, knee: ET.Element) ->
     x, y = follow_path(all_of(knee, "ml")[0].get("d") or "")
     low, high = panel.variable.y_range
     assert x == [10 * i for i in range(101)]
-    for at, angle in zip(y, mean, strict=True):
-        assert high - at / 1000 * (high - low) == pytest.approx(angle, abs=0.06)
+    for position, angle in zip(y, mean, strict=True):
+        assert high - position / 1000 * (high - low) == pytest.approx(angle, abs=0.06)
 
 
 def follow_path(d: str) -> tuple[list[int], list[int]]:

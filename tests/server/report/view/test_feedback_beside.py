@@ -80,9 +80,9 @@ def test_the_profile_is_judged_by_the_curves_of_the_strides_that_count() -> None
 
 
 def test_effects_in_words_say_the_change_and_the_limit_it_is_held_against() -> None:
-    within = SideEffect(0.02, 0.10, "set in the prescription", False, None)
+    inside = SideEffect(0.02, 0.10, "set in the prescription", False, None)
     beyond = SideEffect(2.04, 1.6, "MCID", True, None)
-    second, profile = describe_effects(prescription(), GuardState(within, beyond), METRES)
+    second, profile = describe_effects(prescription(), GuardState(inside, beyond), METRES)
     assert (second.kind, second.label) == ("ok", "Step length, right")
     assert (second.text, second.words) == (
         f"+0.02{NBSP}m", f"within 0.10{NBSP}m (set in the prescription)"

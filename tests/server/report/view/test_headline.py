@@ -78,12 +78,12 @@ def test_the_difference_is_that_of_the_values_as_they_are_printed(
     norms = Norms(None, None)
     parameters = both_sides(name, left, right, sd=0.001)
     (row,) = parameter_rows(parameters, norms)
-    by = re.search(r"by ([\d.]+)", row.difference or "")
+    by_key = re.search(r"by ([\d.]+)", row.difference or "")
     (message,) = said(norms, *parameters)
     spoken = re.search(r"is ([\d.]+)\u202f(%|s|cm)", message)
-    assert by is not None
+    assert by_key is not None
     assert spoken is not None
-    view = float(by[1]) * (100.0 if spoken[2] == "cm" else 1.0)
+    view = float(by_key[1]) * (100.0 if spoken[2] == "cm" else 1.0)
     assert float(spoken[1]) == pytest.approx(view, abs=0.5 if spoken[2] == "cm" else 1e-9)
 
 

@@ -149,7 +149,7 @@ def test_the_trails_are_the_last_seconds_of_the_soles_way(server: viser.ViserSer
     scene = Scene(server)
     i = scene.play(poses, 11.0)
     pieces = np.asarray(scene["/trails"].points)
-    q, p = (np.stack([of[s] for s in poses.q], axis=1) for of in (poses.q, poses.p))
+    q, p = (np.stack([source[s] for s in poses.q], axis=1) for source in (poses.q, poses.p))
     soles = FigureLayout(tuple(poses.q), walk.BODY, "").place(q, p).soles
     for side, drawn in zip(SIDES, np.split(pieces, 2), strict=True):
         observations = drawn[drawn[:, 0, 2] > -1.0]
@@ -245,10 +245,10 @@ def test_the_ghost_of_the_norm_has_the_angles_of_the_norm_beside_the_person(
     for i in range(120, 150, 4):
         now = moment(poses, i)
         scene.figure.show(now)
-        at, (pelvis,) = ghost_of(scene, "pelvis")
+        position, (pelvis,) = ghost_of(scene, "pelvis")
         thighs, shanks = (ghost_of(scene, name)[1] for name in ("thighs", "shanks"))
         soles, feet = (np.concatenate(x) for x in zip(*(ghost_of(scene, n) for n in FEET), strict=True))
-        np.testing.assert_allclose(at[0, :2], now.p[now.segments.index("pelvis"), :2], atol=1e-5)
+        np.testing.assert_allclose(position[0, :2], now.p[now.segments.index("pelvis"), :2], atol=1e-5)
         for k, side in enumerate(SIDES):
             row = round(100 * float(now.phase[side] or 0.0))
             for name, proximal, distal, sign in (
@@ -303,7 +303,7 @@ def test_the_ghost_walks_where_the_person_walks(server: viser.ViserServer, poses
 @pytest.mark.bench
 def test_a_moment_costs_little(server: viser.ViserServer, poses: Poses) -> None:
     layout = FigureLayout(tuple(poses.q), walk.BODY, "erkf")
-    q, p = (np.stack([of[s][:1] for s in poses.q], axis=1) for of in (poses.q, poses.p))
+    q, p = (np.stack([source[s][:1] for s in poses.q], axis=1) for source in (poses.q, poses.p))
     took = []
     for _ in range(200):
         began = time.thread_time()

@@ -128,8 +128,8 @@ def test_following_keeps_the_person_in_the_middle_and_letting_go_keeps_the_room_
         scene.figure.pose(t_s)
         assert np.hypot(*places()[1][:2]) < 1.0
     scene.figure.set_follow(False)
-    still, here = places()
-    assert here[0] > 40
+    still, place = places()
+    assert place[0] > 40
     scene.figure.pose(10.0)
     np.testing.assert_array_equal(places()[0], still)
     assert places()[1][0] < -40
