@@ -16,8 +16,11 @@ Every message states the expected and the actual condition, the location (sensor
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
+
+from sagittal.core.message import describe_message, read_message
 
 Severity = Literal["info", "warning", "error"]
 """error: numbers made from it would be wrong, so the analysis stops; warning: they are less certain."""
@@ -85,7 +88,8 @@ class Notice:
     Parameters
     ----------
     code : stable identifier, snake_case.
-    message : one or two sentences: the observation (measured value, limit) and the remedy.
+    message : one or two sentences: the observation (measured value, limit) and the remedy; a
+        `Message` where it has values.
     sensor : segment or device id concerned, None for the whole recording.
     t_s : start in seconds from recording start, None if not tied to a point in time.
     severity : info, warning or error (see `Severity`).
@@ -98,11 +102,22 @@ class Notice:
     severity: Severity = "warning"
 
     def to_json(self) -> dict[str, object]:
-        """Return a JSON-serialisable dictionary."""
+        """Return a JSON-serialisable dictionary, with `template` and `values` of a `Message`."""
         return {
             "code": self.code,
-            "message": self.message,
+            **describe_message(self.message),
             "sensor": self.sensor,
             "t_s": self.t_s,
             "severity": self.severity,
         }
+
+    @classmethod
+    def from_json(cls, stored: Mapping[str, Any]) -> Notice:
+        """Read what `to_json` wrote, now or before messages had templates."""
+        return cls(
+            stored["code"],
+            read_message(stored),
+            stored["sensor"],
+            stored["t_s"],
+            stored.get("severity", "warning"),
+        )

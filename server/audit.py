@@ -46,14 +46,14 @@ def record(
     resource_id: str | None,
     detail: Mapping[str, Any] | None = None,
     *,
-    at: dt.datetime | None = None,
+    time: dt.datetime | None = None,
 ) -> None:
     """Append one row on a writing connection; actor None = the system, at None = now."""
     token = getattr(actor, "token_id", None)  # who asks by an API token (server/auth/identity.py)
     last = c.execute(select(audit.c.seq, audit.c.hash).order_by(audit.c.seq.desc()).limit(1)).first()
     row = {
         "seq": 1 if last is None else last.seq + 1,
-        "at": at or now(),
+        "at": time or now(),
         "user_id": actor.user_id if actor else None,
         "user_name": actor.name if actor else None,
         "action": action,
@@ -65,10 +65,10 @@ def record(
     c.execute(insert(audit).values(**row, hash=_seal(row)))
 
 
-def list_entries(c: Connection, *, before: int | None = None, limit: int = 100) -> list[Row[Any]]:
+def list_entries(c: Connection, *, before_seq: int | None = None, limit: int = 100) -> list[Row[Any]]:
     """The newest rows, or the newest before a sequence number (for paging)."""
     query = select(audit).order_by(audit.c.seq.desc()).limit(limit)
-    return list(c.execute(query if before is None else query.where(audit.c.seq < before)))
+    return list(c.execute(query if before_seq is None else query.where(audit.c.seq < before_seq)))
 
 
 def find_problems(c: Connection) -> list[str]:
@@ -76,20 +76,20 @@ def find_problems(c: Connection) -> list[str]:
 
     A database replaced as a whole by an older copy is detected by storage/high_water.py instead.
     """
-    found = []
+    problems = []
     expected, previous = 1, GENESIS
     for row in c.execute(select(audit).order_by(audit.c.seq)):
         if row.seq != expected:
-            found.append(f"audit rows {expected} to {row.seq - 1} have been removed")
+            problems.append(f"audit rows {expected} to {row.seq - 1} have been removed")
         elif row.previous != previous:
-            found.append(f"audit row {row.seq} does not follow the row before it")
+            problems.append(f"audit row {row.seq} does not follow the row before it")
         if _seal(row._asdict()) != row.hash:
-            found.append(f"audit row {row.seq} has been changed")
+            problems.append(f"audit row {row.seq} has been changed")
         expected, previous = row.seq + 1, row.hash
     highest = highest_number(c, audit.name)
     if highest >= expected:
-        found.append(f"audit rows {expected} to {highest}, the newest, have been removed")
-    return found
+        problems.append(f"audit rows {expected} to {highest}, the newest, have been removed")
+    return problems
 
 
 def _seal(row: Mapping[str, Any]) -> str:

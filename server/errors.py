@@ -20,8 +20,8 @@ class NotFound(ServiceError):  # noqa: N818 - the name of the HTTP status
 
     status = 404
 
-    def __init__(self, what: str, identity: str) -> None:
-        super().__init__("not_found", f"There is no {what} '{identity}', or it has been deleted.")
+    def __init__(self, kind: str, identity: str) -> None:
+        super().__init__("not_found", f"There is no {kind} '{identity}', or it has been deleted.")
 
 
 class NotAllowed(ServiceError):  # noqa: N818 - the name of the HTTP status
@@ -48,7 +48,7 @@ class NodeAway(ServiceError):  # noqa: N818 - what the person reads
     def __init__(self, name: str | None) -> None:
         super().__init__(
             NODE_AWAY,
-            f"This live take is on the server '{name}', which is away. Try again in a moment.",
+            f"This live recording runs on server '{name}', which is unavailable. Try again in a moment.",
         )
 
 

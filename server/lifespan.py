@@ -68,10 +68,10 @@ def _say_workers(state: State) -> str:
 
 
 def _say_estimators(state: State) -> str:
-    living, wanted = len(state.hub.pool.pids), state.settings.live_workers
-    if living >= wanted:
+    living, configured = len(state.hub.pool.pids), state.settings.live_workers
+    if living >= configured:
         return "ok"
-    return f"{living} of {wanted} estimator processes run; see the server's log."
+    return f"{living} of {configured} estimator processes run; see the server's log."
 
 
 @contextlib.asynccontextmanager

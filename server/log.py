@@ -37,16 +37,16 @@ class JsonLines(logging.Formatter):
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the record as JSON."""
-        at = dt.datetime.fromtimestamp(record.created, dt.UTC)
+        time = dt.datetime.fromtimestamp(record.created, dt.UTC)
         line: dict[str, object] = {
-            "time": at.isoformat(timespec="milliseconds"),
+            "time": time.isoformat(timespec="milliseconds"),
             "level": record.levelname.lower(),
             "logger": record.name,
             "message": record.getMessage(),
         }
-        asked = getattr(record, "request_id", None)
-        if asked is not None:
-            line["request_id"] = asked
+        current_id = getattr(record, "request_id", None)
+        if current_id is not None:
+            line["request_id"] = current_id
         if record.exc_info:
             line["error"] = self.formatException(record.exc_info)
         line |= {name: value for name, value in vars(record).items() if name not in _STANDARD}
@@ -61,8 +61,8 @@ class _Lines(logging.Formatter):
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - the library's name
         line = super().formatMessage(record)
-        asked = getattr(record, "request_id", None)
-        return line if asked is None else f"{line} [{asked}]"
+        current_id = getattr(record, "request_id", None)
+        return line if current_id is None else f"{line} [{current_id}]"
 
 
 def _add_request_id(record: logging.LogRecord) -> bool:

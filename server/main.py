@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if not words:
             raise CycloptsError(msg="A command is missing.")
-        run, given, _ = make_app().parse_args(words, print_error=False, exit_on_error=False)
+        run, bound, _ = make_app().parse_args(words, print_error=False, exit_on_error=False)
     except CycloptsError as error:
         command = f"{words[0]} " if words and words[0] in COMMANDS else ""
         sys.stderr.write(
@@ -65,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         return 2
     if words[0] not in COMMANDS or run.__module__.startswith("cyclopts"):
-        run(*given.args, **given.kwargs)  # help or version
+        run(*bound.args, **bound.kwargs)  # help or version
         return 0
     from sagittal.core.errors import SagittalError
     from sagittal.server.settings import SettingsError, load_settings
@@ -73,8 +73,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     try:
         # before numba, which no command loads before it runs
-        share_compile_cache(load_settings({"data_dir": given.arguments.get("data_dir")}).cache)
-        return int(run(*given.args, **given.kwargs))
+        share_compile_cache(load_settings({"data_dir": bound.arguments.get("data_dir")}).cache)
+        return int(run(*bound.args, **bound.kwargs))
     except SettingsError as error:
         sys.stderr.write(f"{error}\n")
         return 2

@@ -75,8 +75,8 @@ class StateCollector(Collector):
     def collect(self) -> Iterator[Metric]:
         """Current metrics."""
         with self._db.read() as c:
-            counted = c.execute(select(job.c.state, func.count()).group_by(job.c.state)).all()
-            jobs = dict.fromkeys(JOB_STATES, 0) | {row[0]: row[1] for row in counted}
+            counts = c.execute(select(job.c.state, func.count()).group_by(job.c.state)).all()
+            jobs = dict.fromkeys(JOB_STATES, 0) | {row[0]: row[1] for row in counts}
             oldest = c.execute(select(func.min(job.c.created_at)).where(job.c.state == "queued")).scalar()
             is_open = live_take.c.state.in_(OPEN_TAKE_STATES)
             takes = c.execute(select(func.count()).where(is_open)).scalar_one()
@@ -94,8 +94,8 @@ class StateCollector(Collector):
         free = shutil.disk_usage(self._settings.data_dir).free
         yield _gauge("sagittal_disk_free_bytes", "Free space of the data folder", free)
         family = GaugeMetricFamily("sagittal_part_up", "1 = this part works", labels=("part",))
-        for part, said in self._checks().items():
-            family.add_metric((part,), float(said == "ok"))
+        for part, status in self._checks().items():
+            family.add_metric((part,), float(status == "ok"))
         yield family
         if self._nodes.is_one_of_several:
             family = GaugeMetricFamily("sagittal_node_up", "1 = this one is heard of", labels=("node",))

@@ -295,7 +295,7 @@ class Settings:
 
 
 def load_settings(
-    given: Mapping[str, object] | None = None, environment: Mapping[str, str] | None = None
+    options: Mapping[str, object] | None = None, environment: Mapping[str, str] | None = None
 ) -> Settings:
     """Merge command line (None = not given), environment and defaults.
 
@@ -310,7 +310,7 @@ def load_settings(
         text = env.get(_variable(f.name))
         if text is not None:
             values[f.name] = _parse(f.name, str(f.type), text)
-    values |= {name: value for name, value in (given or {}).items() if value is not None}
+    values |= {name: value for name, value in (options or {}).items() if value is not None}
     if "data_dir" in values:
         values["data_dir"] = Path(str(values["data_dir"])).expanduser().absolute()
     return Settings(**values)  # type: ignore[arg-type]
@@ -364,12 +364,12 @@ def _is_unspecified(host: str) -> bool:
 
 def _is_origin(text: str) -> bool:
     try:
-        found = urlsplit(text)
+        url = urlsplit(text)
         return (
-            found.scheme in {"http", "https"}
-            and bool(found.hostname)
-            and (found.port or 0) > 0
-            and (f"{found.scheme}://{found.netloc}" == text and found.username is None)
+            url.scheme in {"http", "https"}
+            and bool(url.hostname)
+            and (url.port or 0) > 0
+            and (f"{url.scheme}://{url.netloc}" == text and url.username is None)
         )
     except ValueError:
         return False

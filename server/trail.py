@@ -80,7 +80,7 @@ class AuditTrail:
 
     def record_opened(
         self,
-        who: SignedIn,
+        user: SignedIn,
         action: str,
         resource: str,
         resource_id: str | None,
@@ -93,11 +93,11 @@ class AuditTrail:
         OperationalError
             the queue for the disk is full, or the database is busy.
         """
-        self._add(_Row(who, action, resource, resource_id, dict(detail or {})))
+        self._add(_Row(user, action, resource, resource_id, dict(detail or {})))
 
     def record_watched(
         self,
-        who: SignedIn,
+        user: SignedIn,
         action: str,
         resource: str,
         resource_id: str | None,
@@ -106,27 +106,27 @@ class AuditTrail:
         """Record access once in QUIET_S for each sign-in, action and resource; raises like
         `record_opened`.
         """
-        self._record_once(who.login_id, _Row(who, action, resource, resource_id, dict(detail or {})))
+        self._record_once(user.login_id, _Row(user, action, resource, resource_id, dict(detail or {})))
 
-    def record_tried(self, who: audit.Actor, action: str, resource: str, resource_id: str) -> None:
+    def record_tried(self, user: audit.Actor, action: str, resource: str, resource_id: str) -> None:
         """Record denied access, once in QUIET_S for each account, action and resource.
 
         Does not raise for database errors: the response must not reveal that the resource exists.
         """
         with contextlib.suppress(SQLAlchemyError):
-            self._record_once(who.user_id, _Row(who, action, resource, resource_id, {}))
+            self._record_once(user.user_id, _Row(user, action, resource, resource_id, {}))
 
-    def _record_once(self, by: str, row: _Row) -> None:
-        key = (by, row.action, row.resource_id)
-        at = self._clock()
+    def _record_once(self, owner: str, row: _Row) -> None:
+        key = (owner, row.action, row.resource_id)
+        time = self._clock()
         with self._guard:
-            if at - self._watched.get(key, -QUIET_S) < QUIET_S:
+            if time - self._watched.get(key, -QUIET_S) < QUIET_S:
                 return
             if len(self._watched) >= _MOST_WATCHED:
-                self._watched = {k: t for k, t in self._watched.items() if at - t < QUIET_S}
+                self._watched = {k: t for k, t in self._watched.items() if time - t < QUIET_S}
         self._add(row)
         with self._guard:
-            self._watched[key] = at
+            self._watched[key] = time
 
     def record_refused(self, action: str, resource: str, resource_id: str | None, address: str) -> None:
         """Record a failed sign-in from an address; does not raise for disk errors.
@@ -134,14 +134,14 @@ class AuditTrail:
         The input is not stored, as users type passwords into the name field. At most MOST_REFUSED rows are
         written per hour; the next row gives the number of suppressed ones in `more`.
         """
-        at = self._clock()
+        time = self._clock()
         with self._guard:
-            while self._refused and self._refused[0] <= at - _HOUR_S:
+            while self._refused and self._refused[0] <= time - _HOUR_S:
                 self._refused.popleft()
             if len(self._refused) >= MOST_REFUSED:
                 self._uncounted += 1
                 return
-            self._refused.append(at)
+            self._refused.append(time)
             more, self._uncounted = self._uncounted, 0
         detail = {"address": address[:64]} | ({"more": more} if more else {})
         with contextlib.suppress(SQLAlchemyError):
@@ -155,12 +155,12 @@ class AuditTrail:
     @contextlib.asynccontextmanager
     async def run(self) -> AsyncIterator[None]:
         """Retry periodically while the context is active, and once more at its end."""
-        again = asyncio.create_task(self._again())
+        retrying = asyncio.create_task(self._again())
         try:
             yield
         finally:
-            again.cancel()
-            await asyncio.gather(again, return_exceptions=True)
+            retrying.cancel()
+            await asyncio.gather(retrying, return_exceptions=True)
             with contextlib.suppress(SQLAlchemyError):
                 await asyncio.to_thread(self.flush)
             if self._waiting:
@@ -208,7 +208,7 @@ class AuditTrail:
                 with self._db.write() as c:
                     for row in rows:
                         audit.record(
-                            c, row.actor, row.action, row.resource, row.resource_id, row.detail, at=row.at
+                            c, row.actor, row.action, row.resource, row.resource_id, row.detail, time=row.at
                         )
                 for _ in rows:
                     self._waiting.popleft()

@@ -79,21 +79,21 @@ class Shown:
         """Translate a value between tags; unknown sentences stay English and are marked as such."""
         if not isinstance(value, str) or isinstance(value, Verbatim) or hasattr(value, "__html__"):
             return value
-        known = self._catalogue.find(value)
-        if known is None and re.search(r"[^\W\d_]{2}\s+[^\W\d_]{2}", value):
+        translation = self._catalogue.find(value)
+        if translation is None and re.search(r"[^\W\d_]{2}\s+[^\W\d_]{2}", value):
             return Markup('<span lang="en">{}</span>').format(value)
-        return value if known is None else known
+        return value if translation is None else translation
 
     def say_message(self, message: str, **values: object) -> Markup:
         """Translate a text of a template, which may contain entities; its values are escaped here."""
-        said = {name: str(escape(self.say_plain(value))) for name, value in values.items()}
-        return Markup(self._catalogue.fill(message, said))  # noqa: S704 - templates are ours, values escaped
+        escaped = {name: str(escape(self.say_plain(value))) for name, value in values.items()}
+        return Markup(self._catalogue.fill(message, escaped))  # noqa: S704 - templates are ours, values escaped
 
     def say_figure(self, drawn: str) -> str:
         """Translate labels and titles of a figure."""
 
-        def speak(found: re.Match[str]) -> str:
-            opening, text = (found[1], found[2]) if found[1] else (found[3], found[4])
+        def speak(match: re.Match[str]) -> str:
+            opening, text = (match[1], match[2]) if match[1] else (match[3], match[4])
             return f"{opening}{escape(self._catalogue.translate(html.unescape(text)))}"
 
         return _FIGURE_TEXT.sub(speak, drawn)

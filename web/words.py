@@ -11,7 +11,7 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
-from sagittal.web.language import MONTHS, fill_placeholders
+from sagittal.web.message_format import MONTHS, fill_placeholders
 
 
 class Verbatim(str):
@@ -54,8 +54,8 @@ def seconds(value: float | None) -> str:
         return "–"
     if value < 120:
         return f"{value:.1f} s" if value < 60 else f"{value:.0f} s"
-    minutes, rest = divmod(round(value), 60)
-    return f"{minutes} min {rest} s"
+    minutes, remainder = divmod(round(value), 60)
+    return f"{minutes} min {remainder} s"
 
 
 def pattern(text: str) -> str:
@@ -72,22 +72,22 @@ _SCRIPTED = re.compile(r'#i-([\w-]+)|\bicon(?:: |\([^()"]*)"([\w-]+)"(?: : "([\w
 def find_scripted_icons() -> frozenset[str]:
     """Icons used by the pages' scripts."""
     scripts = (Path(__file__).parent / "static" / "js").rglob("*.js")
-    found = (names for script in scripts for names in _SCRIPTED.findall(script.read_text("utf-8")))
-    return frozenset(name for names in found for name in names if name)
+    name_sets = (names for script in scripts for names in _SCRIPTED.findall(script.read_text("utf-8")))
+    return frozenset(name for names in name_sets for name in names if name)
 
 
 def used_icons(page: str) -> Markup:
     """Remove unused icons from a page, a twentieth of the size of a session page."""
-    kept = find_scripted_icons().union(_SHOWN.findall(page))
-    symbols, end, rest = str(page).rpartition("</symbol>")
-    fewer = _ICON.sub(lambda icon: icon[0] if icon[1] in kept else "", symbols + end)
-    return Markup(fewer + rest)  # noqa: S704
+    icons = find_scripted_icons().union(_SHOWN.findall(page))
+    symbols, end, tail = str(page).rpartition("</symbol>")
+    fewer = _ICON.sub(lambda icon: icon[0] if icon[1] in icons else "", symbols + end)
+    return Markup(fewer + tail)  # noqa: S704
 
 
 def fill_message(message: str, **values: object) -> Markup:
     """Fill a template message with escaped values; the filter `filled`."""
-    said = {name: str(escape(value)) for name, value in values.items()}
-    return Markup(fill_placeholders(message, said))  # noqa: S704 - templates are ours, values escaped
+    escaped = {name: str(escape(value)) for name, value in values.items()}
+    return Markup(fill_placeholders(message, escaped))  # noqa: S704 - templates are ours, values escaped
 
 
 def as_it_is(value: Any) -> Any:

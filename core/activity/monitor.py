@@ -28,6 +28,7 @@ from sagittal.core.errors import Notice, SignalError
 from sagittal.core.events.bouts import Bout, plain_bouts
 from sagittal.core.events.turns import Turn
 from sagittal.core.frames import Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.signals.rest import Window
 from sagittal.core.signals.sample_blocks import LongStream
@@ -97,8 +98,16 @@ def calibrate_on_walks(
         if count < LEAST_STEPS:
             raise SignalError(
                 "walk_too_short",
-                f"From {start_s:g} to {end_s:g} s only {count} {plural(count, 'step', 'steps')} can be "
-                f"judged for '{kind}'; expected {LEAST_STEPS}. Record 20 steps of each without stopping.",
+                Message(
+                    f"From {{start_s:g}} to {{end_s:g}} s only {{count}} {plural(count, 'step', 'steps')} "
+                    "can be judged for '{kind}'; expected {LEAST_STEPS}. Record 20 steps of each without "
+                    "stopping.",
+                    start_s=start_s,
+                    end_s=end_s,
+                    count=count,
+                    kind=kind,
+                    LEAST_STEPS=LEAST_STEPS,
+                ),
                 sensor=stream.device_id,
                 t_s=start_s,
             )
@@ -118,8 +127,13 @@ def _read_days(
     if stream.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Sensor {stream.device_id} was recorded at {stream.rate_hz:g} Hz; at least "
-            f"{params.min_rate_hz:g} Hz are needed to find steps. Record at 25 Hz or more.",
+            Message(
+                "Sensor {device_id} was recorded at {rate_hz:g} Hz; at least {min_rate_hz:g} Hz are "
+                "needed to find steps. Record at 25 Hz or more.",
+                device_id=stream.device_id,
+                rate_hz=stream.rate_hz,
+                min_rate_hz=params.min_rate_hz,
+            ),
             sensor=stream.device_id,
         )
     thigh = params.transitions.thigh_share * height_m
@@ -362,8 +376,11 @@ def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -
         told.append(
             Notice(
                 "height_assumed",
-                f"Body height is not given; {NOMINAL_HEIGHT_M:.2f} m is taken. It decides how far a chest "
-                "must rise for getting up.",
+                Message(
+                    "Body height is missing; {NOMINAL_HEIGHT_M:.2f} m is assumed. It determines how far the "
+                    "chest must rise to count as standing up.",
+                    NOMINAL_HEIGHT_M=NOMINAL_HEIGHT_M,
+                ),
                 severity="info",
             )
         )
@@ -372,8 +389,8 @@ def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -
         told.append(
             Notice(
                 "no_baseline",
-                "Nobody walked and nobody held still for 5 s: which way is up is not known. Postures are "
-                "left open; record some walking.",
+                "No walking and no still period of 5 s detected, so the vertical is unknown. Postures are "
+                "not classified; include some walking in the recording.",
                 stream.device_id,
             )
         )
@@ -381,8 +398,8 @@ def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -
         told.append(
             Notice(
                 "baseline_assumed",
-                "Without walking the first 5 s of rest are taken as upright. Where the person lay then, all "
-                "postures are wrong.",
+                "No walking detected, so the first 5 s of rest are assumed to be upright. If the person was "
+                "lying then, all postures are wrong.",
                 stream.device_id,
             )
         )
@@ -390,8 +407,8 @@ def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -
         told.append(
             Notice(
                 "forward_unknown",
-                "In some time worn no lean showed where forward is: inclination there has no sign and is "
-                "left out.",
+                "During part of the wear time no trunk lean showed the forward direction; inclination has no "
+                "sign there and is excluded.",
                 stream.device_id,
                 severity="info",
             )

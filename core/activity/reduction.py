@@ -22,6 +22,7 @@ from sagittal.core.errors import SignalError
 from sagittal.core.events.lumbar import StepTimeParams, find_moving, find_step_times, split_about_vertical
 from sagittal.core.events.turns import Turn, find_turns
 from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.signals.recording import SensorSignals, Subject, UniformRecording
 from sagittal.core.signals.rest import find_runs
 from sagittal.core.signals.sample_blocks import LongStream, SampleBlock, find_complete_rows
@@ -143,8 +144,13 @@ def _lay_pieces(stream: LongStream, rate: int) -> Iterator[_Window]:
         if float(block.t_s[-1]) > LONGEST_S:
             raise SignalError(
                 "clock_jump",
-                f"The clock of “{stream.source}” runs over {block.t_s[-1] / 86400:.0f} days; at most "
-                f"{LONGEST_S / 86400:.0f} are read. Export the recording again.",
+                Message(
+                    "The clock of “{source}” runs over {t_s:.0f} days; at most {LONGEST_S:.0f} are "
+                    "read. Export the recording again.",
+                    source=stream.source,
+                    t_s=block.t_s[-1] / 86400,
+                    LONGEST_S=LONGEST_S / 86400,
+                ),
                 sensor=stream.device_id,
             )
         seen, last_s = True, float(block.t_s[-1])
@@ -159,7 +165,7 @@ def _lay_pieces(stream: LongStream, rate: int) -> Iterator[_Window]:
     if not seen:
         raise SignalError(
             "bad_signal",
-            f"“{stream.source}” has no complete sample; export it again.",
+            Message("“{source}” has no complete sample; export it again.", source=stream.source),
             sensor=stream.device_id,
         )
     until = floor(last_s * rate + 0.01) + 1

@@ -17,6 +17,7 @@ from sagittal.core.activity.frames import FRAME_HZ, Singles
 from sagittal.core.activity.params import StairParams
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Bools, Floats
+from sagittal.core.message import Message
 from sagittal.core.signals.rest import find_runs
 
 StepKind = Literal["walking", "stairs_up", "stairs_down"]
@@ -95,9 +96,14 @@ def calibrate_stairs(
     if min(climbs, descends) <= flat or leans <= ahead:
         raise ParameterError(
             "stairs_not_told_apart",
-            f"The trunk rocks by {np.degrees(flat):.1f}° level, {np.degrees(climbs):.1f}° up and "
-            f"{np.degrees(descends):.1f}° down, and leans {np.degrees(leans - ahead):.1f}° further going up. "
-            "Expected more on stairs.",
+            Message(
+                "The trunk rocks by {flat:.1f}° level, {climbs:.1f}° up and {descends:.1f}° down, "
+                "and leans {degrees:.1f}° further going up. Expected more on stairs.",
+                flat=np.degrees(flat),
+                climbs=np.degrees(climbs),
+                descends=np.degrees(descends),
+                degrees=np.degrees(leans - ahead),
+            ),
         )
     return replace(
         params or StairParams(),

@@ -13,6 +13,7 @@ from sagittal.core.angles.kernel import AngleKernel, mean_angles, subtract_zero
 from sagittal.core.angles.result import SIGNS, JointAngles, list_leg_joints
 from sagittal.core.errors import Notice
 from sagittal.core.frames import SIDES, SUFFIX, Bools, Floats, Posture
+from sagittal.core.message import Message
 from sagittal.core.signals.held_samples import cut_blocks, give_pages_back, make_room
 from sagittal.core.signals.rest import Window, index_window
 
@@ -69,10 +70,12 @@ def measure_angles(
         give_pages_back((*held.values(), *(() if poses is None else poses.q.values())))
     notices = _find_missing_joints(orientations, kernel) + _find_gimbal(locked, kernel, orientations.t_s)
     for name in sorted(name for name, x in zip(kernel.names, known, strict=True) if not x):
-        message = (
-            f"{name}: no angle, its sensors have no signal while standing ({zero[0]:.1f} to {zero[1]:.1f} "
-            "s), so "
-            "there is no zero."
+        message = Message(
+            "{name}: no angle, because its sensors have no signal during quiet standing ({zero:.1f} to "
+            "{zero2:.1f} s) and the zero is undefined.",
+            name=name,
+            zero=zero[0],
+            zero2=zero[1],
         )
         notices.append(Notice("no_standing_zero", message, t_s=zero[0]))
     return JointAngles(
@@ -110,8 +113,11 @@ def _find_missing_joints(orientations: Orientations, kernel: AngleKernel) -> lis
             if f"{SIGNS[joint][0][0]}_{SUFFIX[side]}" in kernel.names:
                 continue
             missing = [s for s in (proximal, distal) if s not in orientations.q]
-            message = (
-                f"{side} {joint}: no angles, no sensor on {' and '.join(missing)}; wear or map one there."
+            message = Message(
+                "{side} {joint}: no angles, because there is no sensor on {missing}; attach or assign one.",
+                side=side,
+                joint=joint,
+                missing=" and ".join(missing),
             )
             notices.append(Notice("joint_missing", message, sensor=missing[0]))
     return notices
@@ -127,9 +133,12 @@ def _find_gimbal(locked: Bools, kernel: AngleKernel, t_s: Floats) -> list[Notice
                 continue
             beyond = locked[:, kernel.names.index(frontal)]
             if beyond.any():
-                message = (
-                    f"{side} {joint}: the frontal angle passes 80° in {beyond.mean():.1%} of the take; there "
-                    "flexion and rotation cannot be told apart; check which segment each sensor is on."
+                message = Message(
+                    "{side} {joint}: the frontal angle exceeds 80° in {mean:.1%} of the trial, where "
+                    "flexion and rotation cannot be separated; check which segment each sensor is on.",
+                    side=side,
+                    joint=joint,
+                    mean=beyond.mean(),
                 )
                 notices.append(Notice("gimbal", message, t_s=float(t_s[int(np.argmax(beyond))])))
     return notices

@@ -22,6 +22,7 @@ from sagittal.core.body.poses import Poses
 from sagittal.core.errors import Notice
 from sagittal.core.estimators import BY_METHOD
 from sagittal.core.frames import FOOT, SIDES, SUFFIX, Oriented, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.rotation import wrap_angle
 from sagittal.core.signals.rest import Window, find_runs
 
@@ -91,9 +92,10 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
     notices = angles.notices
     if out:
         places = sorted({_place(name) for name in out})
-        message = (
-            f"Angles of {', '.join(places)} are withheld: the sensors contradict each other there. Check "
-            "sides, segments and mounting, then calibrate again."
+        message = Message(
+            "Angles of {places} are not reported because the sensors contradict each other. Check sides, "
+            "segments and alignment, then calibrate again.",
+            places=", ".join(places),
         )
         notices = (*notices, Notice("angles_withheld", message))
     return replace(
@@ -147,7 +149,12 @@ def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
         if chain
         else ("the path does not fit its rests on the floor", "Fasten the sensor and check for lost samples")
     )
-    message = f"Distances of {whose} are withheld: {why}. {todo}, then record again."
+    message = Message(
+        "Distances of {whose} are not reported: {why}. {todo}, then record again.",
+        whose=whose,
+        why=why,
+        todo=todo,
+    )
     notices = (*posed.poses.notices, Notice("distances_withheld", message))
     return replace(
         posed,

@@ -25,6 +25,7 @@ from sagittal.core.calibration.knee_axis import KneeAxes, measure_knees
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.signals.calibrated import CalibratedRecording
 
 LegJoint = tuple[Segment, Segment]
@@ -261,10 +262,11 @@ def report_ahead(arms: MeasuredArms) -> tuple[Notice, ...]:
     """
     if not _is_turned(arms.ahead, arms.ahead_sd):
         return ()
-    message = (
-        f"The sensors sit as if every forward axis were turned by about {degrees(abs(arms.ahead)):.0f}° to "
-        f"the {'right' if arms.ahead > 0.0 else 'left'}. Frontal and transverse angles are doubtful. Check "
-        "where the sensors sit and that the person walked ahead."
+    message = Message(
+        "The sensor positions suggest that all anterior axes are rotated by about {degrees:.0f}° to the "
+        f"{'right' if arms.ahead > 0.0 else 'left'}. Frontal and transverse angles are "
+        "unreliable. Check sensor placement and that the person walked forward.",
+        degrees=degrees(abs(arms.ahead)),
     )
     return (Notice("forward_against_places", message, severity="warning"),)
 

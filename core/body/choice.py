@@ -22,6 +22,7 @@ from sagittal.core.estimators import (
 )
 from sagittal.core.frames import Segment
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.signals.calibrated import CalibratedRecording
 
 WHOLE: Final = PRESETS["lower_body7"]
@@ -114,8 +115,11 @@ def _without_standing(
     if requested != AUTO:
         raise EstimationError(
             "estimator_impossible",
-            f"The estimator {requested} begins with standing, and nobody stands still in this take. Let it "
-            "be chosen, or record 3 s of standing.",
+            Message(
+                "The estimator {requested} starts from quiet standing, but this trial has none. Use "
+                "automatic choice, or record 3 s of quiet standing.",
+                requested=requested,
+            ),
         )
     return Choice(working, failed, (), (), NO_STANDING, notices)
 
@@ -125,10 +129,13 @@ def _report_failed(
 ) -> tuple[Notice, ...]:
     notices = []
     for s in failed:
-        message = (
-            f"The {s} sensor can be used for {share[s]:.0%} of the take, {need[s]:.0%} is needed, "
-            "so it is left out: angles of its joints are missing or estimated. Charge, fasten or replace it "
-            "and record again."
+        message = Message(
+            "The {value} sensor is usable for {share:.0%} of the trial but {need:.0%} is required, so it "
+            "is excluded: angles of its joints are missing or estimated. Charge, fasten or replace it "
+            "and record again.",
+            value=s,
+            share=share[s],
+            need=need[s],
         )
         notices.append(Notice("sensor_failed", message, sensor=s))
     return tuple(notices)
@@ -136,7 +143,9 @@ def _report_failed(
 
 def _impossible(requested: Requested, working: tuple[Segment, ...]) -> str:
     need = BY_NAME[requested].needs
-    return (
-        f"The estimator {requested} needs sensors on {need}; working: {', '.join(working) or 'none'}. "
-        "Choose another estimator."
+    return Message(
+        "The estimator {requested} requires sensors on {need}; working: {join}. Choose another estimator.",
+        requested=requested,
+        need=need,
+        join=", ".join(working) or "none",
     )

@@ -44,13 +44,15 @@ from sagittal.core.errors import EstimationError, Notice
 from sagittal.core.estimators import BY_NAME, ERKF, L7S_3I, NO_FIGURE, ORIENTATIONS_ONLY, Estimator
 from sagittal.core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
 from sagittal.core.fusion.orientations import LastReading, Orientations
+from sagittal.core.message import Message
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.held_samples import lay_aside
 from sagittal.core.signals.memory import give_memory_back
 
 ON_A_BELT: Final = (
-    "On a treadmill a foot on the belt does not rest in the room, as the estimator takes it to. Positions "
-    "are those on a belt of constant speed; distances are given only where the belt's speed was entered."
+    "On a treadmill the stance foot moves with the belt, whereas the estimator assumes it is stationary. "
+    "Positions are relative to a belt of constant speed; distances are reported only if the belt speed "
+    "was entered."
 )
 
 
@@ -102,7 +104,11 @@ def estimate_poses(
         except EstimationError as error:
             if estimator == choice.order[-1]:
                 raise
-            message = f"{estimator} cannot estimate this take, the next one is used. {error.message}"
+            message = Message(
+                "{estimator} cannot estimate this take, the next one is used. {message}",
+                estimator=estimator,
+                message=error.message,
+            )
             notices.append(Notice("estimator_failed", message, error.sensor, error.t_s))
             reduced = "estimator_failed"
     if made is None:
@@ -113,7 +119,10 @@ def estimate_poses(
         try:
             made = take.with_feet(made, used)
         except EstimationError as error:
-            message = f"The paths of the feet cannot be estimated, so there are no distances. {error.message}"
+            message = Message(
+                "The paths of the feet cannot be estimated, so there are no distances. {message}",
+                message=error.message,
+            )
             notices.append(Notice("foot_paths_failed", message, error.sensor, error.t_s))
     poses = replace(
         made.poses,

@@ -11,6 +11,7 @@ from sagittal.core.body.kinematics import AnchorParams
 from sagittal.core.body.l7s.filter import L7sParams
 from sagittal.core.errors import ParameterError
 from sagittal.core.estimators import AUTO, Requested
+from sagittal.core.message import Message
 
 
 @dataclass(frozen=True)
@@ -40,5 +41,9 @@ class PoseParams:
         if self.estimator not in known:
             raise ParameterError(
                 "unknown_estimator",
-                f"'{self.estimator}' is no estimator; expected one of {', '.join(known)}.",
+                Message(
+                    "'{estimator}' is no estimator; expected one of {known}.",
+                    estimator=self.estimator,
+                    known=", ".join(known),
+                ),
             )

@@ -18,6 +18,7 @@ from sagittal.core.body.model import LENGTHS, BodyModel
 from sagittal.core.body.places import joint_places, sensor_place, standing_origin
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, from_matrix, rotate, to_matrix
 
 Preset = Literal["lower_body7", "feet_pelvis3", "feet2", "single_foot_r", "single_foot_l"]
@@ -90,7 +91,9 @@ class ImuTree:
         if len(set(self.imus)) != n:
             twice = next(s for s in self.imus if self.imus.count(s) > 1)
             raise EstimationError(
-                "duplicate_segment", f"{twice} carries two sensors; set one of them aside.", sensor=twice
+                "duplicate_segment",
+                Message("{twice} has two sensors; exclude one of them.", twice=twice),
+                sensor=twice,
             )
         for name, a, width in (
             ("q_mount", self.q_mount, 4),
@@ -99,29 +102,45 @@ class ImuTree:
         ):
             if a.shape != (n, width):
                 raise ParameterError(
-                    "bad_shape", f"ImuTree: {name} has shape {a.shape}, expected {(n, width)}."
+                    "bad_shape",
+                    Message(
+                        "ImuTree: {name} has shape {shape}, expected {value}.",
+                        name=name,
+                        shape=a.shape,
+                        value=(n, width),
+                    ),
                 )
         group = list(range(n))
         for joint in self.joints:
             if (joint.e_proximal is None) != (joint.e_distal is None):
                 raise ParameterError(
-                    "bad_joint", f"ImuTree: {joint.name} has one hinge axis of two; give both or none."
+                    "bad_joint",
+                    Message("ImuTree: {name} has one hinge axis of two; give both or none.", name=joint.name),
                 )
             if not (
                 0 <= joint.proximal < n and 0 <= joint.distal < n and all(0 <= foot < n for foot in self.feet)
             ):
-                raise EstimationError("joint_unknown", f"{joint.name} or a foot names a sensor out of 0…{n}.")
+                raise EstimationError(
+                    "joint_unknown",
+                    Message("{name} or a foot names a sensor out of 0…{value}.", name=joint.name, value=n),
+                )
             for r in (joint.r_proximal, joint.r_distal):
                 if not (np.isfinite(r).all() and np.linalg.norm(r) < LONGEST_M):
                     raise EstimationError(
                         "segment_length",
-                        f"{joint.name} lies at {np.round(r, 3).tolist()} m from its sensor, expected within "
-                        f"{LONGEST_M:g} m; check the body model's units.",
+                        Message(
+                            "{name} is {round} m from its sensor, expected within {LONGEST_M:g} m; "
+                            "check the units of the body model.",
+                            name=joint.name,
+                            round=np.round(r, 3).tolist(),
+                            LONGEST_M=LONGEST_M,
+                        ),
                     )
             part, other = group[joint.proximal], group[joint.distal]
             if part == other:
                 raise EstimationError(
-                    "joint_loop", f"{joint.name} closes a loop; a tree has one way to each IMU."
+                    "joint_loop",
+                    Message("{name} closes a loop; a tree has one way to each IMU.", name=joint.name),
                 )
             group = [part if g == other else g for g in group]
 
@@ -179,8 +198,13 @@ def _check_mounts(mounts: Mapping[Segment, Floats], segments: Sequence[Segment])
     if missing:
         raise EstimationError(
             "segments_missing",
-            f"{len(segments) - len(missing)} of {len(segments)} sensors are there, missing: "
-            f"{', '.join(missing)}; choose an estimator for the sensors worn.",
+            Message(
+                "{len} of {segments} sensors are available, missing: {missing}; choose an estimator that "
+                "suits the available sensors.",
+                len=len(segments) - len(missing),
+                segments=len(segments),
+                missing=", ".join(missing),
+            ),
             sensor=missing[0],
         )
 
@@ -266,6 +290,11 @@ def _check_lengths(body: BodyModel) -> None:
         if not (np.isfinite(length) and 0.0 < length < LONGEST_M):
             raise EstimationError(
                 "segment_length",
-                f"The body model's {name} is {length:g} m, expected between 0 and {LONGEST_M:g}; enter the "
-                "body height or measure the segment.",
+                Message(
+                    "The body model's {name} is {length:g} m, expected between 0 and {LONGEST_M:g}; "
+                    "enter the body height or measure the segment.",
+                    name=name,
+                    length=length,
+                    LONGEST_M=LONGEST_M,
+                ),
             )

@@ -49,6 +49,7 @@ from sagittal.core.calibration.ways import (
 )
 from sagittal.core.errors import CalibrationError, Notice
 from sagittal.core.frames import Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import rotate
 from sagittal.core.signals.recording import SensorSignals
 
@@ -111,8 +112,12 @@ def find_anterior_axis(
         if written is None:
             raise CalibrationError(
                 "no_walking",
-                f"{segment}: no straight walking of 1.5 s or more was found and no mounting is declared. "
-                "Record at least 8 steps straight ahead, or declare the mounting: “lateral, face right”.",
+                Message(
+                    "{segment}: no straight walking of at least 1.5 s detected and no placement "
+                    "declared. Record "
+                    "at least 8 steps straight ahead, or declare the placement: “lateral, face right”.",
+                    segment=segment,
+                ),
                 sensor=segment,
             )
         said = ForwardMeasure("declared", written, forward.declared_sd, forward.declared_doubt)
@@ -124,10 +129,15 @@ def find_anterior_axis(
     if written is not None and abs(subtract_angles(found.angle, written)) > CONFLICT:
         raise CalibrationError(
             "calibration_sign_conflict",
-            f"{segment}: the walk and the declared mounting “{declared}” differ by "
-            f"{abs(degrees(subtract_angles(found.angle, written))):.0f}°, "
-            f"allowed are {degrees(CONFLICT):.0f}°. "
-            "Correct the mounting in the manifest, or the segment this sensor is mapped to.",
+            Message(
+                "{segment}: the walk and the declared placement “{declared}” differ by {abs:.0f}° (allowed: "
+                "{CONFLICT:.0f}°). Correct the placement in the manifest, or the segment assigned to this "
+                "sensor.",
+                segment=segment,
+                declared=declared,
+                abs=abs(degrees(subtract_angles(found.angle, written))),
+                CONFLICT=degrees(CONFLICT),
+            ),
             sensor=segment,
         )
     return found
@@ -257,9 +267,14 @@ def weigh_axes(
 def _tell_uncertain(segment: Segment, sd: float, limit: float) -> Notice:
     return Notice(
         "forward_uncertain",
-        f"{segment}: its way forward is known to ± {degrees(sd):.0f}° only; ± {degrees(limit):.0f}° is good. "
-        "Frontal and transverse angles there are doubtful. Start straight ahead from standing and walk "
-        "further.",
+        Message(
+            "{segment}: the forward direction is known only to ± {sd:.0f}° (good: ± {limit:.0f}°). "
+            "Frontal and transverse angles are unreliable there. Start walking straight ahead from "
+            "standing and walk further.",
+            segment=segment,
+            sd=degrees(sd),
+            limit=degrees(limit),
+        ),
         sensor=segment,
     )
 
@@ -291,8 +306,13 @@ def _by_gyro(
         notices += (
             Notice(
                 "not_single_axis",
-                f"{segment}: the first component holds {axis.rho:.0%} of the movement, {GOOD_AXIS:.0%} or "
-                "more is good; the flexion axis may be off by 10° and more.",
+                Message(
+                    "{segment}: the first principal component explains {rho:.0%} of the movement (good: "
+                    "{GOOD_AXIS:.0%} or more); the flexion axis may be off by 10° or more.",
+                    segment=segment,
+                    rho=axis.rho,
+                    GOOD_AXIS=GOOD_AXIS,
+                ),
                 sensor=segment,
             ),
         )
@@ -312,17 +332,26 @@ def _signed(
     if segment in TRUNK:
         raise CalibrationError(
             "pelvis_heading_unknown",
-            f"{segment}: which way it faces is not known, no standing is next to the walk. Stand still for "
-            "3 s directly before walking, or declare the mounting, for example “sacrum, face backwards”.",
+            Message(
+                "{segment}: its facing direction is unknown because there is no quiet standing next to the "
+                "walk. Stand still for 3 s directly before walking, or declare the placement, for example "
+                "“sacrum, face backwards”.",
+                segment=segment,
+            ),
             sensor=segment,
         )
     margin = _margin(segment, axis, R_vertical, q, walk)
     if abs(margin) < WEAK_MARGIN:
         weak = Notice(
             "calibration_sign_weak",
-            f"{segment}: forward and backward swing differ by {degrees(abs(margin)):.1f}° only, at least "
-            f"{degrees(WEAK_MARGIN):.0f}° decide which way is forward. Check the sign of the curves, or "
-            "declare the mounting.",
+            Message(
+                "{segment}: forward and backward swing differ by only {degrees:.1f}°; at least "
+                "{WEAK_MARGIN:.0f}° are needed to determine the forward direction. Check the sign of the "
+                "curves, or declare the placement.",
+                segment=segment,
+                degrees=degrees(abs(margin)),
+                WEAK_MARGIN=degrees(WEAK_MARGIN),
+            ),
             sensor=segment,
         )
         return (axis if margin >= 0 else nearest_sign(axis, axis + np.pi)), (weak,)
@@ -347,8 +376,12 @@ def _sign_notices(
     return (
         Notice(
             "calibration_sign_conflict",
-            f"{segment}: it swings {degrees(-margin):.0f}° further to the side where gait swings less. Check "
-            "that it is mapped to the right segment and that the walk was forwards.",
+            Message(
+                "{segment}: it swings {degrees:.0f}° further in the direction in which it should swing less. "
+                "Check that it is assigned to the right segment and that the person walked forwards.",
+                segment=segment,
+                degrees=degrees(-margin),
+            ),
             sensor=segment,
         ),
     )

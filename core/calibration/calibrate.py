@@ -50,6 +50,7 @@ from sagittal.core.calibration.ways import CalibrationWalk
 from sagittal.core.errors import CalibrationError, Notice, SignalError
 from sagittal.core.frames import R_NEUTRAL, Bools, Floats, Segment
 from sagittal.core.fusion.attitude import AttitudeParams, estimate_orientation
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import find_vertical, from_matrix, rotate
 from sagittal.core.signals.calibrated import CalibratedRecording, Calibration, SegmentCalibration
@@ -64,8 +65,8 @@ FEW_STEPS = 8
 """Steps below which calibration says how few there were (docs/science/calibration.md, "Parameters")."""
 
 NO_STANDING = (
-    "No standing found: the person only paused in mid-stride. Let them stand still for 3 to 5 s with both "
-    "feet side by side, before or after walking."
+    "No quiet standing detected: the person only paused mid-stride. Ask them to stand still for 3 to 5 s "
+    "with both feet side by side, before or after walking."
 )
 
 
@@ -121,7 +122,7 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
     """
     params = params or CalibrationParams()
     if not recording.sensors:
-        raise CalibrationError("no_segment", "No sensor is mapped to a segment; map at least one foot.")
+        raise CalibrationError("no_segment", "No sensor is assigned to a segment; assign at least one foot.")
     try:
         rests = find_rests(recording, params.rest)
     except SignalError as why:
@@ -195,9 +196,11 @@ def _calibrate_at(
         notices += f.notices
     steps = _straight_steps(found, standing, q, walk)
     if steps is not None and steps < FEW_STEPS:
-        message = (
-            f"Calibration saw about {steps} straight {plural(steps, 'step', 'steps')}, {FEW_STEPS} or more "
-            "are good; walk further straight."
+        message = Message(
+            f"Calibration used about {{steps}} straight {plural(steps, 'step', 'steps')}; {{FEW_STEPS}} "
+            "or more are recommended. Walk further straight ahead.",
+            steps=steps,
+            FEW_STEPS=FEW_STEPS,
         )
         notices.append(Notice("few_steps", message))
     if facing:
@@ -285,9 +288,11 @@ def _tell_facing(turn: float, leads: bool) -> Notice:
         if leads
         else ("walking and standing", "Stand still where the walk ends before turning where possible.")
     )
-    message = (
-        f"The person turned by {abs(degrees(turn)):.0f}° between {between}; forward is where they stood "
-        f"facing. {todo}"
+    message = Message(
+        "The person turned by {abs:.0f}° between {between}; forward is where they stood facing. {todo}",
+        abs=abs(degrees(turn)),
+        between=between,
+        todo=todo,
     )
     return Notice("facing_not_walking", message, severity="info")
 

@@ -38,6 +38,7 @@ from sagittal.core.calibration.walking import (
 )
 from sagittal.core.errors import CalibrationError, Notice
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import find_vertical, rotate
 from sagittal.core.signals.filtering import low_pass
 from sagittal.core.signals.recording import UniformRecording
@@ -217,8 +218,11 @@ def _sign(
             return (axis if vaulting > 0 else nearest_sign(axis, axis + np.pi)), "pendulum", ()
         raise CalibrationError(
             "pelvis_heading_unknown",
-            f"{segment}: which way it faces is not known without standing. Stand still for 3 s before "
-            "walking, or declare the mounting, for example “sacrum, face backwards”.",
+            Message(
+                "{segment}: its facing direction is unknown without quiet standing. Stand still for 3 s "
+                "before walking, or declare the placement, for example “sacrum, face backwards”.",
+                segment=segment,
+            ),
             sensor=segment,
         )
     for other, theirs in pushed.items():
@@ -238,8 +242,11 @@ def _sign(
     else:
         raise CalibrationError(
             "forward_unknown",
-            f"{segment}: which way is forward cannot be told from it alone. Wear a sensor on the shank or "
-            "foot of that leg, or declare the mounting.",
+            Message(
+                "{segment}: the forward direction cannot be determined from this sensor alone. Attach a "
+                "sensor to the shank or foot of that leg, or declare the placement.",
+                segment=segment,
+            ),
             sensor=segment,
         )
     weak = () if clear else (_weak(segment),)
@@ -258,8 +265,11 @@ def _push(a: Complexes, axis: float, parts: list[Part], bearing: list[float], ra
 def _weak(segment: Segment) -> Notice:
     return Notice(
         "calibration_sign_weak",
-        f"{segment}: forward and backward are hard to tell apart in this walk. Declare the mounting, or "
-        "check the sign of its angles.",
+        Message(
+            "{segment}: forward and backward are hard to distinguish in this walk. Declare the "
+            "placement, or check the sign of its angles.",
+            segment=segment,
+        ),
         sensor=segment,
     )
 

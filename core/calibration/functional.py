@@ -29,6 +29,7 @@ from sagittal.core.calibration.standing import SensorAtRest, vertical_frame
 from sagittal.core.calibration.walking import TRUNK
 from sagittal.core.errors import CalibrationError, Notice
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import find_lengths, find_vertical
 from sagittal.core.signals.recording import UniformRecording
@@ -187,21 +188,40 @@ def _tell(
     told = []
     if done < asked:
         message = (
-            f"{segment}: calibration saw {done} {plural(done, 'swing', 'swings')}, {asked} or more are good."
+            Message(
+                f"{{segment}}: calibration used {{done}} {plural(done, 'swing', 'swings')}; {{asked}} or "
+                "more are recommended.",
+                segment=segment,
+                done=done,
+                asked=asked,
+            )
             if how == "hip_swing"
-            else f"{segment}: calibration saw {done} {plural(done, 'bow', 'bows')}, {asked} or more are good."
+            else Message(
+                f"{{segment}}: calibration used {{done}} {plural(done, 'bow', 'bows')}; {{asked}} or more "
+                "are recommended.",
+                segment=segment,
+                done=done,
+                asked=asked,
+            )
         )
         told.append(Notice("few_repetitions", message, sensor=segment))
     if rho < GOOD_AXIS:
-        message = (
-            f"{segment}: in the {what} the first component holds {rho:.0%} of the movement, {GOOD_AXIS:.0%} "
-            "or more is good. Move in one plane."
+        message = Message(
+            "{segment}: in the {what} the first principal component explains {rho:.0%} of the movement "
+            "(good: {GOOD_AXIS:.0%} or more). Move in one plane.",
+            segment=segment,
+            what=what,
+            rho=rho,
+            GOOD_AXIS=GOOD_AXIS,
         )
         told.append(Notice("not_single_axis", message, sensor=segment))
     if margin < WEAK_MARGIN:
-        message = (
-            f"{segment}: forward and backward are hard to tell apart in these {what}; {further} further "
-            "forward than back, or declare the mounting."
+        message = Message(
+            "{segment}: forward and backward are hard to distinguish in these {what}; {further} further "
+            "forward than back, or declare the placement.",
+            segment=segment,
+            what=what,
+            further=further,
         )
         told.append(Notice("calibration_sign_weak", message, sensor=segment))
     return told

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sagittal.core.errors import CalibrationError
 from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import find_vertical
 from sagittal.core.signals.held_samples import cut_blocks
 
@@ -74,9 +75,14 @@ def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionA
     if rho < SINGLE_AXIS:
         raise CalibrationError(
             "not_single_axis",
-            f"{segment}: the movement has no single axis, the first component holds {rho:.0%} of it, at "
-            f"least {SINGLE_AXIS:.0%} is needed. Walk straight for at least 8 steps, or calibrate by "
-            "walking direction.",
+            Message(
+                "{segment}: the movement has no dominant axis: the first principal component explains "
+                "{rho:.0%} of it, at least {SINGLE_AXIS:.0%} is required. Walk straight for at least 8 "
+                "steps, or calibrate from the walking direction.",
+                segment=segment,
+                rho=rho,
+                SINGLE_AXIS=SINGLE_AXIS,
+            ),
             sensor=segment,
         )
     return found

@@ -17,6 +17,7 @@ from sagittal.core.calibration.standing import GOOD_S, LONGEST_S, find_rests, st
 from sagittal.core.calibration.standing_leg import find_standing_legs
 from sagittal.core.errors import CalibrationError, SignalError
 from sagittal.core.frames import SHANK, SIDES, THIGH, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.signals.calibrated import CalibratedRecording, Calibration, SegmentCalibration
 from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.signals.rest import RestParams, index_window
@@ -71,12 +72,16 @@ def calibrate_with_mounts(
     if not worn:
         raise CalibrationError(
             "no_segment",
-            f"Mountings are known of {', '.join(mounts)}; the take has {', '.join(recording.sensors)}.",
+            Message(
+                "Placements are known for {mounts}; the trial has {sensors}.",
+                mounts=", ".join(mounts),
+                sensors=", ".join(recording.sensors),
+            ),
         )
     found = find_rests(recording, params)
     rests = tuple((max(r[0], after_s), r[1]) for r in found if r[1] - params.shortest_s >= after_s)
     if not rests:
-        raise SignalError("no_rest", "No standing found with the sensors on.", t_s=after_s)
+        raise SignalError("no_rest", "No quiet standing detected with the sensors attached.", t_s=after_s)
     rest = next((r for r in rests if r[1] - r[0] >= GOOD_S), None) or max(rests, key=lambda r: r[1] - r[0])
     zero = (max(rest[0], rest[1] - LONGEST_S), rest[1])
     standing = stand_all(recording, zero, rests, params)
@@ -112,7 +117,12 @@ def _check_mounts(calibrated: CalibratedRecording) -> None:
         up = R @ signals.acc[standing][signals.valid[standing]].mean(axis=0)
         lean = acos(float(np.clip(up[1] / np.linalg.norm(up), -1.0, 1.0)))
         if lean > OFF:
-            raise _refuse(segment, f"in standing its long axis is {degrees(lean):.0f}° off the vertical")
+            raise _refuse(
+                segment,
+                Message(
+                    "its long axis is {lean:.0f}° off the vertical during quiet standing", lean=degrees(lean)
+                ),
+            )
         if segment not in FORWARD:
             continue
         side = SIDE_OF[segment]
@@ -124,17 +134,27 @@ def _check_mounts(calibrated: CalibratedRecording) -> None:
         axis = np.linalg.eigh(rate.T @ rate)[1][:, -1]
         turned = acos(float(min(1.0, abs(axis[2]))))
         if turned > OFF:
-            raise _refuse(segment, f"it bends about an axis {degrees(turned):.0f}° off the agreed one")
+            raise _refuse(
+                segment,
+                Message("its flexion axis is {turned:.0f}° off the specified one", turned=degrees(turned)),
+            )
         low, high = np.percentile(FORWARD[segment] * np.arctan2(force[:, 0], force[:, 1]), (2.0, 98.0))
         stood = FORWARD[segment] * float(np.arctan2(up[0], up[1]))
         if stood - low > high - stood and stood - low > LEANS:
-            raise _refuse(segment, "in squats it leans the wrong way, so it sits the other way round")
+            raise _refuse(
+                segment, "it tilts in the wrong direction in squats, so it is attached the other way round"
+            )
 
 
 def _refuse(segment: Segment, what: str) -> CalibrationError:
     return CalibrationError(
         "mounting_not_as_agreed",
-        f"{segment}: {what}; limit {degrees(OFF):.0f}°. Put the sensor on as agreed, or calibrate from the "
-        "table.",
+        Message(
+            "{segment}: {what}; limit {OFF:.0f}°. Attach the sensor as specified in the protocol, or "
+            "calibrate from the table.",
+            segment=segment,
+            what=what,
+            OFF=degrees(OFF),
+        ),
         sensor=segment,
     )

@@ -10,6 +10,7 @@ import numpy as np
 
 from sagittal.core.errors import SignalError
 from sagittal.core.frames import SHANK, THIGH, Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.signals.recording import SensorSignals, UniformRecording
 from sagittal.core.signals.rest import (
     QuietParams,
@@ -82,8 +83,13 @@ def measure_standing(
     if not NORM_RANGE[0] <= norm <= NORM_RANGE[1]:
         raise SignalError(
             "unit_suspect",
-            f"{segment}: the accelerometer reads {norm:.2f} m/s² at rest, expected 9.81 ± 10 %. Near 1 the "
-            "unit is g, near 0 gravity was removed: declare the unit, or export raw accelerations.",
+            Message(
+                "{segment}: the accelerometer reads {norm:.2f} m/s² at rest, expected 9.81 ± 10 %. "
+                "Near 1 the unit is g, near 0 gravity was removed: declare the unit, or export raw "
+                "accelerations.",
+                segment=segment,
+                norm=norm,
+            ),
             sensor=segment,
             t_s=window[0],
         )
@@ -120,9 +126,11 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
     if found:
         raise SignalError(
             "not_still",
-            "No standing found: in the quietest seconds a sensor still turns by more than "
-            f"{np.degrees(params.drift):.0f}°. Let the person stand still for 3 to 5 s before or after "
-            "walking.",
+            Message(
+                "No quiet standing detected: even in the quietest seconds a sensor rotates by more than "
+                "{drift:.0f}°. Ask the person to stand still for 3 to 5 s before or after walking.",
+                drift=np.degrees(params.drift),
+            ),
             t_s=found[0][0],
         )
     quietest: list[tuple[float, Segment, float]] = []
@@ -139,13 +147,27 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
         code, what = "no_rest", "every sensor is still at some time, but never all of them together"
     elif rate < WOBBLE_FACTOR * params.gyro_limit:
         code = "not_still"
-        what = f"{segment} moves at {np.degrees(rate):.1f} °/s in its quietest second, limit {limit:.0f} °/s"
+        what = Message(
+            "{segment} moves at {rate:.1f} °/s in its quietest second, limit {limit:.0f} °/s",
+            segment=segment,
+            rate=np.degrees(rate),
+            limit=limit,
+        )
     else:
         code = "no_rest"
-        what = f"the quietest second of {segment} has {np.degrees(rate):.0f} °/s, limit {limit:.0f} °/s"
+        what = Message(
+            "the quietest second of {segment} has {rate:.0f} °/s, limit {limit:.0f} °/s",
+            segment=segment,
+            rate=np.degrees(rate),
+            limit=limit,
+        )
     raise SignalError(
         code,
-        f"No standing found: {what}. Let the person stand still for 3 to 5 s before or after walking.",
+        Message(
+            "No quiet standing detected: {what}. Ask the person to stand still for 3 to 5 s before or "
+            "after walking.",
+            what=what,
+        ),
         sensor=segment if np.isfinite(rate) else None,
         t_s=at_s,
     )

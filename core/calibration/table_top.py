@@ -15,6 +15,7 @@ import numpy as np
 
 from sagittal.core.errors import CalibrationError, Notice
 from sagittal.core.frames import R_NEUTRAL, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, exp, from_matrix, mean, multiply, rotate, to_matrix
 from sagittal.core.rotation.compiled import turn
 from sagittal.core.signals.recording import SensorSignals, UniformRecording
@@ -86,7 +87,7 @@ def calibrate_table_top(recording: UniformRecording, params: TableTopParams | No
     """
     params = params or TableTopParams()
     if not recording.sensors:
-        raise CalibrationError("no_segment", "No sensor is mapped to a segment; map those on the table.")
+        raise CalibrationError("no_segment", "No sensor is assigned to a segment; assign those on the table.")
     mounts: dict[Segment, Floats] = {}
     biases: dict[Segment, Floats] = {}
     drifts: dict[Segment, float] = {}
@@ -101,9 +102,11 @@ def calibrate_table_top(recording: UniformRecording, params: TableTopParams | No
         q, drifts[segment] = _carry(signals, biases[segment], start, part, body, recording.rate_hz, params)
         mounts[segment], moved[segment] = to_matrix(multiply(to_segment, q)), body[0] - table[1]
         if drifts[segment] > params.drift:
-            message = (
-                f"{segment}: its tilt drifted by {degrees(drifts[segment]):.1f}° on the way from the table; "
-                "its heading may be off as much. Put it on again, faster."
+            message = Message(
+                "{segment}: its inclination drifted by {degrees:.1f}° between the table and the body; its "
+                "heading may be off by as much. Repeat the transfer more quickly.",
+                segment=segment,
+                degrees=degrees(drifts[segment]),
             )
             notices.append(Notice("table_top_drift", message, sensor=segment))
     return TableTopMounts(mounts, biases, drifts, moved, tuple(notices))
@@ -123,7 +126,7 @@ def find_worn_standing(recording: UniformRecording, params: TableTopParams | Non
     if not rests or rests[0][0] > params.edge_s:
         raise CalibrationError(
             "table_not_still",
-            "The sensors do not lie still together when the take begins; start it before touching them.",
+            "The sensors are not all still when the trial starts; start the recording before touching them.",
             t_s=0.0,
         )
     for rest in rests[1:]:
@@ -133,8 +136,11 @@ def find_worn_standing(recording: UniformRecording, params: TableTopParams | Non
             return rest
     raise CalibrationError(
         "body_not_still",
-        f"No standing of {params.stand_s:g} s was found with all sensors on the body; stand still before "
-        "squatting.",
+        Message(
+            "No quiet standing of {stand_s:g} s detected with all sensors attached; stand still before "
+            "squatting.",
+            stand_s=params.stand_s,
+        ),
         t_s=rests[0][1],
     )
 
@@ -171,16 +177,24 @@ def _find_ends(
     if not rests or rests[0][0] > params.edge_s:
         raise CalibrationError(
             "table_not_still",
-            f"{segment} does not lie still when the take begins; leave it on the table for "
-            f"{params.rest.shortest_s:g} s or more after the start.",
+            Message(
+                "{segment} is not still when the trial starts; leave it on the table for at least "
+                "{shortest_s:g} s after the start.",
+                segment=segment,
+                shortest_s=params.rest.shortest_s,
+            ),
             sensor=segment,
             t_s=0.0,
         )
     if len(rests) < 2 or rests[-1][1] < end_s - params.edge_s:
         raise CalibrationError(
             "body_not_still",
-            f"{segment} is not still on the body when the take ends; stand still for "
-            f"{params.rest.shortest_s:g} s or more before stopping.",
+            Message(
+                "{segment} is not still on the body when the trial ends; stand still for at least "
+                "{shortest_s:g} s before stopping.",
+                segment=segment,
+                shortest_s=params.rest.shortest_s,
+            ),
             sensor=segment,
             t_s=end_s,
         )
@@ -188,8 +202,13 @@ def _find_ends(
     if body[0] - table[1] > params.longest_s:
         raise CalibrationError(
             "table_top_too_long",
-            f"{segment} was on its way for {body[0] - table[1]:.0f} s; the gyroscope can be trusted for "
-            f"{params.longest_s:g} s.",
+            Message(
+                "Transferring {segment} from the table took {table:.0f} s; the gyroscope is accurate enough "
+                "for {longest_s:g} s.",
+                segment=segment,
+                table=body[0] - table[1],
+                longest_s=params.longest_s,
+            ),
             sensor=segment,
             t_s=table[1],
         )
@@ -197,8 +216,14 @@ def _find_ends(
     if rate > params.still:
         raise CalibrationError(
             "table_not_still",
-            f"{segment} is not still on the table: its rate varies by {degrees(rate):.1f} °/s, limit "
-            f"{degrees(params.still):.0f} °/s. Leave it alone for {params.still_s:g} s after the start.",
+            Message(
+                "{segment} is not still on the table: its angular rate varies by {rate:.1f} °/s (limit "
+                "{still:.0f} °/s). Do not touch it for {still_s:g} s after the start.",
+                segment=segment,
+                rate=degrees(rate),
+                still=degrees(params.still),
+                still_s=params.still_s,
+            ),
             sensor=segment,
             t_s=table[0],
         )
@@ -206,7 +231,10 @@ def _find_ends(
     if silent:
         raise CalibrationError(
             "table_top_gap",
-            f"{segment} sent nothing for a while on its way; how it turned meanwhile is not known.",
+            Message(
+                "{segment} lost data during the transfer from the table, so its rotation is unknown.",
+                segment=segment,
+            ),
             sensor=segment,
             t_s=silent[0][0] / recording.rate_hz,
         )
@@ -237,8 +265,13 @@ def _lie_on_table(segment: Segment, force: Floats, params: TableTopParams) -> Fl
     if slope > params.slope:
         raise CalibrationError(
             "table_orientation",
-            f"{segment} lies {degrees(slope):.0f}° off the agreed way on the table, limit "
-            f"{degrees(params.slope):.0f}°; lay all sensors the same way up.",
+            Message(
+                "{segment} lies {slope:.0f}° off the specified orientation on the table (limit "
+                "{slope2:.0f}°); lay all sensors the same way up.",
+                segment=segment,
+                slope=degrees(slope),
+                slope2=degrees(params.slope),
+            ),
             sensor=segment,
             t_s=0.0,
         )

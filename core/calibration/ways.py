@@ -24,6 +24,7 @@ from sagittal.core.calibration.standing import SensorAtRest
 from sagittal.core.calibration.walking import TRUNK
 from sagittal.core.errors import Notice
 from sagittal.core.frames import FOOT, Bools, Segment
+from sagittal.core.message import Message
 from sagittal.core.signals.recording import SensorSignals
 from sagittal.core.signals.rest import Window
 
@@ -178,8 +179,13 @@ def tell_disagreement(segment: Segment, off: float) -> Notice:
     """Notice that strides and acceleration give different directions, `off` rad apart."""
     return Notice(
         "heading_disagreement",
-        f"{segment}: strides and acceleration show ways {abs(degrees(off)):.0f}° apart, "
-        f"{degrees(DISAGREEMENT):.0f}° are expected at most; the strides were used. Frontal and "
-        "transverse angles of this segment are doubtful; look at the mounting.",
+        Message(
+            "{segment}: the forward directions from strides and from acceleration differ by {abs:.0f}° "
+            "(expected up to {DISAGREEMENT:.0f}°); strides were used. Frontal and transverse angles of "
+            "this segment are unreliable; check its alignment.",
+            segment=segment,
+            abs=abs(degrees(off)),
+            DISAGREEMENT=degrees(DISAGREEMENT),
+        ),
         sensor=segment,
     )

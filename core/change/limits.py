@@ -14,6 +14,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE
 
 Limb = Literal["affected", "unaffected"]
@@ -56,7 +57,7 @@ class Repeatability:
         """Return this repeatability as a limit of change."""
         return ChangeLimit(
             self.mdc95,
-            f"{self.people} people of this clinic",
+            Message("{people} people of this clinic", people=self.people),
             f"own repeated measurements, n = {self.people}",
         )
 
@@ -127,10 +128,14 @@ _SPEED: Final = (
 
 _KESAR: Final = "Kesar et al. 2011 (Gait Posture 33:314), treadmill"
 _MDC: Final = {
-    "step_length": ChangeLimit(0.067, _CHRONIC, f"{_KESAR}, affected side"),
+    "step_length": ChangeLimit(0.067, _CHRONIC, Message("{KESAR}, affected side", KESAR=_KESAR)),
     "hip_extension": ChangeLimit(11.5, _CHRONIC, _KESAR),
-    "angle": ChangeLimit(11.5, _CHRONIC, f"{_KESAR}: the largest of its joint angles, 3.8 to 11.5°"),
-    "share": ChangeLimit(4.2, _CHRONIC, f"{_KESAR}: the largest of its temporal limits, 3.2 to 4.2 %"),
+    "angle": ChangeLimit(
+        11.5, _CHRONIC, Message("{KESAR}: the largest of its joint angles, 3.8 to 11.5°", KESAR=_KESAR)
+    ),
+    "share": ChangeLimit(
+        4.2, _CHRONIC, Message("{KESAR}: the largest of its temporal limits, 3.2 to 4.2 %", KESAR=_KESAR)
+    ),
 }
 """`ParameterEntry.change` → limit. Angles and shares of which only the range of all limits was read take its
 largest."""
@@ -144,7 +149,11 @@ def _pair(affected: float, unaffected: float, source: str) -> tuple[ChangeLimit,
 
 
 def _from_sem(affected: float, unaffected: float, source: str) -> tuple[ChangeLimit, ChangeLimit]:
-    return _pair(_mdc95(affected), _mdc95(unaffected), f"{source}, 1.96 √2 of its error of measurement")
+    return _pair(
+        _mdc95(affected),
+        _mdc95(unaffected),
+        Message("{source}, 1.96 √2 of its error of measurement", source=source),
+    )
 
 
 _BY_LIMB: Final = {

@@ -15,6 +15,7 @@ import numpy as np
 from sagittal.core.errors import Notice
 from sagittal.core.events.result import GaitEvents
 from sagittal.core.frames import SIDES, Floats, Segment, Side
+from sagittal.core.message import Message
 
 FURTHEST_S: Final = 0.45
 """A lift further from a contact belongs to another step."""
@@ -65,9 +66,13 @@ def tell_foot_lag(events: GaitEvents, params: AlternationParams) -> tuple[Notice
         return (
             Notice(
                 "feet_out_of_time",
-                f"The two double supports differ by {2000 * abs(lag):.0f} ms. A limp looks like this, so "
-                f"does a clock {1000 * abs(lag):.0f} ms late. No sensor between the feet tells which: "
-                "the ± of step times allows for it.",
+                Message(
+                    "The two double-support phases differ by {abs:.0f} ms. The cause may be a limp or a "
+                    "clock that is {abs2:.0f} ms late. No sensor between the feet can tell them apart: "
+                    "the ± of step times allows for both.",
+                    abs=2000 * abs(lag),
+                    abs2=1000 * abs(lag),
+                ),
                 late,
                 severity="info",
             ),
@@ -75,10 +80,14 @@ def tell_foot_lag(events: GaitEvents, params: AlternationParams) -> tuple[Notice
     return (
         Notice(
             "feet_out_of_time",
-            f"The two double supports differ by {2000 * abs(lag):.0f} ms: the "
-            f"{'right' if lag > 0 else 'left'} foot seems {1000 * abs(lag):.0f} ms late. "
-            "A wrong clock looks like this, a strong limp rarely. Step times and double support are "
-            "doubtful; synchronise the sensors.",
+            Message(
+                "The two double-support phases differ by {abs:.0f} ms: the "
+                f"{'right' if lag > 0 else 'left'} foot appears to be {{abs2:.0f}} ms late. This "
+                "indicates a clock offset, rarely a severe limp. Step times and double support are "
+                "unreliable; synchronise the sensors.",
+                abs=2000 * abs(lag),
+                abs2=1000 * abs(lag),
+            ),
             late,
         ),
     )

@@ -23,6 +23,7 @@ from sagittal.core.events.foot_pitch import FootPitchParams
 from sagittal.core.events.gyro_peaks import LIMB, GyroPeakPresets, gyro_peak_events
 from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents
 from sagittal.core.frames import FOOT, SIDES, Side
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 
 if TYPE_CHECKING:
@@ -70,7 +71,11 @@ class ConsensusParams:
         if unknown := [name for name in self.presets if name not in known]:
             raise ParameterError(
                 "unknown_detector",
-                f"There is no detector '{unknown[0]}'; expected one of {', '.join(known)}.",
+                Message(
+                    "There is no detector '{unknown}'; expected one of {known}.",
+                    unknown=unknown[0],
+                    known=", ".join(known),
+                ),
             )
 
 
@@ -254,8 +259,12 @@ def _others(side: Side, voters: Mapping[str, _Sorted]) -> Notice:
     counts = ", ".join(f"{name} {len(own[side, 'ic'])}" for name, own in voters.items())
     return Notice(
         "others_found_contacts",
-        f"Other detectors found contacts of the {side} foot ({counts}). The analysis can be run with the"
-        " consensus of all detectors instead; compare its contacts with the signals.",
+        Message(
+            "Other detectors found contacts of the {side} foot ({counts}). The analysis can be run with "
+            "the consensus of all detectors instead; check its contacts against the signals.",
+            side=side,
+            counts=counts,
+        ),
         FOOT[side],
         severity="info",
     )
@@ -264,10 +273,16 @@ def _others(side: Side, voters: Mapping[str, _Sorted]) -> Notice:
 def _led_by_other(side: Side, leads: str, voters: Mapping[str, _Sorted]) -> Notice:
     return Notice(
         "led_by_other",
-        f"No contacts of the {side} foot were found by a foot sensor. These are of {leads}"
-        + (f" and {len(voters) - 1} more" if len(voters) > 1 else " alone")
-        + " (reconstructions of published ones), about 0.06 s from what a foot sensor would tell. Compare"
-        " them with the signals, and stance, swing and support only with takes of the same sensors.",
+        Message(
+            "No contacts of the {side} foot were detected from a foot sensor. They come from {leads} "
+            + ("and {others} more" if len(voters) > 1 else "alone")
+            + " (reconstructions of published detectors), about 0.06 s from those of a foot sensor. "
+            "Check them against the signals, and compare stance, swing and support only with trials "
+            "using the same sensors.",
+            side=side,
+            leads=leads,
+            others=len(voters) - 1,
+        ),
         FOOT[side],
     )
 
@@ -277,10 +292,20 @@ def _disagree(side: Side, dropped: int, n: int) -> Notice:
         "detectors_disagree",
         plural(
             dropped,
-            f"{dropped} possible contact of the {side} foot was seen by too few of {n} detectors and is left"
-            " out.",
-            f"{dropped} possible contacts of the {side} foot were seen by too few of {n} detectors and are"
-            " left out.",
+            Message(
+                "{dropped} possible contact of the {side} foot was detected by too few of {value} detectors "
+                "and is excluded.",
+                dropped=dropped,
+                side=side,
+                value=n,
+            ),
+            Message(
+                "{dropped} possible contacts of the {side} foot were detected by too few of {value} "
+                "detectors and are excluded.",
+                dropped=dropped,
+                side=side,
+                value=n,
+            ),
         ),
         FOOT[side],
         severity="info",

@@ -25,6 +25,7 @@ from sagittal.core.events.foot_movement import FootMovement, FootMovements
 from sagittal.core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
 from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.rotation import angle_between
 from sagittal.core.signals.held_samples import compare_neighbours, cut_blocks
 
@@ -135,8 +136,12 @@ def _each_foot(
     if orientations.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Gait events need at least {params.min_rate_hz:g} Hz, the recording has"
-            f" {orientations.rate_hz:g} Hz. Record at a higher rate.",
+            Message(
+                "Gait events need at least {min_rate_hz:g} Hz, the recording has {rate_hz:g} Hz. "
+                "Record at a higher rate.",
+                min_rate_hz=params.min_rate_hz,
+                rate_hz=orientations.rate_hz,
+            ),
         )
     events: list[GaitEvent] = []
     notices: list[Notice] = []
@@ -144,7 +149,9 @@ def _each_foot(
     for side in SIDES:
         foot = FOOT[side]
         if foot not in orientations.q or not orientations.valid[foot].any():
-            message = f"No sensor on the {side} foot, or no sample of it: its contacts are unknown."
+            message = Message(
+                "No sensor on the {side} foot, or no sample of it: its contacts are unknown.", side=side
+            )
             notices.append(Notice("foot_missing", message, foot))
             continue
         no_rest = [n for n in orientations.notices if n.code == "no_rest" and n.sensor in (None, foot)]
@@ -231,9 +238,15 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list
         remarks.append(
             Notice(
                 "no_toe_off",
-                f"The {side} foot never pitched below {_degrees(params.threshold)} (lowest was"
-                f" {_degrees(figures.s_min)}), so no contacts were found on it. A shuffling gait, no walking,"
-                " or a sensor on another segment looks like this.",
+                Message(
+                    "The pitch of the {side} foot never fell below {threshold} (lowest: {s_min}), so "
+                    "no contacts "
+                    "were detected. Possible causes: shuffling gait, no walking, or a sensor on "
+                    "another segment.",
+                    side=side,
+                    threshold=_degrees(params.threshold),
+                    s_min=_degrees(figures.s_min),
+                ),
                 foot,
             )
         )
@@ -241,9 +254,13 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list
         remarks.append(
             Notice(
                 "rest_pose_suspect",
-                f"The {side} foot never pitched above {_degrees(params.suspect_max)} (highest was"
-                f" {_degrees(figures.s_max)}). Check that the person stood with the whole sole on the floor"
-                " during the rest.",
+                Message(
+                    "The pitch of the {side} foot never exceeded {suspect_max} (highest: {s_max}). "
+                    "Check that the person stood with the whole sole on the floor.",
+                    side=side,
+                    suspect_max=_degrees(params.suspect_max),
+                    s_max=_degrees(figures.s_max),
+                ),
                 foot,
             )
         )
@@ -251,9 +268,13 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list
         remarks.append(
             Notice(
                 "rest_pose_suspect",
-                f"The {side} foot is pitched by {_degrees(figures.s_quiet)} on average while it is quiet"
-                f" (expected within ±{_degrees(params.suspect_quiet)}). Check that the person stood with the"
-                " whole sole on the floor during the rest.",
+                Message(
+                    "The mean pitch of the {side} foot at rest is {s_quiet} (expected within "
+                    "±{suspect_quiet}). Check that the person stood with the whole sole on the floor.",
+                    side=side,
+                    s_quiet=_degrees(figures.s_quiet),
+                    suspect_quiet=_degrees(params.suspect_quiet),
+                ),
                 foot,
             )
         )
@@ -272,9 +293,14 @@ def _threshold_notice(figures: dict[str, PitchFigures], params: FootPitchParams)
     counts = ", ".join(f"{foot} {f.n_ic} initial contacts" for foot, f in figures.items())
     return Notice(
         "event_threshold_changed",
-        f"Contacts were found with a push-off threshold of {params.threshold:g} instead of"
-        f" {FootPitchParams.threshold:g}: {counts}. Compare the feet: a higher threshold can lose most"
-        " contacts of a drop foot.",
+        Message(
+            "Contacts were detected with a push-off threshold of {threshold:g} instead of "
+            "{threshold2:g}: {counts}. Compare both feet: a higher threshold can miss most contacts of a "
+            "drop foot.",
+            threshold=params.threshold,
+            threshold2=FootPitchParams.threshold,
+            counts=counts,
+        ),
     )
 
 

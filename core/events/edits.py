@@ -15,6 +15,7 @@ from typing import Any, Final, Literal, cast, get_args
 from sagittal.core.errors import ParameterError
 from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents, Stride, Strides
 from sagittal.core.frames import SIDES, Side
+from sagittal.core.message import Message
 
 EditKind = Literal["move_event", "add_event", "delete_event", "exclude_stride", "include_stride"]
 KINDS: Final[tuple[EditKind, ...]] = get_args(EditKind)
@@ -135,7 +136,11 @@ def _place(found: Sequence[GaitEvent], edit: Edit) -> int:
             return i
     raise ParameterError(
         "no_such_event",
-        f"There is no {_name(edit)} at {edit.time_s:.3f} s; it may have been changed meanwhile. Load again.",
+        Message(
+            "There is no {edit} at {time_s:.3f} s; it may have been changed meanwhile. Load again.",
+            edit=_name(edit),
+            time_s=edit.time_s,
+        ),
         t_s=edit.time_s,
     )
 
@@ -144,7 +149,11 @@ def _refuse_outside(time_s: float, duration_s: float) -> None:
     if not 0.0 <= time_s <= duration_s:
         raise ParameterError(
             "event_outside",
-            f"{time_s:.3f} s is outside the recording; expected 0 to {duration_s:.3f} s.",
+            Message(
+                "{time_s:.3f} s is outside the recording; expected 0 to {duration_s:.3f} s.",
+                time_s=time_s,
+                duration_s=duration_s,
+            ),
             t_s=time_s,
         )
 
@@ -154,8 +163,14 @@ def _put(found: list[GaitEvent], edit: Edit, time_s: float) -> None:
     if near is not None:
         raise ParameterError(
             "event_order",
-            f"The {_name(edit)} at {time_s:.3f} s would be less than {1000 * APART_S:.0f} ms from another "
-            f"event of that foot at {near.time_s:.3f} s; delete that one first.",
+            Message(
+                "The {edit} at {time_s:.3f} s would be less than {APART_S:.0f} ms from another event "
+                "of that foot at {time_s2:.3f} s; delete that one first.",
+                edit=_name(edit),
+                time_s=time_s,
+                APART_S=1000 * APART_S,
+                time_s2=near.time_s,
+            ),
             t_s=time_s,
         )
     found.append(GaitEvent(time_s, edit.side, cast("EventKind", edit.event), SOURCE, time_s))
@@ -167,8 +182,11 @@ def _refuse_passing(found: Iterable[GaitEvent], edit: Edit, from_s: float, to_s:
     if passed is not None:
         raise ParameterError(
             "event_order",
-            f"The {_name(edit)} cannot pass another event of that foot at {passed.time_s:.3f} s; delete that "
-            "one first.",
+            Message(
+                "The {edit} cannot pass another event of that foot at {time_s:.3f} s; delete that one first.",
+                edit=_name(edit),
+                time_s=passed.time_s,
+            ),
             t_s=to_s,
         )
 
@@ -178,4 +196,4 @@ def _name(edit: Edit) -> str:
 
 
 def _bad(what: str) -> ParameterError:
-    return ParameterError("bad_edit", f"This edit is not as expected: {what}.")
+    return ParameterError("bad_edit", Message("This edit is not as expected: {what}.", what=what))

@@ -22,6 +22,7 @@ import numpy as np
 from sagittal.core.errors import Notice, SignalError
 from sagittal.core.events.result import GaitEvent, GaitEvents
 from sagittal.core.frames import FOOT, SHANK, SIDES, Bools, Floats, Oriented, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import conjugate, log, multiply
 from sagittal.core.signals.filtering import low_pass
@@ -125,15 +126,24 @@ def gyro_peak_events(take: Oriented, rate_hz: float, params: GyroPeakParams | No
     if rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Gait events need at least {params.min_rate_hz:g} Hz, the recording has {rate_hz:g} Hz. Record"
-            " at a higher rate.",
+            Message(
+                "Gait events need at least {min_rate_hz:g} Hz, the recording has {rate_hz:g} Hz. "
+                "Record at a higher rate.",
+                min_rate_hz=params.min_rate_hz,
+                rate_hz=rate_hz,
+            ),
         )
     events: list[GaitEvent] = []
     notices: list[Notice] = []
     for side in SIDES:
         segment = LIMB[params.segment][side]
         if segment not in take.q or not take.valid[segment].any():
-            message = f"No sensor on the {side} {params.segment}: {params.name} finds no contacts of it."
+            message = Message(
+                "No sensor on the {side} {segment}: {name} cannot detect its contacts.",
+                side=side,
+                segment=params.segment,
+                name=params.name,
+            )
             notices.append(Notice("segment_missing", message, segment))
             continue
         rate = sagittal_rate(take.q[segment], rate_hz)
@@ -150,9 +160,15 @@ def gyro_peak_events(take: Oriented, rate_hz: float, params: GyroPeakParams | No
             notices.append(
                 Notice(
                     "no_swing",
-                    f"The {side} {params.segment} never swung faster than"
-                    f" {np.degrees(params.swing_rad_s):.0f}°/s (fastest was {top:.0f}°/s), so {params.name}"
-                    " found no contacts on it.",
+                    Message(
+                        "The {side} {segment} never swung faster than {swing_rad_s:.0f}°/s (fastest was "
+                        "{top:.0f}°/s), so {name} found no contacts on it.",
+                        side=side,
+                        segment=params.segment,
+                        swing_rad_s=np.degrees(params.swing_rad_s),
+                        top=top,
+                        name=params.name,
+                    ),
                     segment,
                 )
             )
@@ -262,10 +278,26 @@ def _say_unclear(side: Side, segment: Segment, found: tuple[int, int], params: G
         "swing_unclear",
         plural(
             found[0],
-            f"{found[0]} swing of the {side} {params.segment} stays just below {limit}°/s and {found[1]}"
-            f" exceed it: {params.name} would miss many contacts, so it reports none.",
-            f"{found[0]} swings of the {side} {params.segment} stay just below {limit}°/s and {found[1]}"
-            f" exceed it: {params.name} would miss many contacts, so it reports none.",
+            Message(
+                "{found} swing of the {side} {segment} stays just below {limit}°/s and {found2} "
+                "exceed it: {name} would miss many contacts, so it reports none.",
+                found=found[0],
+                side=side,
+                segment=params.segment,
+                limit=limit,
+                found2=found[1],
+                name=params.name,
+            ),
+            Message(
+                "{found} swings of the {side} {segment} stay just below {limit}°/s and {found2} "
+                "exceed it: {name} would miss many contacts, so it reports none.",
+                found=found[0],
+                side=side,
+                segment=params.segment,
+                limit=limit,
+                found2=found[1],
+                name=params.name,
+            ),
         ),
         segment,
     )

@@ -17,6 +17,7 @@ from sagittal.core.events.foot_movement import FootMovement
 from sagittal.core.events.foot_pitch import FootPitchParams
 from sagittal.core.events.result import GaitEvent
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 
 REMEMBERED: Final = 4
 """Events of a foot that may be told again: a foot-off, the contact after it, and a swing that is held."""
@@ -53,7 +54,11 @@ class ContactDetector:
         if rate_hz < pitch.min_rate_hz:
             raise SignalError(
                 "sample_rate_too_low",
-                f"Gait events need at least {pitch.min_rate_hz:g} Hz, the sensors send {rate_hz:g} Hz.",
+                Message(
+                    "Gait events need at least {min_rate_hz:g} Hz, the sensors send {rate_hz:g} Hz.",
+                    min_rate_hz=pitch.min_rate_hz,
+                    rate_hz=rate_hz,
+                ),
             )
         self.sides: tuple[Side, ...] = tuple(s for f in feet for s in SIDES if FOOT[s] == f)
         self._feet = [FootContactState.start(rate_hz, pitch, params) for _ in self.sides]

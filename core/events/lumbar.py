@@ -24,6 +24,7 @@ from sagittal.core.events.bouts import Bout, BoutParams, RowParams, plain_bouts,
 from sagittal.core.events.periodicity import Periodicity, PeriodicityParams, step_times
 from sagittal.core.events.steps import Step, Steps
 from sagittal.core.frames import Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import find_lengths
 from sagittal.core.signals.filtering import low_pass, smooth_gaussian
@@ -122,7 +123,7 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
     params = params or LumbarParams()
     segment = trunk_sensor(recording)
     if segment is None:
-        raise SignalError("no_trunk_sensor", "Steps of the trunk need a sensor on the pelvis or the chest.")
+        raise SignalError("no_trunk_sensor", "Trunk steps require a sensor on the pelvis or chest.")
     found = _find_rows(recording, segment, params)
     if isinstance(found, Steps):
         return found
@@ -139,9 +140,12 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
         return _nothing(
             segment,
             "few_steps",
-            f"{len(times)} {plural(len(times), 'step was', 'steps were')} found, nowhere "
-            f"{params.bouts.min_strides + 2} without a break: no walking bout is reported. "
-            "Record a longer walk.",
+            Message(
+                f"{{times}} {plural(len(times), 'step', 'steps')} detected, but never {{min_strides}} "
+                "in a row: no walking bout is reported. Record a longer walk.",
+                times=len(times),
+                min_strides=params.bouts.min_strides + 2,
+            ),
         )
     steps = [
         step
@@ -169,9 +173,9 @@ def _tell_unknown_sides(steps: list[Step], segment: Segment) -> tuple[Notice, ..
     return (
         Notice(
             "side_unknown",
-            "Which foot made a step cannot be told"
-            + (" from the chest." if segment == "chest" else " everywhere from this sensor.")
-            + " Step times and cadence do not depend on it.",
+            "Left and right steps cannot "
+            + ("be distinguished from the chest." if segment == "chest" else "always be distinguished.")
+            + " Step times and cadence do not depend on this.",
             segment,
             severity="info",
         ),
@@ -201,8 +205,12 @@ def _find_rows(
     if rate < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Steps need at least {params.min_rate_hz:g} Hz, the recording has {rate:g} Hz. Record at a"
-            " higher rate.",
+            Message(
+                "Steps need at least {min_rate_hz:g} Hz, the recording has {rate:g} Hz. Record at a "
+                "higher rate.",
+                min_rate_hz=params.min_rate_hz,
+                rate=rate,
+            ),
             sensor=segment,
         )
     signals = recording.sensors[segment]
@@ -210,7 +218,7 @@ def _find_rows(
     vertical, yaw_rate = _split_along(signals, up, norm)
     moving = find_moving(vertical, signals.valid, rate, params)
     if not moving.any():
-        return _nothing(segment, "no_walking", "The trunk hardly moved: no steps were found.")
+        return _nothing(segment, "no_walking", "The trunk hardly moved: no steps detected.")
     if signals.gyr.any():
         rhythm = step_times(vertical, signals.gyr, rate, params.periodicity)
     else:
@@ -220,9 +228,12 @@ def _find_rows(
         return _nothing(
             segment,
             "non_periodic",
-            f"The movement of the trunk has no rhythm of steps (best score {rhythm.score.max():.2f}; needed"
-            f" for several seconds: {params.periodicity.row_score:g}): no steps are reported. Record at least"
-            " ten steps straight ahead.",
+            Message(
+                "Trunk movement has no step rhythm (best score {max:.2f}; {row_score:g} required for several "
+                "seconds): no steps are reported. Record at least ten steps straight ahead.",
+                max=rhythm.score.max(),
+                row_score=params.periodicity.row_score,
+            ),
         )
     return _steps(vertical, moving, rhythm, rate, params), rhythm, yaw_rate
 

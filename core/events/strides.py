@@ -16,6 +16,7 @@ from sagittal.core.errors import Notice
 from sagittal.core.events.flags import StrideParams, decide_exclusions, flag_cycles
 from sagittal.core.events.result import COMPARED, GaitEvents, Stride, StrideFlag, Strides, list_known
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Oriented, Side
+from sagittal.core.message import Message, join_messages
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import wrap_angle, yaw
 
@@ -141,17 +142,22 @@ def _short_walk(strides: Sequence[Stride], near_turns: bool) -> list[Notice]:
     """Notices on too few strides for a comparison, and on counting those next to a turn."""
     left = Counter(s.side for s in strides if s.excluded_reason is None)
     few = [side for side in SIDES if 0 < left[side] < COMPARED]
-    said = []
+    said: list[str] = []
     if few:
         counts = " and ".join(f"{left[side]} {side}" for side in few)
         word = plural(sum(left[s] for s in few), "stride counts", "strides count")
         said.append(
-            f"Only {counts} {word}; fewer than {COMPARED} of a side are compared with nothing. Walk further "
-            "straight ahead."
+            Message(
+                "Only {counts} {word}; at least {COMPARED} per side are needed for a comparison. Walk "
+                "further straight ahead.",
+                counts=counts,
+                word=word,
+                COMPARED=COMPARED,
+            )
         )
     if near_turns:
-        said.append("So few are left that strides next to a turn are counted too.")
-    return [Notice("short_walk", " ".join(said))] if said else []
+        said.append("Because so few remain, strides next to a turn are included.")
+    return [Notice("short_walk", join_messages(*said))] if said else []
 
 
 def _unused(strides: Sequence[Stride]) -> list[Notice]:
@@ -164,10 +170,19 @@ def _unused(strides: Sequence[Stride]) -> list[Notice]:
             words = ", ".join(f"{n} {reason}" for reason, n in reasons.most_common())
             said = plural(
                 len(own),
-                f"The only {side} stride does not count: {words}. How a walk starts, turns and stops is left "
-                "out: walk further straight ahead.",
-                f"None of the {len(own)} {side} strides counts: {words}. How a walk starts, turns and stops "
-                "is left out: walk further straight ahead.",
+                Message(
+                    "The only {side} stride is excluded: {words}. Gait initiation, turns and termination are "
+                    "excluded: walk further straight ahead.",
+                    side=side,
+                    words=words,
+                ),
+                Message(
+                    "All {own} {side} strides are excluded: {words}. Gait initiation, turns and "
+                    "termination are excluded: walk further straight ahead.",
+                    own=len(own),
+                    side=side,
+                    words=words,
+                ),
             )
             notices.append(Notice("no_strides", said, FOOT[side]))
     return notices

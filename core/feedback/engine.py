@@ -19,6 +19,7 @@ from sagittal.core.feedback.schedule import ScheduleSlot, find_slot
 from sagittal.core.feedback.stride import StrideLike
 from sagittal.core.feedback.tally import RunningStatistics
 from sagittal.core.feedback.zones import make_zones
+from sagittal.core.message import Message
 
 OPENING: Final = 10
 """Strides without feedback that give the start level where no earlier session does (our choice)."""
@@ -109,11 +110,24 @@ class FeedbackEngine:
         """
         if name not in COMMANDS:
             raise ParameterError(
-                "unknown_command", f"There is no command '{name}'. Expected one of {', '.join(COMMANDS)}."
+                "unknown_command",
+                Message(
+                    "There is no command '{name}'. Expected one of {COMMANDS}.",
+                    name=name,
+                    COMMANDS=", ".join(COMMANDS),
+                ),
             )
         if isinstance(value, bool) == (name == "level") or not isinstance(value, int):
             expected = "a whole number of levels" if name == "level" else "true or false"
-            raise ParameterError("bad_value", f"The value of {name} is {value!r}. Expected {expected}.")
+            raise ParameterError(
+                "bad_value",
+                Message(
+                    "The value of {name} is {value}. Expected {expected}.",
+                    name=name,
+                    value=repr(value),
+                    expected=expected,
+                ),
+            )
         if name == "level":
             self._ladder.move(value)
         elif name == "pause":

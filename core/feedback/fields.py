@@ -7,6 +7,7 @@ from math import inf, isfinite
 from typing import Any, Final, TypeVar
 
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 
 Name = TypeVar("Name")
 
@@ -24,7 +25,12 @@ class RecordFields:
 
     def __init__(self, path: str, data: object) -> None:
         if not isinstance(data, Mapping):
-            raise ParameterError(CODE, f"{path} is {data!r}. Expected an object with named fields.")
+            raise ParameterError(
+                CODE,
+                Message(
+                    "{path} is {data}. Expected an object with named fields.", path=path, data=repr(data)
+                ),
+            )
         self._path = path
         self._data: Mapping[Any, object] = data
         self._read: set[str] = set()
@@ -98,7 +104,13 @@ class RecordFields:
         unknown = sorted(str(k) for k in self._data.keys() - self._read)
         if unknown:
             raise ParameterError(
-                CODE, f"{self._path} has {', '.join(unknown)}. Expected only {', '.join(sorted(self._read))}."
+                CODE,
+                Message(
+                    "{path} has {unknown}. Expected only {join}.",
+                    path=self._path,
+                    unknown=", ".join(unknown),
+                    join=", ".join(sorted(self._read)),
+                ),
             )
 
     def _number(self, name: str, found: object, least: float, most: float) -> float:
@@ -120,4 +132,13 @@ class RecordFields:
         return self._data.get(name, default)
 
     def _wrong(self, name: str, found: object, expected: str) -> ParameterError:
-        return ParameterError(CODE, f"{self._path}.{name} is {found!r}. Expected {expected}.")
+        return ParameterError(
+            CODE,
+            Message(
+                "{path}.{name} is {found}. Expected {expected}.",
+                path=self._path,
+                name=name,
+                found=repr(found),
+                expected=expected,
+            ),
+        )

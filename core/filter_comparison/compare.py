@@ -39,6 +39,7 @@ from sagittal.core.formats.orientation_table import OrientationTable
 from sagittal.core.frames import SIDES, Bools, Floats, Segment
 from sagittal.core.fusion.algorithms.choice import LABELS
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.pipeline import Progress, TakeAnalysis
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.rest import Window
@@ -135,17 +136,22 @@ def _require_orientations(analysis: TakeAnalysis) -> tuple[CalibratedRecording, 
         if analysis.legs is not None:
             raise EstimationError(
                 "no_orientations",
-                "Squats are followed by the chain of the leg; filters are compared on walks.",
+                "Squats are analysed with a kinematic chain of the leg; filters can be compared on walks "
+                "only.",
             )
         why = "" if analysis.problem is None else f" {analysis.problem.message}"
-        raise EstimationError("nothing_calibrated", f"No sensor of this take is calibrated.{why}")
+        raise EstimationError(
+            "nothing_calibrated", Message("No sensor in this trial is calibrated.{why}", why=why)
+        )
     return calibrated, alone, own
 
 
 def _check_any_ran(runs: Mapping[str, FilterRun]) -> None:
     if not any(run.q for run in runs.values()):
         told = next(run.told[0].message for run in runs.values())
-        raise EstimationError("no_filter_ran", f"No filter gave a result. The first says: {told}")
+        raise EstimationError(
+            "no_filter_ran", Message("No filter gave a result. The first reported: {told}", told=told)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,9 +204,9 @@ def _agree(
     told = run.told
     to_median = pool_scores(list(by_median.values()))
     if name is not None and to_median is not None and to_median.total > FAR:
-        message = (
-            f"{np.degrees(to_median.total):.0f}° from the median: far from the others. "
-            "Leave it out to see the spread of the rest."
+        message = Message(
+            "{total:.0f}° from the median: far from the others. Exclude it to see the spread of the rest.",
+            total=np.degrees(to_median.total),
         )
         told = (*told, Notice(FAR_CODE, message))
     label = OWN_CHAIN if name is None else LABELS[name]
@@ -214,9 +220,19 @@ def _tell(agreements: list[FilterAgreement]) -> tuple[Notice, ...]:
     far = [a.label for a in agreements if any(n.code == FAR_CODE for n in a.told)]
     told = []
     if missing:
-        told.append(Notice("filters_left_out", f"No result, the table says why: {', '.join(missing)}."))
+        told.append(
+            Notice(
+                "filters_left_out",
+                Message("No result (see the table for reasons): {missing}.", missing=", ".join(missing)),
+            )
+        )
     if far:
-        told.append(Notice("filters_far", f"Far from the others, and in the spread: {', '.join(far)}."))
+        told.append(
+            Notice(
+                "filters_far",
+                Message("Far from the others but included in the spread: {far}.", far=", ".join(far)),
+            )
+        )
     return tuple(told)
 
 

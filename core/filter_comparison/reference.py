@@ -21,6 +21,7 @@ from sagittal.core.filter_comparison.result import BlandAltman
 from sagittal.core.formats.aliases import segment_named
 from sagittal.core.formats.orientation_table import OrientationTable
 from sagittal.core.frames import SEGMENTS, Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, log, mean, multiply, normalise, rotate, wrap_angle, yaw
 
 LEAST_OVERLAP_S: Final = 5.0
@@ -103,15 +104,25 @@ def _check_reference(
     if not common:
         raise FormatError(
             "no_common_segment",
-            f"{table.source} has {', '.join(list(table.q)[:8])}, the take {', '.join(median)}. "
-            "Name columns by segments or by sensor ids of this take.",
+            Message(
+                "{source} has {join}, the take {median}. Name columns by segments or by sensor ids "
+                "of this take.",
+                source=table.source,
+                join=", ".join(list(table.q)[:8]),
+                median=", ".join(median),
+            ),
         )
     lasts_s = float(table.t_s[-1] - table.t_s[0])
     if lasts_s > LONGEST_S:
         raise FormatError(
             "too_long",
-            f"{table.source} lasts {lasts_s:.6g} s by its time; expected at most {LONGEST_S:g} s. "
-            "A column in ms or µs says so in its name: time_ms, time_us.",
+            Message(
+                "{source} lasts {lasts_s:.6g} s by its time; expected at most {LONGEST_S:g} s. A "
+                "column in ms or µs says so in its name: time_ms, time_us.",
+                source=table.source,
+                lasts_s=lasts_s,
+                LONGEST_S=LONGEST_S,
+            ),
         )
     if lasts_s < LEAST_OVERLAP_S:
         raise _too_short(table.source)
@@ -122,15 +133,20 @@ def _tell_placing(lag_s: float, correlation: float) -> tuple[Notice, ...]:
     return (
         Notice(
             "reference_lag",
-            f"The reference's clock was moved {'back' if lag_s < 0.0 else 'on'} by {abs(lag_s):.3f} s, "
-            f"where the angular speeds correlate best ({correlation:.3f}).",
+            Message(
+                f"The reference's clock was moved {'back' if lag_s < 0.0 else 'on'} by {{lag_s:.3f}} "
+                "s, where the angular speeds correlate best ({correlation:.3f}).",
+                lag_s=abs(lag_s),
+                correlation=correlation,
+            ),
             severity="info",
         ),
         Notice(
             "reference_turned",
-            "By segment, one constant turn of the world and one of the sensor were fitted to the median of "
-            "the filters. A constant error that all filters share does not show. Filters near the median "
-            "look better: errors that differ by less than about a degree rank no filter.",
+            "For each segment, one constant rotation of the world frame and one of the sensor frame were "
+            "fitted to the median of the filters. A constant error common to all filters is not visible. "
+            "Filters near the median appear better: differences below about one degree do not rank "
+            "filters.",
             severity="info",
         ),
     )
@@ -203,8 +219,14 @@ def find_lag(
     if r[best] < LEAST_CORRELATION:
         raise FormatError(
             "other_movement",
-            f"{source} moves differently from the take: angular speeds correlate by {r[best]:.2f} at best, "
-            f"expected {LEAST_CORRELATION:g}. Is it of this take, and are the segments right?",
+            Message(
+                "{source} moves differently from the take: angular speeds correlate by {best:.2f} "
+                "at best, expected {LEAST_CORRELATION:g}. Is it of this take, and are the segments "
+                "right?",
+                source=source,
+                best=r[best],
+                LEAST_CORRELATION=LEAST_CORRELATION,
+            ),
         )
     a, b, c = r[max(best - 1, 0)], r[best], r[min(best + 1, len(r) - 1)]
     bend = a - 2.0 * b + c
@@ -214,7 +236,12 @@ def find_lag(
 def _too_short(source: str) -> FormatError:
     return FormatError(
         "no_overlap",
-        f"“{source}” and the take have less than {LEAST_OVERLAP_S:g} s in common; give the whole of it.",
+        Message(
+            "“{source}” and the trial overlap by less than {LEAST_OVERLAP_S:g} s; provide the complete "
+            "reference.",
+            source=source,
+            LEAST_OVERLAP_S=LEAST_OVERLAP_S,
+        ),
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from sagittal.core.events.result import COMPARED
 from sagittal.core.flags.rules import CURVES, RULES, SWING_TO_STANCE, Beyond, Kind, Rule
 from sagittal.core.frames import SIDES, Side
+from sagittal.core.message import Message
 from sagittal.core.norms.lookup import Norms, look_up_norms
 from sagittal.core.norms.tables import wbds_group
 from sagittal.core.parameters.anatomical_zero import anatomical_curves
@@ -197,7 +198,9 @@ def _at_speed(rule: Rule, adults: Norms) -> Rule:
     beyond = norm.mean + (2.0 if rule.beyond == "above" else -2.0) * norm.sd
     if rule.adults == "marked":
         return replace(rule, marked=beyond)
-    return replace(rule, limit=beyond, spread=norm.sd, source=f"mean + 2 SD, {norm.source}")
+    return replace(
+        rule, limit=beyond, spread=norm.sd, source=Message("mean + 2 SD, {source}", source=norm.source)
+    )
 
 
 def _with_limit(rule: Rule, controls: Norms | None) -> Rule:

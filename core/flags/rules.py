@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from sagittal.core.message import Message
 from sagittal.core.norms.tables import WBDS, read_rows
 from sagittal.core.norms.values import single_side_sd
 from sagittal.core.parameters.catalogue import LIMIT_FIGURES, CurveFigure, list_curve_figures, require_entries
@@ -62,7 +63,7 @@ Patterson et al. 2008."""
 _STIFF: Final = "cluster analysis of 50 people after stroke, 24 with a stiff knee, at their own speed"
 """Its abstract was read, which names no authors."""
 
-_PRACTICE: Final = "clinical use; no source confirmed"
+_PRACTICE: Final = "clinical use; no confirmed source"
 _CONTROLS: Final = "mean ± 2 SD of own controls"
 _RATIO: Final = "Patterson et al. 2010, 95 % of healthy people; source not confirmed"
 _OVERALL: Final = "Patterson et al. 2008 (Arch Phys Med Rehabil 89:304): 0.9 to 1.1 in 24 healthy people"
@@ -91,7 +92,7 @@ def _below_norm(parameter: str) -> float:
 
 def _apart(joint: str, variable: str, parameter: str) -> Rule:
     limit = 2.0 * _wbds(parameter)[2]
-    source = f"2 SD of left − right, {WBDS}"
+    source = Message("2 SD of left − right, {WBDS}", WBDS=WBDS)
     return Rule(
         f"{joint}_range_asymmetry", f"{variable}_rom_deg", "difference", "above", limit, source,
         adults="limit",
@@ -108,7 +109,7 @@ RULES: Final[tuple[Rule, ...]] = (
         beyond="below",
         # not 0°: 45 % of healthy sides pass it, as the zero of a knee depends on the protocol by 5°
         limit=-5.0,
-        source=f"{_PRACTICE}; second limit: mean − 2 SD of healthy adults",
+        source=Message("{PRACTICE}; second limit: mean − 2 SD of healthy adults", PRACTICE=_PRACTICE),
         marked=_below_norm("knee_min_stance(20-60%)"),
         level=True,
         verified=False,

@@ -109,7 +109,7 @@ def _metadata(r: Recording) -> dict[str, object]:
         "belt_speed_mps": r.belt_speed_mps,
         "mounting": dict(r.mounting),
         "sha256": dict(r.sha256),
-        "notices": [_notice(n) for n in r.notices],
+        "notices": [n.to_json() for n in r.notices],
         "sensors": [
             {
                 "id": s.device_id,
@@ -118,19 +118,11 @@ def _metadata(r: Recording) -> dict[str, object]:
                 "source": s.source,
                 "rate_hz": s.rate_hz,
                 "clock": s.clock,
-                "notices": [_notice(n) for n in s.notices],
+                "notices": [n.to_json() for n in s.notices],
             }
             for s in r.streams.values()
         ],
     }
-
-
-def _notice(n: Notice) -> dict[str, object]:
-    return {"code": n.code, "message": n.message, "sensor": n.sensor, "t_s": n.t_s, "severity": n.severity}
-
-
-def _read_notice(n: Mapping[str, Any]) -> Notice:
-    return Notice(n["code"], n["message"], n["sensor"], n["t_s"], n["severity"])
 
 
 def looks_like(data: bytes) -> bool:
@@ -197,7 +189,7 @@ def open_long(file: SourceFile) -> Recording:
                 has_gyro=has_gyro,
                 duration_s=(last - first) * 1e-6,
                 open_blocks=partial(_read_blocks, file, device, has_gyro, first),
-                notices=tuple(_read_notice(n) for n in _list(sensor["notices"])),
+                notices=tuple(Notice.from_json(n) for n in _list(sensor["notices"])),
             )
         return Recording(
             streams={},
@@ -206,7 +198,7 @@ def open_long(file: SourceFile) -> Recording:
             protocol=cast("Protocol", info["protocol"]),
             mounting=_texts(info["mounting"]),
             sha256=_texts(info["sha256"]),
-            notices=tuple(_read_notice(n) for n in _list(info["notices"])),
+            notices=tuple(Notice.from_json(n) for n in _list(info["notices"])),
             long=long,
         )
     except DAMAGE as e:
@@ -278,7 +270,7 @@ def _recording(file: pq.ParquetFile, info: Mapping[str, object], source: str) ->
         device = str(sensor["id"])
         signals, rows = _read_signals(file, device, there, rooms)
         acc = signals["acc"]
-        known = [_read_notice(n) for n in _list(sensor["notices"])]
+        known = [Notice.from_json(n) for n in _list(sensor["notices"])]
         known += _clear_infinite(device, signals)
         if not has_whole_row(acc):
             message = f"{device} in {source} holds no acceleration; results that need it are left out."
@@ -312,7 +304,7 @@ def _recording(file: pq.ParquetFile, info: Mapping[str, object], source: str) ->
         protocol=cast("Protocol", info["protocol"]),
         mounting=_texts(info["mounting"]),
         sha256=_texts(info["sha256"]),
-        notices=(*(_read_notice(n) for n in _list(info["notices"])), *notices),
+        notices=(*(Notice.from_json(n) for n in _list(info["notices"])), *notices),
         belt_speed_mps=None if (belt := info.get("belt_speed_mps")) is None else float(str(belt)),
     )
 

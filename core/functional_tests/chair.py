@@ -17,6 +17,7 @@ from sagittal.core.functional_tests.rising import (
     find_changes,
 )
 from sagittal.core.functional_tests.trunk import TrunkMotion
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import list_names
 from sagittal.core.parameters.catalogue.entry import CHAIR
 from sagittal.core.plurals import plural
@@ -80,7 +81,11 @@ def measure_chair_rises(
         (
             Notice(
                 "more_rises",
-                f"{more} more {plural(more, 'rise follows', 'rises follow')}; the first five are measured.",
+                Message(
+                    f"{{more}} more {plural(more, 'rise follows', 'rises follow')}; the first five are "
+                    "measured.",
+                    more=more,
+                ),
                 severity="info",
             ),
         )

@@ -14,6 +14,7 @@ import numpy as np
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
 from sagittal.core.fusion.attitude import AttitudeParams, estimate_orientation
+from sagittal.core.message import Message
 from sagittal.core.rotation import exp, find_vertical
 from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.signals.rest import find_rest_windows, index_window
@@ -62,7 +63,7 @@ def find_trunk_sensor(recording: UniformRecording) -> Segment:
             return segment
     raise EstimationError(
         "segments_missing",
-        "This test needs a sensor on the pelvis or the chest, and none of them measures; wear or map one.",
+        "This test requires a sensor on the pelvis or chest, and neither has data; attach or assign one.",
     )
 
 
@@ -79,8 +80,11 @@ def follow_trunk(recording: UniformRecording) -> TrunkMotion:
     if not rests:
         raise EstimationError(
             "no_rest",
-            f"The sensor on the {segment} never rests for a second. Let the person sit or stand still for a"
-            " few seconds before the test begins.",
+            Message(
+                "The sensor on the {segment} is never still for one second. Ask the person to sit or stand "
+                "still for a few seconds before the test starts.",
+                segment=segment,
+            ),
             sensor=segment,
         )
     longest = index_window(max(rests, key=lambda r: r[1] - r[0]), rate)

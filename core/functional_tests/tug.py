@@ -16,6 +16,7 @@ from sagittal.core.functional_tests.rising import (
     find_changes,
 )
 from sagittal.core.functional_tests.trunk import TrunkMotion
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import list_names
 from sagittal.core.parameters.catalogue.entry import TUG
 from sagittal.core.plurals import plural
@@ -79,7 +80,7 @@ def measure_tug(
             "tug_final_turn_velocity_dps": degrees(last.peak_rad_s),
         }
     more = sum(c.kind == SIT_TO_STAND and c.start_s >= end for c in changes)
-    again = plural(more, ONCE_MORE, AGAIN.format(n=more))
+    again = plural(more, ONCE_MORE, Message(AGAIN, n=more))
     told = (Notice("more_tests", again, severity="info"),) if more else ()
     rows = state_figures(values, NAMES, "turn_missing" if len(between) < 2 else "no_rise")
     return FunctionalTest(start, end, segments, rows, trunk.segment, corrected, told)

@@ -15,6 +15,7 @@ import numpy as np
 
 from sagittal.core.events.result import COMPARED
 from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.message import Message
 from sagittal.core.norms.kinematics import NormBand
 from sagittal.core.norms.lookup import Norms
 from sagittal.core.norms.profile import SAGITTAL, CurveReference, MeanCurves, gather_curves, leave_one_out
@@ -119,7 +120,9 @@ def control_group(
         )
         if part
     )
-    source = f"{n} {plural(n, 'control', 'controls')} of this clinic, same sensors and method"
+    source = Message(
+        f"{{value}} {plural(n, 'control', 'controls')} of this clinic, same sensors and method", value=n
+    )
     if n < FEWEST:
         return ControlGroup(n, who, source, reason="few_controls")
     values = [_mean_values(s) for s in people.values()]

@@ -8,6 +8,7 @@ from math import hypot, sqrt
 from typing import Final, Literal, cast
 
 from sagittal.core.frames import GRAVITY
+from sagittal.core.message import Message
 from sagittal.core.norms.speed import WBDS_MPS
 from sagittal.core.norms.tables import LEVEL, WBDS, WBDS_N, read_rows, wbds_group
 from sagittal.core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES, NormKey, find_entry
@@ -15,9 +16,11 @@ from sagittal.core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES, NormKey
 Sex = Literal["female", "male"]
 Pace = Literal["slow", "normal", "fast"]
 
-_NOT_LEVEL = "Not comparable: measured from the person's own standing, the reference is anatomical."
-_BAND = "The range defines the pace class, it is not mean ± SD."
-_COARSE = "Not comparable: the contacts of this take are too uncertain; wear a sensor on each foot."
+_NOT_LEVEL = (
+    "Not comparable: measured relative to the person's own standing, whereas the reference is anatomical."
+)
+_BAND = "The range defines the pace class; it is not mean ± SD."
+_COARSE = "Not comparable: the contacts in this trial are too uncertain; use a sensor on each foot."
 COARSE_S: Final = 0.05
 """Contacts less certain than this (s, in the median) put a share of the stride off by two points and more, a
 reference sd. Our choice."""
@@ -27,7 +30,10 @@ _SHARES: Final = frozenset(
      "initial_double_support_pct", "terminal_double_support_pct")
 )  # fmt: skip
 
-_WIDTH = "Not comparable: a walkway measures between the heels, we between the ankles, which is wider."
+_WIDTH = (
+    "Not comparable: walkways measure between the heels; Sagittal measures between the ankles, which is "
+    "wider."
+)
 """Heels lie 5 to 6 cm behind the ankles: with toes out by 7 to 10° that is 1 to 2 cm, half a reference sd."""
 
 _DIFFERS: Final[Mapping[str | None, str]] = {None: "", "ankles": _WIDTH}
@@ -142,13 +148,17 @@ def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -
         row = table[key.row]
         note = _BAND if row["kind"] != "mean_sd" else _DIFFERS[key.differs]
         first, last = row["age_min"], row["age_max"]
-        ages = f"{first} years" if first == last else f"{first} to {last} years"
+        ages = (
+            Message("{first} years", first=first)
+            if first == last
+            else Message("{first} to {last} years", first=first, last=last)
+        )
         values[name] = NormValue(
             name=name,
             mean=float(row["mean"]),
             sd=float(row["sd"]),
             n=None,
-            group=f"{sex}, {ages}, {pace} pace",
+            group=Message("{sex}, {ages}, {pace} pace", sex=sex, ages=ages, pace=pace),
             source=row["source"],
             comparable=not note,
             note=note,
@@ -224,7 +234,7 @@ def predict_at_speed(
             mean=mean,
             sd=mean * float(row["resid_sd_ln"]),
             n=int(row["n"]) // _SPEEDS,
-            group=f"{group.lower()} adults at this speed on a treadmill",
+            group=Message("{lower} adults at this speed on a treadmill", lower=group.lower()),
             source="BMClab h2a (MIT)",
         )
     return values

@@ -23,6 +23,7 @@ from sagittal.core.frames import Segment
 from sagittal.core.fusion.attitude import compile_attitude_kernel
 from sagittal.core.fusion.mahony import MahonyParams, estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.online.frame import SegmentCheck
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.filtering import low_pass
@@ -125,8 +126,11 @@ def _missing(recording: UniformRecording, worn: Sequence[Segment]) -> list[Notic
     return [
         Notice(
             "sensor_missing",
-            f"The {s} sensor sent nothing while the others stood; the take goes on without it. Connect it "
-            "and calibrate again.",
+            Message(
+                "The {value} sensor sent no data during quiet standing; recording continues without it. "
+                "Connect it and calibrate again.",
+                value=s,
+            ),
             sensor=s,
         )
         for s in worn

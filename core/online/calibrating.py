@@ -28,6 +28,7 @@ from sagittal.core.calibration.live_standing import (
 from sagittal.core.calibration.walking import moving_mask
 from sagittal.core.errors import Notice, SagittalError, SignalError
 from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.online.calibrated import LiveCalibration, MountingParams, finish_calibration
 from sagittal.core.online.frame import CalibrationView, SegmentCheck, Stage
 from sagittal.core.plurals import plural
@@ -201,9 +202,10 @@ class LiveCalibrator:
         self._walked, before = walked, self._walked
         self.view = replace(self.view, stood_s=stood, walked_s=walked, checks=self._checks(seen))
         if walked and seen.stood_s >= p.stand_s and (moved := self._moved(recording)):
-            message = (
-                f"{', '.join(moved)}: the sensor sits otherwise than when all stood before. What was walked "
-                "until now does not count; this standing does."
+            message = Message(
+                "{moved}: the sensor has moved since the last quiet standing. The walk so far is discarded; "
+                "this quiet standing is used.",
+                moved=", ".join(moved),
             )
             self._stand(recording, seen)
             self.view = replace(self.view, problem=Notice("sensor_moved", message, moved[0]))
@@ -217,9 +219,13 @@ class LiveCalibrator:
         look = not ongoing and (walked > before or before_ongoing)
         found = self._calibration(recording) if walked >= p.first_look_s and look else None
         if found is None and self.stage == "walk" and len(self._attempt) >= p.longest_s * rate:
-            message = (
-                f"Only {walked:.0f} s were walked in {p.longest_s:.0f} s, {p.walk_s:.0f} s or {p.steps} "
-                "straight steps are needed. Stand still again, then walk straight ahead."
+            message = Message(
+                "Only {walked:.0f} s of walking in {longest_s:.0f} s; {walk_s:.0f} s or {steps} straight "
+                "steps are needed. Stand still again, then walk straight ahead.",
+                walked=walked,
+                longest_s=p.longest_s,
+                walk_s=p.walk_s,
+                steps=p.steps,
             )
             self._restart(Notice("walk_too_short", message))
         return found
@@ -247,8 +253,8 @@ class LiveCalibrator:
             if found.posture != "standing":
                 raise SignalError(
                     "not_still",
-                    "A sensor moved slowly or one foot was ahead while all stood. Stand still for 3 s with "
-                    "both feet side by side, then walk straight ahead.",
+                    "A sensor moved slowly or one foot was in front during quiet standing. Stand still "
+                    "for 3 s with both feet side by side, then walk straight ahead.",
                 )
             least = p.least_steps if late else p.steps
             if found.straight_steps is None and late:
@@ -285,9 +291,12 @@ def _why(found: Calibration, steps: int, params: CalibratingParams) -> Notice:
     unknown = (n for n in found.notices if n.sensor is not None and n.sensor not in found.segments)
     if (told := next(unknown, None)) is not None:
         return told
-    message = (
-        f"{params.walk_s:.0f} s of movement held about {steps} straight "
-        f"{plural(steps, 'step', 'steps')}, {params.least_steps} are "
-        "needed. Stand still again, then walk straight ahead."
+    message = Message(
+        "{walk_s:.0f} s of movement contained about {steps} straight "
+        f"{plural(steps, 'step', 'steps')}; {{least_steps}} are needed. Stand still again, "
+        "then walk straight ahead.",
+        walk_s=params.walk_s,
+        steps=steps,
+        least_steps=params.least_steps,
     )
     return Notice("few_steps", message)

@@ -35,6 +35,7 @@ from sagittal.core.frames import Bools, Floats, Segment, Side
 from sagittal.core.fusion.attitude import AttitudeParams
 from sagittal.core.fusion.live_attitude import AttitudeTracker
 from sagittal.core.fusion.live_drift import HeadingHold
+from sagittal.core.message import Message
 from sagittal.core.online.calibrated import LiveCalibration
 from sagittal.core.parameters.live.live_history import MOST, SampleHistory
 from sagittal.core.parameters.live.live_stride import LiveStride
@@ -44,11 +45,11 @@ from sagittal.core.signals.rest import index_window
 from sagittal.core.timeline.columns import find_columns, take_columns, take_mask
 
 NOT_LIVE: Final = (
-    "The sensors that are worn ({}) show no figure while they stream: for one, wear both feet, or the pelvis "
-    "and a whole leg. All is recorded and can be analysed afterwards."
+    "The sensors that are worn ({sensors}) show no figure while they stream: for one, wear both feet, or the "
+    "pelvis and a whole leg. All is recorded and can be analysed afterwards."
 )
 BROKEN: Final = (
-    "The live filter lost its footing and shows no figure any more; recording goes on. Stand still and "
+    "The live filter diverged and the avatar is no longer shown; recording continues. Stand still and "
     "calibrate again; check which sensor is on which segment."
 )
 COURSES: Final[tuple[Segment, ...]] = ("pelvis", "foot_l", "foot_r")
@@ -180,7 +181,7 @@ class LiveChain:
         feet = FootPaths(filtered(alone)) if alone else None
         if best in (L7S_3I.name, L7S_2I.name) and feet is not None:
             return LiveL7s(column, mounted, body, rate, feet, self.params.l7s)
-        message = NOT_LIVE.format(", ".join(self.segments))
+        message = Message(NOT_LIVE, sensors=", ".join(self.segments))
         self._notices.append(Notice("no_live_figure", message, severity="info"))
         return UnlinkedSensors(self.segments, feet)
 

@@ -9,6 +9,7 @@ from sagittal.core.activity.monitor import Progress, monitor_activity
 from sagittal.core.activity.result import ActivityResult
 from sagittal.core.errors import SignalError
 from sagittal.core.frames import Segment
+from sagittal.core.message import Message
 from sagittal.core.pipeline.analysis import TakeAnalysis
 from sagittal.core.pipeline.config import PipelineConfig
 from sagittal.core.pipeline.stages import PipelineStage
@@ -40,8 +41,11 @@ def find_trunk_stream(recording: Recording) -> tuple[Segment, LongStream]:
         return "chest", next(iter(there.values()))
     raise SignalError(
         "no_trunk_sensor",
-        "Daily life needs a sensor on the chest or the lower back. Say in the mapping which sensor was worn "
-        f"there (sensors found: {', '.join(there)}).",
+        Message(
+            "Daily-life analysis requires a sensor on the chest or lower back. Assign the sensor that "
+            "was worn there (sensors in the recording: {there}).",
+            there=", ".join(there),
+        ),
     )
 
 
@@ -57,7 +61,7 @@ def judge_activity(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
     found = analysis.activity
     if found is None:
         level: Level = "poor"
-        report = QualityReport(level, ("Nothing could be read from the sensor.",), 0.0, 0.0, {}, (), ())
+        report = QualityReport(level, ("The sensor provided no usable data.",), 0.0, 0.0, {}, (), ())
         return replace(analysis, report=report)
     reasons = list_doubts(found)
     level = "good" if not reasons else "usable" if share_known(found) >= WORN_SHARE else "poor"
@@ -75,16 +79,18 @@ def share_known(found: ActivityResult) -> float:
 
 def list_doubts(found: ActivityResult) -> tuple[str, ...]:
     """Why the level is not good, as sentences."""
-    doubts = []
+    doubts: list[str] = []
     total = max(found.duration_s, 1e-9)
     unknown = 1.0 - share_known(found)
     if unknown > 0.1:
-        doubts.append(f"The posture is not known in {100 * unknown:.0f} % of the time worn.")
+        doubts.append(
+            Message("Posture is unknown for {unknown:.0f} % of the wear time.", unknown=100 * unknown)
+        )
     lost = 60.0 * found.minutes("gap") / total
     if lost > 0.1:
-        doubts.append(f"{100 * lost:.0f} % of the time nothing was recorded.")
+        doubts.append(Message("No data for {lost:.0f} % of the time.", lost=100 * lost))
     if any(n.code in ("no_baseline", "baseline_assumed") for n in found.notices):
-        doubts.append("Without walking it is not certain which way is up.")
+        doubts.append("Without walking, the vertical is uncertain.")
     return tuple(doubts)
 
 

@@ -23,6 +23,7 @@ from sagittal.core.events.turns import Turn
 from sagittal.core.frames import Side
 from sagittal.core.functional_tests.result import FunctionalTest
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.parameters.measure import MeasuredGait, Tracks
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.pipeline.config import PipelineConfig
@@ -46,7 +47,7 @@ def require_stage(result: Result | None, stage: str) -> Result:
     ParameterError : `stage_not_reached`.
     """
     if result is None:
-        raise ParameterError("stage_not_reached", f"The stage '{stage}' gave no result.")
+        raise ParameterError("stage_not_reached", Message("The stage '{stage}' gave no result.", stage=stage))
     return result
 
 

@@ -22,6 +22,7 @@ from sagittal.core.events.lumbar import LumbarParams
 from sagittal.core.events.turns import TurnParams
 from sagittal.core.functional_tests.params import FunctionalTestParams
 from sagittal.core.fusion.mahony import MahonyParams
+from sagittal.core.message import Message
 from sagittal.core.quality import QualityParams
 from sagittal.core.quality.stuck import StuckParams
 from sagittal.core.setup import SetupParams
@@ -107,7 +108,11 @@ class PipelineConfig:
         if self.detector not in get_args(Detector):
             raise ParameterError(
                 "unknown_detector",
-                f"Detector '{self.detector}' is not one of {', '.join(get_args(Detector))}.",
+                Message(
+                    "Detector '{detector}' is not one of {join}.",
+                    detector=self.detector,
+                    join=", ".join(get_args(Detector)),
+                ),
             )
 
     @property
@@ -141,7 +146,13 @@ def override_config(defaults: Settings, overrides: Mapping[str, Any], path: str 
             continue
         if name not in names:
             raise ParameterError(
-                "unknown_parameter", f"There is no {path}.{name}; expected one of {', '.join(sorted(names))}."
+                "unknown_parameter",
+                Message(
+                    "There is no {path}.{name}; expected one of {join}.",
+                    path=path,
+                    name=name,
+                    join=", ".join(sorted(names)),
+                ),
             )
         default = getattr(defaults, name)
         if dataclasses.is_dataclass(default) and isinstance(value, Mapping):
@@ -150,7 +161,14 @@ def override_config(defaults: Settings, overrides: Mapping[str, Any], path: str 
             values[name] = tuple(value) if isinstance(default, tuple) else value
         else:
             raise ParameterError(
-                "bad_parameter", f"{path}.{name} is {value!r}, expected the like of {default!r}."
+                "bad_parameter",
+                Message(
+                    "{path}.{name} is {value}, expected the like of {default}.",
+                    path=path,
+                    name=name,
+                    value=repr(value),
+                    default=repr(default),
+                ),
             )
     return dataclasses.replace(defaults, **values)  # type: ignore[type-var]
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from sagittal.core.errors import Notice, ParameterError, SagittalError
 from sagittal.core.events.lumbar import TRUNK
+from sagittal.core.message import Message
 from sagittal.core.pipeline.activity_stages import ACTIVITY_MONITOR, ACTIVITY_QUALITY
 from sagittal.core.pipeline.analysis import TakeAnalysis
 from sagittal.core.pipeline.config import PipelineConfig
@@ -171,14 +172,21 @@ def resume(
     recipe = choose_recipe(analysis)
     names = [s.name for s in recipe]
     if stage not in names:
-        raise ParameterError("unknown_stage", f"No stage '{stage}'; expected one of {', '.join(names)}.")
+        raise ParameterError(
+            "unknown_stage",
+            Message("No stage '{stage}'; expected one of {names}.", stage=stage, names=", ".join(names)),
+        )
     first = names.index(stage)
     before, again = recipe[:first], recipe[first:]
     missing = [s.name for s in before if any(getattr(analysis, name) is None for name in s.results)]
     if missing and not again[0].runs_after_problem:
         raise ParameterError(
             "stage_not_reached",
-            f"The analysis cannot go on at '{stage}': {missing[0]} gave no result. Resume from there.",
+            Message(
+                "The analysis cannot go on at '{stage}': {missing} gave no result. Resume from there.",
+                stage=stage,
+                missing=missing[0],
+            ),
         )
     changed = [
         name for s in before for name in s.reads if getattr(config, name) != getattr(analysis.config, name)
@@ -186,7 +194,11 @@ def resume(
     if changed:
         raise ParameterError(
             "earlier_parameters",
-            f"{', '.join(changed)} belong to stages before '{stage}'. Resume from an earlier one.",
+            Message(
+                "{changed} belong to stages before '{stage}'. Resume from an earlier one.",
+                changed=", ".join(changed),
+                stage=stage,
+            ),
         )
     forgotten: dict[str, Any] = dict.fromkeys(name for s in again for name in s.results)
     if analysis.stopped_at in names[first:]:

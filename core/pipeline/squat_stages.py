@@ -18,6 +18,7 @@ from sagittal.core.calibration.standing_leg import find_standing_legs
 from sagittal.core.calibration.table_top import calibrate_table_top, crop, find_worn_standing
 from sagittal.core.errors import Notice
 from sagittal.core.frames import SUFFIX
+from sagittal.core.message import Message
 from sagittal.core.pipeline.analysis import TakeAnalysis, require_stage
 from sagittal.core.pipeline.config import PipelineConfig
 from sagittal.core.pipeline.stages import PipelineStage
@@ -27,16 +28,19 @@ from sagittal.core.squat.side import find_squat_sides
 
 AGREED: Final = Notice(
     "mounting_agreed",
-    "The sensors are taken to sit as agreed for squats: on the flat of the shin, the front of the thigh, the "
-    "back. Ten degrees beside it turn the angles by as much.",
+    "The sensors are assumed to be placed as specified for squats: flat of the shin, front of the thigh, "
+    "lower back. A misplacement of ten degrees rotates the angles by as much.",
     severity="info",
 )
 
 
 NO_HEIGHT: Final = Notice(
     "height_assumed",
-    f"Body height is not given; {NOMINAL_HEIGHT_M:.2f} m is taken. The way of the hip down depends on it, "
-    "the angles hardly.",
+    Message(
+        "Body height is missing; {NOMINAL_HEIGHT_M:.2f} m is assumed. Hip displacement depends on it; "
+        "angles hardly do.",
+        NOMINAL_HEIGHT_M=NOMINAL_HEIGHT_M,
+    ),
     severity="info",
 )
 

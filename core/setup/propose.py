@@ -18,6 +18,7 @@ from sagittal.core.agreement import Agreement, AgreementParams
 from sagittal.core.agreement.agree import compare_sensors
 from sagittal.core.agreement.exchange import find_exchange
 from sagittal.core.frames import FOOT, GRAVITY, SHANK, SIDES, THIGH, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.quality.sides import find_left_leg
 from sagittal.core.quality.signals import Facts, measure_signal, measure_stream
 from sagittal.core.quality.suspicion import list_suspicions
@@ -55,12 +56,19 @@ def propose_labels(uniform: UniformRecording, agreed: Agreement) -> SetupRepair 
     if exchange is not None and exchange.mirrored:
         turned = {uniform.sensors[s].device_id: SensorCorrection(acc_axes=AGAINST) for s in exchange.mirrored}
         which = _list(sorted(exchange.mirrored))
-        said = f"The accelerometer of {which} has its signs turned round: the joints beside it fit a mirror."
+        said = Message(
+            "The accelerometer of {which} has inverted axes: adjacent joints match its mirror image.",
+            which=which,
+        )
         return SetupRepair("axes", (said,), exchange.ratio, corrections=turned)
     if exchange is not None and exchange.mixed_up:
         segments = {uniform.sensors[x].device_id: s for s, x in exchange.mixed_up.items()}
-        moved = [f"that of {x} is worn on {s}" for s, x in exchange.mixed_up.items() if s != x]
-        said = f"The joints show that sensors are mixed up: {_list(moved)}."
+        moved: list[str] = [
+            Message("the sensor assigned to {value} is worn on {value2}", value=x, value2=s)
+            for s, x in exchange.mixed_up.items()
+            if s != x
+        ]
+        said = Message("Joint motion shows that sensors are swapped: {moved}.", moved=_list(moved))
         return SetupRepair("labels", (said,), exchange.ratio, segments)
     if exchange is None or exchange.cosine is None:
         return _propose_legs(uniform)
@@ -98,7 +106,11 @@ def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
         corrections |= {x.device_id: one for x in follow.values()}
         said += follow
     return SetupRepair(
-        "units", (f"Units or signs of {_list(said)} are not those of a body.",), np.inf, {}, corrections
+        "units",
+        (Message("The units or signs of {said} are not plausible for body motion.", said=_list(said)),),
+        np.inf,
+        {},
+        corrections,
     )
 
 
@@ -123,7 +135,12 @@ def _propose_axes(
     if not wrong:
         return None
     which = _list(sorted(wrong))
-    said = [f"The gyroscope of {which} does not turn as its accelerometer shows; other axes or units do."]
+    said: list[str] = [
+        Message(
+            "The gyroscope of {which} does not match its accelerometer; other axes or units do.",
+            which=which,
+        )
+    ]
     margin = min(fits[0] / fits[1:].min() for fits in wrong.values())
     judged = len([f for f in found.values() if f is not None])
     gyr = _choose_axes(wrong, judged, params)
@@ -141,7 +158,7 @@ def _propose_axes(
     if turned is None and not any(_leaves_hands_open(x) for x in gyr.values()):
         turned = frozenset()
     if turned is None:
-        said.append("Whether its accelerometer is turned round too cannot be told from these sensors.")
+        said.append("These sensors do not show whether its accelerometer is inverted as well.")
         return SetupRepair("axes", tuple(said), margin)
     corrections = {
         uniform.sensors[s].device_id: _correct_gyr(x, AGAINST if s in turned else AS_READ)
@@ -236,7 +253,9 @@ def _propose_legs(uniform: UniformRecording) -> SetupRepair | None:
         for side, other in zip(SIDES, reversed(SIDES), strict=True)
     }
     segments = {x.device_id: across.get(s, s) for s, x in uniform.sensors.items()}
-    evidence = "The pelvis is pushed away from the leg that swings: left and right sensors seem exchanged."
+    evidence = (
+        "The pelvis is pushed away from the swing leg: the left and right sensors appear to be swapped."
+    )
     return SetupRepair("labels", (evidence,), 1.0, segments)
 
 

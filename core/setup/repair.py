@@ -11,6 +11,7 @@ from sagittal.core.errors import Notice
 from sagittal.core.formats.aliases import segment_named
 from sagittal.core.formats.manifest import manifest_of
 from sagittal.core.frames import Segment
+from sagittal.core.message import join_messages
 from sagittal.core.signals.correction import SensorCorrection
 
 SetupMistake = Literal["units", "axes", "labels", "mounting"]
@@ -55,11 +56,11 @@ class SetupRepair:
     def tell(self, severity: Literal["warning", "error"]) -> Notice:
         """Notice with the mistake and its correction."""
         todo = (
-            "A repair is proposed; confirm it and analyse again."
+            "A correction is proposed; confirm it and re-analyse."
             if self.can_be_applied
-            else "What would put it right cannot be said; check the set-up of the sensors."
+            else "No correction can be proposed; check the sensor set-up."
         )
-        return Notice("setup_wrong", " ".join((*self.evidence, todo)), severity=severity)
+        return Notice("setup_wrong", join_messages(*self.evidence, todo), severity=severity)
 
     def complete_manifest(self, manifest: Mapping[str, Any]) -> dict[str, Any]:
         """Manifest with this correction added; other entries are kept, earlier corrections are applied

@@ -15,6 +15,7 @@ import numpy as np
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.message import Message
 
 AXES: Final = ("x", "y", "z")
 AS_READ: Final[tuple[str, ...]] = AXES
@@ -57,14 +58,22 @@ class SensorCorrection:
             if sorted(a.removeprefix("-") for a in axes) != list(AXES):
                 raise ParameterError(
                     "correction_implausible",
-                    f"{name} is {list(axes)}; expected x, y and z once each, with or without a minus: "
-                    '["-y", "x", "z"].',
+                    Message(
+                        '{name} is {axes}; expected x, y and z once each, with or without a minus: ["-y", '
+                        '"x", "z"].',
+                        name=name,
+                        axes=list(axes),
+                    ),
                 )
         for name in ("acc_times", "gyr_times"):
             if not 1e-4 <= getattr(self, name) <= 1e4:
                 raise ParameterError(
                     "correction_implausible",
-                    f"{name} is {getattr(self, name):g}; expected a factor from 0.0001 to 10000.",
+                    Message(
+                        "{name} is {self:g}; expected a factor from 0.0001 to 10000.",
+                        name=name,
+                        self=getattr(self, name),
+                    ),
                 )
 
     @property

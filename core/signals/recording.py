@@ -16,6 +16,7 @@ import numpy as np
 
 from sagittal.core.errors import Notice, ParameterError, SignalError
 from sagittal.core.frames import PROTOCOLS, SEGMENTS, Bools, Floats, Protocol, Segment
+from sagittal.core.message import Message
 from sagittal.core.signals.held_samples import HoldsSamples, hold_samples
 from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 from sagittal.core.subject.anthropometry import BodyMeasures
@@ -30,7 +31,16 @@ def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], 
     if a.ndim != len(shape) or any(
         want is not None and got != want for got, want in zip(a.shape, shape, strict=True)
     ):
-        raise ParameterError("bad_shape", f"{where}: {name} has shape {a.shape}, expected {shape}.")
+        raise ParameterError(
+            "bad_shape",
+            Message(
+                "{where}: {name} has shape {shape}, expected {shape2}.",
+                where=where,
+                name=name,
+                shape=a.shape,
+                shape2=shape,
+            ),
+        )
     a.setflags(write=False)
 
 
@@ -50,14 +60,22 @@ def check_belt(belt_speed_mps: float | None, protocol: Protocol) -> None:
     if not BELT_MPS[0] <= belt_speed_mps <= BELT_MPS[1]:
         raise ParameterError(
             "belt_speed_implausible",
-            f"Belt speed {belt_speed_mps:g} m/s is outside {BELT_MPS[0]:g} to {BELT_MPS[1]:g} m/s; give it "
-            "in metres per second (3.6 km/h is 1 m/s).",
+            Message(
+                "Belt speed {belt_speed_mps:g} m/s is outside {BELT_MPS:g} to {BELT_MPS2:g} m/s; "
+                "give it in metres per second (3.6 km/h is 1 m/s).",
+                belt_speed_mps=belt_speed_mps,
+                BELT_MPS=BELT_MPS[0],
+                BELT_MPS2=BELT_MPS[1],
+            ),
         )
     if protocol != "treadmill":
         raise ParameterError(
             "belt_speed_without_treadmill",
-            f"A belt speed is given, but the protocol is '{protocol}'; set it to treadmill or leave the "
-            "speed out.",
+            Message(
+                "A belt speed is given, but the protocol is '{protocol}'; set it to treadmill or "
+                "leave the speed out.",
+                protocol=protocol,
+            ),
         )
 
 
@@ -84,13 +102,19 @@ class Subject:
         if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:
             raise ParameterError(
                 "height_implausible",
-                f"Body height {self.height_m:g} m is outside 0.5 to 2.5 m; give it in metres.",
+                Message(
+                    "Body height {height_m:g} m is outside 0.5 to 2.5 m; give it in metres.",
+                    height_m=self.height_m,
+                ),
             )
         if self.standing_width_m is not None and not 0.0 <= self.standing_width_m <= 0.8:
             raise ParameterError(
                 "standing_width_implausible",
-                f"Ankles {self.standing_width_m:g} m apart while standing is outside 0 to 0.8 m; give the "
-                "distance of their middles in metres.",
+                Message(
+                    "Ankles {standing_width_m:g} m apart while standing is outside 0 to 0.8 m; give the "
+                    "distance of their middles in metres.",
+                    standing_width_m=self.standing_width_m,
+                ),
             )
         check_standing(self.standing_angles_deg)
         object.__setattr__(self, "standing_angles_deg", MappingProxyType(dict(self.standing_angles_deg)))
@@ -151,7 +175,9 @@ class ImuStream(HoldsSamples):
     def __post_init__(self) -> None:
         n = len(self.t_s)
         if n == 0:
-            raise SignalError("empty", f"“{self.source}”: no samples.", sensor=self.device_id)
+            raise SignalError(
+                "empty", Message("“{source}”: no samples.", source=self.source), sensor=self.device_id
+            )
         for name, a, shape in (
             ("t_s", self.t_s, (n,)),
             ("acc", self.held("acc"), (n, 3)),
@@ -162,7 +188,9 @@ class ImuStream(HoldsSamples):
             _frozen(a, name, shape, self.source)
         if np.any(self.t_s[1:] <= self.t_s[:-1]):
             raise SignalError(
-                "time_not_increasing", f"“{self.source}”: time does not increase.", sensor=self.device_id
+                "time_not_increasing",
+                Message("“{source}”: time does not increase.", source=self.source),
+                sensor=self.device_id,
             )
 
 
@@ -183,8 +211,12 @@ class GivenLimits:
         if any(not 0.0 <= t < float("inf") for t in times) or times != sorted(set(times)):
             raise ParameterError(
                 "test_limits",
-                f"A test from {self.start_s} s to {self.end_s} s; expected times of 0 or more, the end after "
-                "the start.",
+                Message(
+                    "A test from {start_s} s to {end_s} s; expected times of 0 or more, the end after the "
+                    "start.",
+                    start_s=self.start_s,
+                    end_s=self.end_s,
+                ),
             )
 
 
@@ -242,7 +274,12 @@ class Recording:
         check_belt(self.belt_speed_mps, self.protocol)
         if self.protocol not in PROTOCOLS:
             raise ParameterError(
-                "unknown_protocol", f"Protocol '{self.protocol}' is not one of {', '.join(PROTOCOLS)}."
+                "unknown_protocol",
+                Message(
+                    "Protocol '{protocol}' is not one of {PROTOCOLS}.",
+                    protocol=self.protocol,
+                    PROTOCOLS=", ".join(PROTOCOLS),
+                ),
             )
         worn: dict[str, str] = {}
         for device, segment in self.segments.items():
@@ -251,13 +288,23 @@ class Recording:
             if segment not in SEGMENTS:
                 raise ParameterError(
                     "unknown_segment",
-                    f"Sensor {device} is mapped to '{segment}'; expected {', '.join(SEGMENTS)} or null.",
+                    Message(
+                        "Sensor {device} is mapped to '{segment}'; expected {SEGMENTS} or null.",
+                        device=device,
+                        segment=segment,
+                        SEGMENTS=", ".join(SEGMENTS),
+                    ),
                     sensor=device,
                 )
             if segment in worn:
                 raise ParameterError(
                     "duplicate_segment",
-                    f"Sensors {worn[segment]} and {device} are both mapped to {segment}; choose one.",
+                    Message(
+                        "Sensors {segment} and {device} are both mapped to {segment2}; choose one.",
+                        segment=worn[segment],
+                        device=device,
+                        segment2=segment,
+                    ),
                     sensor=device,
                 )
             worn[segment] = device
@@ -302,7 +349,9 @@ class SensorSignals(HoldsSamples):
             _frozen(a, name, shape, self.device_id)
         if not (np.isfinite(acc).all() and np.isfinite(gyr).all()):
             raise SignalError(
-                "bad_signal", f"{self.device_id}: non-finite samples left.", sensor=self.device_id
+                "bad_signal",
+                Message("{device_id}: non-finite samples left.", device_id=self.device_id),
+                sensor=self.device_id,
             )
 
 
@@ -331,7 +380,12 @@ class UniformRecording:
             if len(s.valid) != len(self.t_s):
                 raise ParameterError(
                     "bad_shape",
-                    f"{segment} has {len(s.valid)} samples, the axis {len(self.t_s)}.",
+                    Message(
+                        "{segment} has {valid} samples, the axis {t_s}.",
+                        segment=segment,
+                        valid=len(s.valid),
+                        t_s=len(self.t_s),
+                    ),
                     sensor=segment,
                 )
         object.__setattr__(self, "sensors", MappingProxyType(dict(self.sensors)))

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 from sagittal.core.body.chain.filter import ChainFilterParams
 from sagittal.core.calibration.table_top import TableTopParams
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 from sagittal.core.squat.repetitions import RepetitionParams
 
 SquatMounting = Literal["fixed_offset", "table_top"]
@@ -36,5 +37,9 @@ class SquatParams:
         if self.mounting not in get_args(SquatMounting):
             raise ParameterError(
                 "unknown_mounting",
-                f"Mounting '{self.mounting}' is not one of {', '.join(get_args(SquatMounting))}.",
+                Message(
+                    "Mounting '{mounting}' is not one of {join}.",
+                    mounting=self.mounting,
+                    join=", ".join(get_args(SquatMounting)),
+                ),
             )

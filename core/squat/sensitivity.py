@@ -23,6 +23,7 @@ from sagittal.core.calibration.fixed_offset import BACK, FRONT
 from sagittal.core.calibration.standing_leg import find_standing_legs
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import SUFFIX, Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.rotation import about, from_matrix, to_matrix
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.squat.joints import JOINTS, name_joint_angles
@@ -189,7 +190,10 @@ def make_case(
     if missing := reference.list_missing(side):
         raise EstimationError(
             "no_reference",
-            f"The reference has no {', '.join(missing)}; it needs the seven angles of the leg.",
+            Message(
+                "The reference has no {missing}; it needs the seven angles of the leg.",
+                missing=", ".join(missing),
+            ),
         )
     at = calibrated.recording.t_s[signals.first :]
     found = {

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Final
 
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 
 LIMITS: Final[Mapping[str, tuple[float, float]]] = {
     "leg_m": (0.3, 1.3),
@@ -53,7 +54,14 @@ class BodyMeasures:
             if value is not None and not low <= value <= high:
                 raise ParameterError(
                     "length_implausible",
-                    f"{name} {value:g} is outside {low:g} to {high:g} m; give lengths of the body in metres.",
+                    Message(
+                        "{name} {value:g} is outside {low:g} to {high:g} m; give lengths of the body in "
+                        "metres.",
+                        name=name,
+                        value=value,
+                        low=low,
+                        high=high,
+                    ),
                 )
 
     def complete_from(self, other: BodyMeasures) -> BodyMeasures:

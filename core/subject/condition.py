@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 from sagittal.core.frames import Protocol
+from sagittal.core.message import Message
 
 WalkingPace = Literal["comfortable", "slow", "fast"]
 WalkingAid = Literal[
@@ -22,23 +23,23 @@ Orthosis = Literal["none", "insole", "foot_lifter", "ankle_foot", "knee", "knee_
 Footwear = Literal["shoes", "orthopaedic_shoes", "socks", "barefoot"]
 
 CHOICES: Final[Mapping[str, Mapping[str, str]]] = {
-    "pace": {"comfortable": "own pace", "slow": "slow", "fast": "fast"},
+    "pace": {"comfortable": "comfortable pace", "slow": "slow", "fast": "fast"},
     "aid": {
         "none": "no aid",
         "stick": "stick",
-        "four_point_stick": "four-point stick",
+        "four_point_stick": "quad stick",
         "crutch": "one crutch",
         "crutches": "two crutches",
         "frame": "walking frame",
         "rollator": "rollator",
         "handrail": "handrail or bars",
-        "person": "a person's hand",
-        "harness": "weight support",
+        "person": "hand-held assistance",
+        "harness": "body-weight support",
     },
     "orthosis": {
         "none": "no orthosis",
         "insole": "insoles",
-        "foot_lifter": "foot lifter",
+        "foot_lifter": "foot-drop splint",
         "ankle_foot": "ankle-foot orthosis",
         "knee": "knee orthosis",
         "knee_ankle_foot": "knee-ankle-foot orthosis",
@@ -102,7 +103,7 @@ class WalkingCondition:
         """Names of the items that were not stated."""
         names = tuple(name for name, value in self.stated.items() if value is None)
         belt = self.protocol == "treadmill" and self.belt_speed_mps is None
-        return (*names, "speed of the belt") if belt else names
+        return (*names, "belt speed") if belt else names
 
     @property
     def is_at_own_pace(self) -> bool:
@@ -128,7 +129,11 @@ class WalkingCondition:
 
     @property
     def _floor(self) -> str:
-        belt = "" if self.belt_speed_mps is None else f" at {self.belt_speed_mps:.2f}\u202fm/s"
+        belt = (
+            ""
+            if self.belt_speed_mps is None
+            else Message(" at {belt_speed_mps:.2f}\u202fm/s", belt_speed_mps=self.belt_speed_mps)
+        )
         return PROTOCOL_WORDS[self.protocol] + belt
 
 
@@ -151,19 +156,25 @@ def compare_conditions(a: WalkingCondition, b: WalkingCondition) -> tuple[str, .
     """Differences between the conditions of one recording and a later one, in words: "own pace, then
     fast".
     """
-    found = []
+    found: list[str] = []
     if a.protocol != b.protocol:
-        found.append(f"{PROTOCOL_WORDS[a.protocol]}, then {PROTOCOL_WORDS[b.protocol]}")
+        found.append(
+            Message(
+                "{protocol}, then {protocol2}",
+                protocol=PROTOCOL_WORDS[a.protocol],
+                protocol2=PROTOCOL_WORDS[b.protocol],
+            )
+        )
     elif not _same_belt(a.belt_speed_mps, b.belt_speed_mps):
         speeds = [
             "unknown" if c.belt_speed_mps is None else f"{c.belt_speed_mps:.2f}\u202fm/s" for c in (a, b)
         ]
-        found.append(f"speed of the belt {speeds[0]}, then {speeds[1]}")
+        found.append(Message("belt speed {speeds}, then {speeds2}", speeds=speeds[0], speeds2=speeds[1]))
     for name, words in CHOICES.items():
         values = [getattr(c, name) for c in (a, b)]
         if values[0] != values[1]:
-            first, second = (words.get(v or "", f"{name} not stated") for v in values)
-            found.append(f"{first}, then {second}")
+            first, second = (words.get(v or "", Message("{name} not stated", name=name)) for v in values)
+            found.append(Message("{first}, then {second}", first=first, second=second))
     if a.feedback != b.feedback:
         found.append("with feedback, then without" if a.feedback else "without feedback, then with")
     return tuple(found)

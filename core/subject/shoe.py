@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 
 LIMITS = {"back_m": (0.0, 0.35), "front_m": (0.0, 0.35), "tip_up_m": (0.0, 0.1)}
 """What a tape can read, m."""
@@ -42,6 +43,12 @@ class Shoe:
             if not low <= value <= high:
                 raise ParameterError(
                     "shoe_implausible",
-                    f"{name} {value:g} m is outside {low:g} to {high:g} m; give distances along the sole "
-                    "from the middle of the foot's sensor, in metres.",
+                    Message(
+                        "{name} {value:g} m is outside {low:g} to {high:g} m; give distances along the sole "
+                        "from the middle of the foot's sensor, in metres.",
+                        name=name,
+                        value=value,
+                        low=low,
+                        high=high,
+                    ),
                 )

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 
 PELVIS: Final = ("pelvis_tilt", "pelvis_obliquity")
 """Pelvis angles that standing has a zero for; obliquity is given with the right side up positive."""
@@ -38,10 +39,18 @@ def check_standing(standing_deg: Mapping[str, float]) -> None:
     for name, value in standing_deg.items():
         if name not in NAMES:
             known = ", ".join(NAMES)
-            raise ParameterError("unknown_angle", f"'{name}' is no angle; expected one of {known}.")
+            raise ParameterError(
+                "unknown_angle",
+                Message("'{name}' is no angle; expected one of {known}.", name=name, known=known),
+            )
         if not abs(value) <= LIMIT_DEG:
             raise ParameterError(
                 "standing_angle_implausible",
-                f"{name}: {value:g}° in standing is outside ±{LIMIT_DEG:g}°; give what the goniometer read, "
-                "in degrees.",
+                Message(
+                    "{name}: {value:g}° in standing is outside ±{LIMIT_DEG:g}°; give what the "
+                    "goniometer read, in degrees.",
+                    name=name,
+                    value=value,
+                    LIMIT_DEG=LIMIT_DEG,
+                ),
             )

@@ -25,6 +25,7 @@ from sagittal.core.formats.live_log import (
     encode_batch,
 )
 from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.timeline.buffer import SampleBuffer
 from sagittal.core.timeline.params import TimelineParams
 from sagittal.core.timeline.queue import StreamQueue
@@ -133,7 +134,7 @@ class LiveAxis:
                 return None
             if queue.hold(t_us, batch):
                 self._notify(
-                    "out_of_order", queue, "sent samples that run backwards in time; they are left out."
+                    "out_of_order", queue, "sent samples with decreasing time stamps; they are excluded."
                 )
         if self._start_s is None and not self._begin():
             return None
@@ -164,7 +165,7 @@ class LiveAxis:
         self._origin_us = first_us + offset
         for x in self._queues.values():
             if x not in heard:
-                self._notify("sensor_missing", x, "sent nothing so far; the take goes on without it.")
+                self._notify("sensor_missing", x, "has sent no data so far; recording continues without it.")
         starts = [x.first_us + (self._clock.offset_us(x.stream) or 0) - self._origin_us for x in heard]
         self._start_s = float(max(starts) * 1e-6)
         return True
@@ -196,14 +197,19 @@ class LiveAxis:
         stretch = self.params.timeline.max_stretch * queue.samples / queue.rate_hz + self.params.longest_s
         if ahead_s <= min(allowed, self.params.longest_s) and queue.whole_s(first_us) <= stretch:
             return False
-        self._notify("clock_jump", queue, "has a clock that jumps; batches beyond the jump are left out.")
+        self._notify("clock_jump", queue, "has a clock jump; batches after the jump are excluded.")
         return True
 
     def _notify(self, code: str, queue: StreamQueue, what: str) -> None:
         """Add a notice about a stream, once."""
         if (code, queue.stream) in self._notified:
             return
-        notice = Notice(code, f"{', '.join(queue.ids)} {what}", queue.ids[0], self._next / self.rate_hz)
+        notice = Notice(
+            code,
+            Message("{ids} {what}", ids=", ".join(queue.ids), what=what),
+            queue.ids[0],
+            self._next / self.rate_hz,
+        )
         self._notified[code, queue.stream] = notice
         self._fresh.append(notice)
 
@@ -212,14 +218,22 @@ def _common_rate(queues: Sequence[StreamQueue], hello: Hello, params: TimelinePa
     if not queues:
         named = ", ".join(x.id for x in hello.sensors)
         raise SignalError(
-            "no_mapping", f"No sensor is worn on a segment; say which one is where (sensors: {named})."
+            "no_mapping",
+            Message(
+                "No sensor is assigned to a segment; assign the sensors (available: {named}).", named=named
+            ),
         )
     slowest = min(queues, key=lambda x: x.rate_hz)
     if slowest.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Sensor {slowest.ids[0]} sends {slowest.rate_hz:g} Hz; at least {params.min_rate_hz:g} Hz are "
-            "needed to find foot contacts. Set it to 60 Hz or more.",
+            Message(
+                "Sensor {ids} sends {rate_hz:g} Hz; at least {min_rate_hz:g} Hz are needed to find "
+                "foot contacts. Set it to 60 Hz or more.",
+                ids=slowest.ids[0],
+                rate_hz=slowest.rate_hz,
+                min_rate_hz=params.min_rate_hz,
+            ),
             sensor=slowest.ids[0],
         )
     return max(x.rate_hz for x in queues)

@@ -8,11 +8,13 @@ ones are invalid and hold the last value (docs/science/timeline.md, "Rule").
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from sagittal.core.errors import Notice, SignalError
 from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.signals.held_samples import is_complete
 from sagittal.core.signals.recording import ImuStream, Recording, SensorSignals, UniformRecording
 from sagittal.core.timeline.grid import lay_signal
@@ -33,8 +35,7 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
     params = params or TimelineParams()
     worn = _find_worn(recording)
     _refuse_copies(worn)
-    notices = list(recording.notices)
-    notices += [n for s in worn.values() for n in s.notices]
+    notices = [*recording.notices, *_merge_alike([n for s in worn.values() for n in s.notices])]
     usable = _find_usable(worn)
     _check_clocks(usable)
     rate, rate_notices = _common_rate(usable, params)
@@ -44,9 +45,15 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
     if n > params.max_stretch * most:
         raise SignalError(
             "clock_jump",
-            f"The sensors' clock spans {end - start:.0f} s, {n} samples at {rate:g} Hz, but at most "
-            f"{most} were recorded: "
-            "the counter or time column jumps. Export the recording again.",
+            Message(
+                "The sensors' clock spans {start:.0f} s, {value} samples at {rate:g} Hz, but at "
+                "most {most} were recorded: the counter or time column jumps. Export the recording "
+                "again.",
+                start=end - start,
+                value=n,
+                rate=rate,
+                most=most,
+            ),
         )
     sensors = {segment: _lay_sensor(s, start, n, rate, params) for segment, s in usable.items()}
     return UniformRecording(
@@ -61,6 +68,15 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
     )
 
 
+def _merge_alike(notices: list[Notice]) -> list[Notice]:
+    """Merge notices of several sensors of one table that have the same words."""
+    merged: dict[tuple[str, str], Notice] = {}
+    for n in notices:
+        key = n.code, n.message
+        merged[key] = n if key not in merged else replace(n, sensor=None)
+    return list(merged.values())
+
+
 def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
     """The sensors mapped to a segment."""
     worn = {
@@ -72,15 +88,20 @@ def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
     if too_long:  # nor are the others analysed as if it had not been worn
         raise SignalError(
             "recording_too_long",
-            f"The recording of “{'”, “'.join(too_long)}” is too long for the protocol "
-            f"'{recording.protocol}'. Cut out the walk, or choose daily life (activity) for a sensor on the "
-            "trunk.",
+            Message(
+                "The recording of “{too_long}” is too long for the protocol '{protocol}'. Extract the walk, "
+                "or choose daily life (activity) for a trunk sensor.",
+                too_long="”, “".join(too_long),
+                protocol=recording.protocol,
+            ),
         )
     if not worn:
         raise SignalError(
             "no_mapping",
-            "No sensor is assigned to a segment; say which sensor is worn where "
-            f"(sensors found: {', '.join(recording.streams)}).",
+            Message(
+                "No sensor is assigned to a segment; assign the sensors (in the recording: {streams}).",
+                streams=", ".join(recording.streams),
+            ),
         )
     return worn
 
@@ -91,8 +112,11 @@ def _find_usable(worn: Mapping[Segment, ImuStream]) -> dict[Segment, ImuStream]:
     if not usable:
         raise SignalError(
             "missing_gyro",
-            f"None of the {len(worn)} sensors has a gyroscope signal, so no orientation can be computed. "
-            "Export the recording again with the rate of turn (Gyr_X, Gyr_Y, Gyr_Z).",
+            Message(
+                "None of the {worn} sensors has a gyroscope signal, so no orientation can be "
+                "computed. Export the recording again with the rate of turn (Gyr_X, Gyr_Y, Gyr_Z).",
+                worn=len(worn),
+            ),
         )
     return usable
 
@@ -105,10 +129,15 @@ def _refuse_copies(worn: dict[Segment, ImuStream]) -> None:
         if first != segment:
             raise SignalError(
                 "duplicate_stream",
-                f"Sensors {worn[first].device_id} ({first}) and {s.device_id} ({segment}) hold identical "
-                "samples: "
-                "one is a copy under another id. Keep the one that was worn there, set the other to 'not "
-                "used'.",
+                Message(
+                    "Sensors {device_id} ({first}) and {device_id2} ({segment}) hold identical samples: "
+                    "one is a copy under another id. Keep the one that was worn there, set the other to "
+                    "'not used'.",
+                    device_id=worn[first].device_id,
+                    first=first,
+                    device_id2=s.device_id,
+                    segment=segment,
+                ),
                 sensor=s.device_id,
             )
 
@@ -119,8 +148,11 @@ def _check_clocks(usable: dict[Segment, ImuStream]) -> None:
         listed = ", ".join(f"{s.device_id}: {s.clock}" for s in usable.values())
         raise SignalError(
             "no_common_clock",
-            f"The sensors are timed in different ways ({listed}) and cannot be aligned; "
-            "give all of them with a packet counter or with a time column.",
+            Message(
+                "The sensors use different time bases ({listed}) and cannot be aligned; provide a packet "
+                "counter or a time column for all of them.",
+                listed=listed,
+            ),
         )
 
 
@@ -132,9 +164,13 @@ def _common_rate(usable: dict[Segment, ImuStream], params: TimelineParams) -> tu
     if slowest.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Sensor {slowest.device_id} was recorded at {slowest.rate_hz:g} Hz; at least "
-            f"{params.min_rate_hz:g} Hz "
-            "are needed to find foot contacts. Record again at 60 Hz or more.",
+            Message(
+                "Sensor {device_id} was recorded at {rate_hz:g} Hz; at least {min_rate_hz:g} Hz are "
+                "needed to find foot contacts. Record again at 60 Hz or more.",
+                device_id=slowest.device_id,
+                rate_hz=slowest.rate_hz,
+                min_rate_hz=params.min_rate_hz,
+            ),
             sensor=slowest.device_id,
         )
     if rate - slowest.rate_hz <= 1e-3 * rate:
@@ -143,7 +179,11 @@ def _common_rate(usable: dict[Segment, ImuStream], params: TimelineParams) -> tu
     return rate, [
         Notice(
             "rates_differ",
-            f"Sensors run at different rates ({listed}); all were interpolated to {rate:g} Hz.",
+            Message(
+                "Sensors run at different rates ({listed}); all were interpolated to {rate:g} Hz.",
+                listed=listed,
+                rate=rate,
+            ),
         )
     ]
 
@@ -160,22 +200,35 @@ def _common_range(
         listed = ", ".join(f"{k} {a:.1f} to {b:.1f} s" for k, (a, b) in spans.items())
         raise SignalError(
             "no_overlap",
-            f"The sensors were never recording at the same time ({listed}); "
-            "the files seem to come from different takes.",
+            Message(
+                "The sensors never recorded at the same time ({listed}); the files appear to be from "
+                "different trials.",
+                listed=listed,
+            ),
         )
     if end - start < params.min_duration_s:
         raise SignalError(
             "too_short",
-            f"Only {end - start:.1f} s were recorded by all sensors together; at least "
-            f"{params.min_duration_s:g} s "
-            "are needed (1 s of quiet standing and two strides). Record a longer take.",
+            Message(
+                "All sensors together recorded only {start:.1f} s; at least {min_duration_s:g} s are needed "
+                "(1 s of quiet standing and two strides). Record a longer trial.",
+                start=end - start,
+                min_duration_s=params.min_duration_s,
+            ),
         )
     notices = [
         Notice(
             "unequal_lengths",
-            f"Sensor {usable[k].device_id} on {k} recorded from {max(a - start, 0.0):.1f} to "
-            f"{min(b, end) - start:.1f} s "
-            f"of {end - start:.1f} s; {k} has no data for the rest.",
+            Message(
+                "Sensor {device_id} on {value} recorded from {max:.1f} to {min:.1f} s of {start:.1f} "
+                "s; {value2} has no data for the rest.",
+                device_id=usable[k].device_id,
+                value=k,
+                max=max(a - start, 0.0),
+                min=min(b, end) - start,
+                start=end - start,
+                value2=k,
+            ),
             k,
             max(min(b, end) - start, 0.0),
         )
@@ -187,8 +240,12 @@ def _common_range(
         notices.append(
             Notice(
                 "cropped",
-                f"The sensors did not start and stop together. Left out, as only some of them recorded "
-                f"it: {start - first:.1f} s at the start, {last - end:.1f} s at the end.",
+                Message(
+                    "The sensors did not start and stop together. Excluded because only some of them were "
+                    "recording: {first:.1f} s at the start, {end:.1f} s at the end.",
+                    first=start - first,
+                    end=last - end,
+                ),
                 severity="info",
             )
         )
@@ -203,7 +260,10 @@ def _lay_sensor(
     if not good.any():
         raise SignalError(
             "bad_signal",
-            f"Sensor {s.device_id} has no sample with both acceleration and angular rate; export it again.",
+            Message(
+                "Sensor {device_id} has no sample with both acceleration and angular rate; export it again.",
+                device_id=s.device_id,
+            ),
             sensor=s.device_id,
         )
     mag = _lay_magnetometer(s, start_s, samples, rate, params)

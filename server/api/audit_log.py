@@ -19,7 +19,7 @@ router = APIRouter(prefix="/audit", tags=["audit"])
 
 
 @router.get("/head", response_model=schemas.AuditHead)
-def read_head(db: Db, who: Annotated[Identity, require(Action.READ_AUDIT)]) -> schemas.AuditHead:
+def read_head(db: Db, user: Annotated[Identity, require(Action.READ_AUDIT)]) -> schemas.AuditHead:
     """Number and hash of the newest row, to be stored outside the server (`sagittal check --head FILE`)."""
     with db.read() as c:
         newest = read_newest(c)
@@ -31,7 +31,7 @@ def read_head(db: Db, who: Annotated[Identity, require(Action.READ_AUDIT)]) -> s
 @router.get("", response_model=list[schemas.AuditRow])
 def list_audit(
     db: Db,
-    who: Annotated[Identity, require(Action.READ_AUDIT)],
+    user: Annotated[Identity, require(Action.READ_AUDIT)],
     before: Annotated[int | None, Query(ge=1, le=2**53, description="rows older than this number")] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> list[schemas.AuditRow]:
@@ -39,5 +39,5 @@ def list_audit(
     with db.read() as c:
         return [
             schemas.make_answer(schemas.AuditRow, row)
-            for row in audit.list_entries(c, before=before, limit=limit)
+            for row in audit.list_entries(c, before_seq=before, limit=limit)
         ]

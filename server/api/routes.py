@@ -99,7 +99,7 @@ def build_api() -> APIRouter:
     api.include_router(filter_runs.references)
 
     @api.get("/openapi.json", include_in_schema=False)
-    def document(request: Request, who: Annotated[Identity, require(Action.READ_API)]) -> dict[str, Any]:
+    def document(request: Request, user: Annotated[Identity, require(Action.READ_API)]) -> dict[str, Any]:
         """Describe this API as OpenAPI."""
         return openapi(request.app)
 

@@ -67,16 +67,16 @@ class Request(BaseModel):
         return sent | ({"note": ""} if "note" in sent and sent["note"] is None else {})
 
 
-def make_answer(kind: type[Answer], source: object, **others: object) -> Answer:
+def make_answer(kind: type[Answer], source: object, **overrides: object) -> Answer:
     """Build a response from a row or a result.
 
     Parameters
     ----------
     kind : a dataclass. source : object with attributes of the same names; others are omitted.
-    others : fields that `source` lacks or that need conversion.
+    overrides : fields that `source` lacks or that need conversion.
     """
     names = [field.name for field in fields(kind)]  # type: ignore[arg-type]  # any dataclass
-    return kind(**{name: others[name] if name in others else getattr(source, name) for name in names})
+    return kind(**{name: overrides[name] if name in overrides else getattr(source, name) for name in names})
 
 
 @dataclass(frozen=True)

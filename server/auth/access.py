@@ -47,14 +47,14 @@ class RouteAccess:
         return identity
 
 
-def _note_try(connection: HTTPConnection, who: Identity) -> None:
+def _note_try(connection: HTTPConnection, user: Identity) -> None:
     """Record an attempt to open a patient outside the care team; the response is as for an unknown id."""
     db: Database = connection.app.state.db
     trail: AuditTrail = connection.app.state.trail
     with db.read() as c:
-        hidden = list_hidden(c, who.user_id, connection.path_params)
+        hidden = list_hidden(c, user.user_id, connection.path_params)
     for patient_id in hidden:
-        trail.record_tried(who, "patient.hidden", "patient", patient_id)
+        trail.record_tried(user, "patient.hidden", "patient", patient_id)
 
 
 def require(action: Action) -> Any:
@@ -81,11 +81,11 @@ def identify(connection: HTTPConnection, parts: Mapping[str, str], *, counts: bo
     return logins.find(token, parts) if counts else logins.look(token, parts)
 
 
-def opens(connection: HTTPConnection, who: Identity, parts: Mapping[str, str]) -> bool:
+def opens(connection: HTTPConnection, user: Identity, parts: Mapping[str, str]) -> bool:
     """Whether the user may open the resources given by path parameters (server/auth/sight.py)."""
     db: Database = connection.app.state.db
     with db.read() as c:
-        return may_open(c, who, parts)
+        return may_open(c, user, parts)
 
 
 def find_end(connection: HTTPConnection, **parts: str) -> str | None:
@@ -94,10 +94,10 @@ def find_end(connection: HTTPConnection, **parts: str) -> str | None:
     Returns None while the sign-in is valid and still grants access; the check does not count as activity.
     `parts` default to the path parameters of the connection.
     """
-    who = identify(connection, parts or connection.path_params, counts=False)
-    if who is None:
+    user = identify(connection, parts or connection.path_params, counts=False)
+    if user is None:
         return "not_signed_in"
-    return None if who.opens else "not_found"
+    return None if user.opens else "not_found"
 
 
 async def wait_for_end(find: Callable[[], str | None]) -> str:
@@ -111,8 +111,8 @@ async def wait_for_end(find: Callable[[], str | None]) -> str:
     while True:
         await asyncio.sleep(CHECK_EVERY_S)
         try:
-            why = await asyncio.to_thread(find)
+            reason = await asyncio.to_thread(find)
         except SQLAlchemyError:
             continue
-        if why is not None:
-            return why
+        if reason is not None:
+            return reason

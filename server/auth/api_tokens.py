@@ -87,15 +87,15 @@ def issue(
             "too_many_tokens",
             f"An account has at most {MOST_TOKENS} tokens. Revoke one that is not used.",
         )
-    token, at = PREFIX + new_token(), now()
+    token, issued_at = PREFIX + new_token(), now()
     values = {
         "id": new_id(),
         "user_id": user_id,
         "name": name,
         "token_sha256": token_hash(token),
         "scopes": sorted(scopes),
-        "created_at": at,
-        "expires_at": at + dt.timedelta(days=days),
+        "created_at": issued_at,
+        "expires_at": issued_at + dt.timedelta(days=days),
     }
     c.execute(insert(api_token).values(values))
     return c.execute(select(api_token).where(api_token.c.id == values["id"])).one(), token
@@ -111,7 +111,7 @@ def revoke(c: Connection, user_id: str, token_id: str) -> None:
     """Revoke one token of a user; raises Problem 404."""
     gone = c.execute(delete(api_token).where(api_token.c.id == token_id, api_token.c.user_id == user_id))
     if not gone.rowcount:
-        raise Problem(404, "token_not_found", "There is no such token; it may have been revoked already.")
+        raise Problem(404, "token_not_found", "No such token; it may already have been revoked.")
 
 
 def revoke_all(c: Connection, user_id: str) -> None:
@@ -129,7 +129,7 @@ def read_bearer(connection: HTTPConnection) -> str | None:
 
 def find_bearer(db: Database, token: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
     """Identity for a token; None if it is unknown, expired or revoked, or its account is closed."""
-    at = now()
+    time = now()
     query = (
         select(
             user,
@@ -139,14 +139,14 @@ def find_bearer(db: Database, token: str, parts: Mapping[str, str] = NOTHING) ->
             opens_parts(parts).label("opens"),
         )
         .join(api_token, api_token.c.user_id == user.c.id)
-        .where(api_token.c.token_sha256 == token_hash(token), api_token.c.expires_at > at, user.c.active)
+        .where(api_token.c.token_sha256 == token_hash(token), api_token.c.expires_at > time, user.c.active)
     )
-    found = db.ask(query)
-    if not found:
+    rows = db.ask(query)
+    if not rows:
         return None
-    [row] = found
-    if row.used_at is None or row.used_at <= at - _TOUCH_EVERY:
-        _write_used(db, row.token_id, at)
+    [row] = rows
+    if row.used_at is None or row.used_at <= time - _TOUCH_EVERY:
+        _write_used(db, row.token_id, time)
     allowed = frozenset[Action]().union(*(SCOPES[Scope(scope)] for scope in row.scopes))
     login_id = f"token:{row.token_id}"
     return Identity(
@@ -154,10 +154,10 @@ def find_bearer(db: Database, token: str, parts: Mapping[str, str] = NOTHING) ->
     )
 
 
-def _write_used(db: Database, token_id: str, at: dt.datetime) -> None:
+def _write_used(db: Database, token_id: str, time: dt.datetime) -> None:
     try:
         with db.write() as c:
-            c.execute(update(api_token).where(api_token.c.id == token_id).values(used_at=at))
+            c.execute(update(api_token).where(api_token.c.id == token_id).values(used_at=time))
     except OperationalError as error:
         if refusal_of(error) is None:
             raise

@@ -29,20 +29,20 @@ def list_declared_actions(routes: Sequence[BaseRoute]) -> dict[str, Action]:
     UndeclaredRouteError
         a route declares no action or several, or the owner of a path parameter is unknown.
     """
-    found: dict[str, Action] = {}
+    declared: dict[str, Action] = {}
     for path, route in _leaves(routes):
         actions = _actions(route)
         name = f"{_methods(route)} {path}"
         if len(actions) != 1:
-            said = ", ".join(sorted(actions)) or "none"
-            raise UndeclaredRouteError(f"Route {name}: expected one declared action, found {said}.")
+            names = ", ".join(sorted(actions)) or "none"
+            raise UndeclaredRouteError(f"Route {name}: expected one declared action, found {names}.")
         unknown = set(re.findall(r"\{(\w+)", path)) - OWNER.keys() - OF_NOBODY
         if unknown:
             raise UndeclaredRouteError(
                 f"Route {name}: nothing says whose {', '.join(sorted(unknown))} is; see server/auth/sight.py."
             )
-        found[name] = actions.pop()
-    return found
+        declared[name] = actions.pop()
+    return declared
 
 
 def _leaves(routes: Sequence[BaseRoute]) -> Iterator[tuple[str, BaseRoute]]:

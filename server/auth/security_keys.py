@@ -103,7 +103,7 @@ def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> di
         raise Problem(
             409,
             "no_keys_here",
-            "Keys work where the address is a name and begins with https, or on localhost.",
+            "Security keys require an https address with a host name, or localhost.",
         )
     if not second_factor.is_on(c, user_id):
         raise Problem(
@@ -111,8 +111,8 @@ def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> di
             "second_factor_off",
             "Set up the authenticator first: its recovery codes help when a key is lost.",
         )
-    known = list_keys(c, user_id)
-    if len(known) >= MOST_KEYS:
+    keys = list_keys(c, user_id)
+    if len(keys) >= MOST_KEYS:
         raise Problem(409, "too_many_keys", f"An account has at most {MOST_KEYS} keys. Remove one first.")
     options = generate_registration_options(
         rp_id=site.host,
@@ -120,7 +120,7 @@ def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> di
         user_name=name,
         user_id=bytes.fromhex(user_id),
         challenge=_new_challenge(c, user_id, "register"),
-        exclude_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in known],
+        exclude_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in keys],
     )
     return _as_tree(options_to_json(options))
 
@@ -130,19 +130,19 @@ def take_challenge(c: Connection, user_id: str, purpose: Purpose, answer: Mappin
     from webauthn import base64url_to_bytes
 
     try:
-        said = json.loads(base64url_to_bytes(str(answer["response"]["clientDataJSON"])))
-        challenge = base64url_to_bytes(str(said["challenge"]))
+        client_data = json.loads(base64url_to_bytes(str(answer["response"]["clientDataJSON"])))
+        challenge = base64url_to_bytes(str(client_data["challenge"]))
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
     table = security_key_challenge
-    given = (
+    expected = (
         table.c.challenge_sha256 == token_hash(challenge.hex()),
         table.c.user_id == user_id,
         table.c.purpose == purpose,
         table.c.expires_at > now(),
     )
     # of two that come at once one deletes the row
-    return challenge if c.execute(delete(table).where(*given)).rowcount else None
+    return challenge if c.execute(delete(table).where(*expected)).rowcount else None
 
 
 def register(
@@ -162,13 +162,13 @@ def register(
     if challenge is None or not site.has_keys or not second_factor.is_on(c, user_id):
         raise KeyRefused(403)
     with _refusals(403):
-        made = verify_registration_response(
+        verified = verify_registration_response(
             credential=dict(answer),
             expected_challenge=challenge,
             expected_rp_id=site.host,
             expected_origin=site.origin,
         )
-    same = select(security_key.c.id).where(security_key.c.credential_id == made.credential_id)
+    same = select(security_key.c.id).where(security_key.c.credential_id == verified.credential_id)
     if c.execute(same).first() is not None:
         raise KeyRefused(403)
     if len(list_keys(c, user_id)) >= MOST_KEYS:
@@ -178,9 +178,9 @@ def register(
         "user_id": user_id,
         "name": name,
         "host": site.address,
-        "credential_id": made.credential_id,
-        "public_key": made.credential_public_key,
-        "sign_count": made.sign_count,
+        "credential_id": verified.credential_id,
+        "public_key": verified.credential_public_key,
+        "sign_count": verified.sign_count,
         "created_at": now(),
     }
     c.execute(insert(security_key).values(row))
@@ -192,13 +192,13 @@ def begin_sign_in(c: Connection, site: Site, user_id: str) -> dict[str, Any] | N
     from webauthn import generate_authentication_options, options_to_json
     from webauthn.helpers.structs import PublicKeyCredentialDescriptor, UserVerificationRequirement
 
-    known = list_usable(c, site, user_id)
-    if not known or not second_factor.is_on(c, user_id):
+    keys = list_usable(c, site, user_id)
+    if not keys or not second_factor.is_on(c, user_id):
         return None
     options = generate_authentication_options(
         rp_id=site.host,
         challenge=_new_challenge(c, user_id, "sign_in"),
-        allow_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in known],
+        allow_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in keys],
         # the password is what one knows; the key is what one has
         user_verification=UserVerificationRequirement.DISCOURAGED,
     )
@@ -241,22 +241,22 @@ def remove(c: Connection, site: Site, user_id: str, key_id: str) -> None:
     """Delete one key of an account; if none is left here, codes are accepted again. Raises Problem 404."""
     mine = (security_key.c.id == key_id, security_key.c.user_id == user_id)
     if not c.execute(delete(security_key).where(*mine)).rowcount:
-        raise Problem(404, "key_not_found", "There is no such key; it may have been removed already.")
+        raise Problem(404, "key_not_found", "No such key; it may already have been removed.")
     if not list_usable(c, site, user_id):
         second_factor.take_keys_only(c, user_id, only=False)
 
 
 def _new_challenge(c: Connection, user_id: str, purpose: Purpose) -> bytes:
     """Create a challenge and delete expired or surplus ones of this account."""
-    at, made = now(), secrets.token_bytes(32)
+    time, challenge = now(), secrets.token_bytes(32)
     table = security_key_challenge
-    c.execute(delete(table).where(table.c.expires_at <= at))
+    c.execute(delete(table).where(table.c.expires_at <= time))
     mine = select(table.c.challenge_sha256).where(table.c.user_id == user_id)
     waiting = c.execute(mine.order_by(table.c.expires_at.desc()).offset(_MOST_WAITING - 1)).scalars().all()
     c.execute(delete(table).where(table.c.challenge_sha256.in_(waiting)))
-    row = {"challenge_sha256": token_hash(made.hex()), "user_id": user_id, "purpose": purpose}
-    c.execute(insert(table).values(**row, expires_at=at + CHALLENGE_LIFE))
-    return made
+    row = {"challenge_sha256": token_hash(challenge.hex()), "user_id": user_id, "purpose": purpose}
+    c.execute(insert(table).values(**row, expires_at=time + CHALLENGE_LIFE))
+    return challenge
 
 
 @contextlib.contextmanager

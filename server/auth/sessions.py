@@ -67,33 +67,33 @@ class Logins:
 
     def start(self, c: Connection, user_id: str, replaces: str | None) -> str:
         """Open a sign-in and return its new token; the browser's previous token, if any, is revoked."""
-        at = self._clock()
+        time = self._clock()
         if replaces is not None:
             self.end(c, token_hash(replaces))
         gone = login_session.c.token_sha256.in_(self._ended)
-        c.execute(delete(login_session).where((login_session.c.expires_at <= at) | gone))
+        c.execute(delete(login_session).where((login_session.c.expires_at <= time) | gone))
         token = new_token()
         c.execute(
             insert(login_session).values(
                 token_sha256=token_hash(token),
                 user_id=user_id,
-                created_at=at,
-                last_seen_at=at,
-                expires_at=at + self._absolute,
+                created_at=time,
+                last_seen_at=time,
+                expires_at=time + self._absolute,
             )
         )
         return token
 
     def keep(self, user_id: str, replaces: str | None) -> str | None:
         """Open a sign-in in memory while the disk is not writable; None if there are too many."""
-        at = self._clock()
+        time = self._clock()
         if replaces is not None:
             self._forget(token_hash(replaces))
-        self._kept = {k: v for k, v in self._kept.items() if v.expires_at > at}
+        self._kept = {k: v for k, v in self._kept.items() if v.expires_at > time}
         if len(self._kept) >= MOST_KEPT:
             return None
         token = new_token()
-        self._kept[token_hash(token)] = _Login(user_id, at, at + self._absolute)
+        self._kept[token_hash(token)] = _Login(user_id, time, time + self._absolute)
         return token
 
     def find(self, token: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
@@ -107,32 +107,32 @@ class Logins:
 
     def look(self, token: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
         """Return the identity for a token without counting the request as activity."""
-        found = self._open(token_hash(token), self._clock(), parts)
-        return None if found is None else found[1]
+        session = self._open(token_hash(token), self._clock(), parts)
+        return None if session is None else session[1]
 
     def seconds_left(self, login_id: str) -> float:
         """Seconds until a sign-in expires without activity; 0 if it has expired. Does not count as
         activity.
         """
-        at = self._clock()
-        found = self._open(login_id, at)
-        if found is None:
+        time = self._clock()
+        session = self._open(login_id, time)
+        if session is None:
             return 0.0
-        login, _ = found
-        return (min(login.expires_at, login.last_seen_at + self._idle) - at).total_seconds()
+        login, _ = session
+        return (min(login.expires_at, login.last_seen_at + self._idle) - time).total_seconds()
 
     def touch(self, login_id: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
         """Count a running view or replay as activity; None if the sign-in has ended and the view must
         close.
         """
-        at = self._clock()
-        found = self._open(login_id, at, parts)
-        if found is None:
+        time = self._clock()
+        session = self._open(login_id, time, parts)
+        if session is None:
             return None
-        login, identity = found
+        login, identity = session
         # a short idle time must not end between two writes
-        if login.last_seen_at <= at - min(TOUCH_EVERY, self._idle / 4):
-            self._write_seen(login_id, at)
+        if login.last_seen_at <= time - min(TOUCH_EVERY, self._idle / 4):
+            self._write_seen(login_id, time)
         return identity
 
     def close(self, login_id: str) -> None:
@@ -161,28 +161,28 @@ class Logins:
         )
 
     def _open(
-        self, login_id: str, at: dt.datetime, parts: Mapping[str, str] = NOTHING
+        self, login_id: str, time: dt.datetime, parts: Mapping[str, str] = NOTHING
     ) -> tuple[_Login, Identity] | None:
         """The sign-in and its identity, None if it is unknown or expired."""
         if login_id in self._ended:
             return None
-        kept = self._kept.get(login_id)
+        held = self._kept.get(login_id)
         opens = opens_parts(parts).label("opens")
         stored = select(login_session.c.last_seen_at, login_session.c.expires_at, user, opens).join(
             user, user.c.id == login_session.c.user_id
         )
         query = (
             stored.where(login_session.c.token_sha256 == login_id)
-            if kept is None
-            else select(user, opens).where(user.c.id == kept.user_id)
+            if held is None
+            else select(user, opens).where(user.c.id == held.user_id)
         )
-        found = self._db.ask(query.where(user.c.active))
-        if not found:
+        rows = self._db.ask(query.where(user.c.active))
+        if not rows:
             return None
-        [person] = found
-        login = kept or _Login(person.id, person.last_seen_at, person.expires_at)
-        seen = max(login.last_seen_at, self._seen.get(login_id, login.last_seen_at))
-        if login.expires_at <= at or seen <= at - self._idle:
+        [person] = rows
+        login = held or _Login(person.id, person.last_seen_at, person.expires_at)
+        last_seen = max(login.last_seen_at, self._seen.get(login_id, login.last_seen_at))
+        if login.expires_at <= time or last_seen <= time - self._idle:
             return None
         identity = Identity(
             person.id,
@@ -193,16 +193,16 @@ class Logins:
             person.language,
             opens=bool(person.opens),
         )
-        return dataclasses.replace(login, last_seen_at=seen), identity
+        return dataclasses.replace(login, last_seen_at=last_seen), identity
 
-    def _write_seen(self, login_id: str, at: dt.datetime) -> None:
+    def _write_seen(self, login_id: str, time: dt.datetime) -> None:
         if login_id not in self._kept:
             try:
                 with self._db.write() as c:
                     c.execute(
                         update(login_session)
                         .where(login_session.c.token_sha256 == login_id)
-                        .values(last_seen_at=at)
+                        .values(last_seen_at=time)
                     )
             except OperationalError as error:
                 # busy or refused: a page that only reads need not wait for this again
@@ -211,7 +211,7 @@ class Logins:
             else:
                 self._seen.pop(login_id, None)
                 return
-        self._seen[login_id] = at
+        self._seen[login_id] = time
 
     def _forget(self, login_id: str) -> None:
         """End a sign-in in memory; a stored one expires when idle."""

@@ -93,37 +93,37 @@ NOTHING: Final[Mapping[str, str]] = MappingProxyType({})
 """Parts of an address that names nothing."""
 
 
-def only_seen(query: Select[Any], who: Identity | None) -> Select[Any]:
+def only_seen(query: Select[Any], user: Identity | None) -> Select[Any]:
     """Restrict a query over `patient` to those the user may open; None = the system, which sees all."""
-    if who is None or who.is_admin:
+    if user is None or user.is_admin:
         return query
-    return query.where(~TEAMS_ARE_ON | _is_seen(who.user_id, patient.c.id))
+    return query.where(~TEAMS_ARE_ON | _is_seen(user.user_id, patient.c.id))
 
 
-def may_open(c: Connection, who: Identity, parts: Mapping[str, str]) -> bool:
+def may_open(c: Connection, identity: Identity, parts: Mapping[str, str]) -> bool:
     """Whether a user may open everything that the path parameters refer to; False if any does not exist."""
-    return bool(c.execute(select(opens_parts(parts)).where(user.c.id == who.user_id)).scalar())
+    return bool(c.execute(select(opens_parts(parts)).where(user.c.id == identity.user_id)).scalar())
 
 
 def list_hidden(c: Connection, user_id: str, parts: Mapping[str, str]) -> list[str]:
     """Ids of the patients that path parameters refer to and whose care team does not include the user."""
-    found: set[str] = set()
+    hidden_ids: set[str] = set()
     for name in parts.keys() & OWNER.keys():
         query, own = OWNER[name]
         hidden = ~_is_seen(user_id, query.selected_columns[0])
-        found.update(c.execute(query.where(own == parts[name], hidden)).scalars())
-    return sorted(found)
+        hidden_ids.update(c.execute(query.where(own == parts[name], hidden)).scalars())
+    return sorted(hidden_ids)
 
 
-def find_emergency(c: Connection, who: Identity | None, patient_id: str) -> Row[Any] | None:
+def find_emergency(c: Connection, user: Identity | None, patient_id: str) -> Row[Any] | None:
     """The emergency access that alone lets a user see a patient; None if not needed or not granted."""
-    if who is None or who.is_admin or not c.execute(select(TEAMS_ARE_ON)).scalar_one():
+    if user is None or user.is_admin or not c.execute(select(TEAMS_ARE_ON)).scalar_one():
         return None
-    mine = (care_team_member.c.user_id == who.user_id) & (care_team_member.c.patient_id == patient_id)
+    mine = (care_team_member.c.user_id == user.user_id) & (care_team_member.c.patient_id == patient_id)
     if c.execute(select(care_team_member.c.since).where(mine)).first():
         return None
     query = select(emergency_access).where(
-        emergency_access.c.user_id == who.user_id,
+        emergency_access.c.user_id == user.user_id,
         emergency_access.c.patient_id == patient_id,
         is_emergency_open(),
     )
@@ -132,8 +132,8 @@ def find_emergency(c: Connection, who: Identity | None, patient_id: str) -> Row[
 
 def is_emergency_open() -> ColumnElement[bool]:
     """SQL condition: the emergency access is active."""
-    at = literal(now(), emergency_access.c.ends_at.type)
-    return emergency_access.c.ended_at.is_(None) & (emergency_access.c.ends_at > at)
+    time = literal(now(), emergency_access.c.ends_at.type)
+    return emergency_access.c.ended_at.is_(None) & (emergency_access.c.ends_at > time)
 
 
 def opens_parts(parts: Mapping[str, str]) -> ColumnElement[bool]:

@@ -41,10 +41,10 @@ class FailureTimes(Protocol):
     def list_times(self, key: Key) -> Sequence[float]:
         """Times of a key, oldest first."""
 
-    def add(self, key: Key, at: float) -> None:
+    def add(self, key: Key, time: float) -> None:
         """Add a failure."""
 
-    def remove(self, key: Key, at: float) -> None:
+    def remove(self, key: Key, time: float) -> None:
         """Remove a recorded failure; no error if absent."""
 
     def clear(self, key: Key) -> None:
@@ -53,7 +53,7 @@ class FailureTimes(Protocol):
     def clear_account(self, account: str) -> None:
         """Remove all failures of an account, from any address."""
 
-    def forget(self, before: float) -> None:
+    def forget(self, cutoff: float) -> None:
         """Remove expired failures, now or later."""
 
 
@@ -96,12 +96,12 @@ class Throttle:
 
         return self._store.work(do)
 
-    def withdraw(self, account: str, address: str, at: float) -> None:
+    def withdraw(self, account: str, address: str, time: float) -> None:
         """Remove an attempt counted by `begin`: it succeeded, or could not be verified."""
 
         def do(times: FailureTimes) -> None:
             for key in _keys(account, address):
-                times.remove(key, at)
+                times.remove(key, time)
 
         self._store.work(do)
 
@@ -160,15 +160,15 @@ class FailuresInMemory:
         """See FailureTimes."""
         return self._failures.get(key, ())
 
-    def add(self, key: Key, at: float) -> None:
+    def add(self, key: Key, time: float) -> None:
         """See FailureTimes."""
-        self._failures[key].append(at)
+        self._failures[key].append(time)
 
-    def remove(self, key: Key, at: float) -> None:
+    def remove(self, key: Key, time: float) -> None:
         """See FailureTimes."""
         times = self._failures.get(key)
-        if times is not None and at in times:
-            times.remove(at)
+        if times is not None and time in times:
+            times.remove(time)
             if not times:
                 del self._failures[key]
 
@@ -181,10 +181,10 @@ class FailuresInMemory:
         for key in [k for k in self._failures if k[0] == account]:
             del self._failures[key]
 
-    def forget(self, before: float) -> None:
+    def forget(self, cutoff: float) -> None:
         """See FailureTimes; runs only when there are many entries."""
         if len(self._failures) > _MAX_KEYS:
-            for key in [k for k, times in self._failures.items() if times[-1] <= before]:
+            for key in [k for k, times in self._failures.items() if times[-1] <= cutoff]:
                 del self._failures[key]
 
 
@@ -219,15 +219,15 @@ class _FailureRows:
 
     def list_times(self, key: Key) -> Sequence[float]:
         query = select(failed_attempt.c.at).where(_is(key)).order_by(failed_attempt.c.at)
-        return [at.timestamp() for at in self._c.execute(query).scalars()]
+        return [time.timestamp() for time in self._c.execute(query).scalars()]
 
-    def add(self, key: Key, at: float) -> None:
+    def add(self, key: Key, time: float) -> None:
         account, address = key
-        row = {"id": new_id(), "account": account, "address": address, "at": _moment(at)}
+        row = {"id": new_id(), "account": account, "address": address, "at": _moment(time)}
         self._c.execute(insert(failed_attempt).values(row))
 
-    def remove(self, key: Key, at: float) -> None:
-        query = select(failed_attempt.c.id).where(_is(key), failed_attempt.c.at == _moment(at)).limit(1)
+    def remove(self, key: Key, time: float) -> None:
+        query = select(failed_attempt.c.id).where(_is(key), failed_attempt.c.at == _moment(time)).limit(1)
         self._c.execute(delete(failed_attempt).where(failed_attempt.c.id.in_(query.scalar_subquery())))
 
     def clear(self, key: Key) -> None:
@@ -236,8 +236,8 @@ class _FailureRows:
     def clear_account(self, account: str) -> None:
         self._c.execute(delete(failed_attempt).where(failed_attempt.c.account == account))
 
-    def forget(self, before: float) -> None:
-        self._c.execute(delete(failed_attempt).where(failed_attempt.c.at <= _moment(before)))
+    def forget(self, cutoff: float) -> None:
+        self._c.execute(delete(failed_attempt).where(failed_attempt.c.at <= _moment(cutoff)))
 
 
 def _is(key: Key) -> ColumnElement[bool]:
@@ -245,13 +245,13 @@ def _is(key: Key) -> ColumnElement[bool]:
     return and_(failed_attempt.c.account == account, failed_attempt.c.address == address)
 
 
-def _moment(at: float) -> dt.datetime:
-    return dt.datetime.fromtimestamp(at, dt.UTC)
+def _moment(timestamp: float) -> dt.datetime:
+    return dt.datetime.fromtimestamp(timestamp, dt.UTC)
 
 
 def _wait(times: Sequence[float], limit: int, now: float) -> float:
     """Seconds until fewer than `limit` of these failures are within the window."""
-    failures = [at for at in times if at > now - WINDOW_S]
+    failures = [time for time in times if time > now - WINDOW_S]
     return failures[-limit] + WINDOW_S - now if len(failures) >= limit else 0.0
 
 

@@ -64,19 +64,19 @@ class LastPlaces:
 NO_PLACES: Final = LastPlaces({}, None)
 
 
-def keep_checks(c: Connection, recording_id: str, found: Sequence[Mapping[str, Any]]) -> None:
+def keep_checks(c: Connection, recording_id: str, checks: Sequence[Mapping[str, Any]]) -> None:
     """Store the device checks of an analysis, in the transaction that publishes it.
 
     Replaces the checks of earlier analyses of the session, which cover the same samples or are superseded.
 
     Parameters
     ----------
-    found : `devices` of analysis.json.
+    checks : `devices` of analysis.json.
     """
     own = select(recording.c.session_id).where(recording.c.id == recording_id).scalar_subquery()
     siblings = select(recording.c.id).where(recording.c.session_id == own).scalar_subquery()
     c.execute(delete(device_check).where(device_check.c.recording_id.in_(siblings)))
-    for one in found:
+    for one in checks:
         content = {name: one[name] for name in DeviceCheck.__dataclass_fields__}
         row = {name: one[name] for name in ("device_id", "segment", "exchanged")}
         c.execute(insert(device_check).values(**row, recording_id=recording_id, content=content, at=now()))
@@ -88,10 +88,10 @@ def list_devices(c: Connection) -> list[KnownDevice]:
     grouped: dict[str, list[Any]] = {}
     for row in rows:
         grouped.setdefault(row.device_id, []).append(row)
-    known = [_known(found) for found in grouped.values()]
-    known.sort(key=lambda d: d.device_id)
-    known.sort(key=lambda d: d.last.day, reverse=True)
-    return known[:LISTED]
+    devices = [_known(checks) for checks in grouped.values()]
+    devices.sort(key=lambda d: d.device_id)
+    devices.sort(key=lambda d: d.last.day, reverse=True)
+    return devices[:LISTED]
 
 
 def get(c: Connection, device_id: str) -> KnownDevice:
@@ -115,10 +115,10 @@ def recall_places(
     device_ids : None = all of the clinic, at most `LISTED`. but : a session to exclude.
     """
     since = now().date() - dt.timedelta(days=REMEMBERED_DAYS)
-    wanted = _placed(device_ids).where(~device_check.c.exchanged, session.c.performed_on >= since)
+    query = _placed(device_ids).where(~device_check.c.exchanged, session.c.performed_on >= since)
     if but is not None:
-        wanted = wanted.where(session.c.id != but)
-    last = wanted.subquery()
+        query = query.where(session.c.id != but)
+    last = query.subquery()
     newest = (
         select(last)
         .where(last.c.place == 1)

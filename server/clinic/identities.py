@@ -17,6 +17,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, delete, insert, select, update
 
 from sagittal.core.errors import SagittalError
+from sagittal.core.user_text import UserText
 from sagittal.server import audit
 from sagittal.server.clinic import patients
 from sagittal.server.errors import Conflict, ServiceError
@@ -32,7 +33,6 @@ from sagittal.server.storage.field_cipher import (
 )
 from sagittal.server.storage.schema.person_tables import identity_key, patient_identity
 from sagittal.server.storage.schema.tables import now
-from sagittal.web.user_text import UserText
 
 FIELDS: Final = ("name", "born_on", "record_number", "insurance_number", "contact")
 MOST: Final[Mapping[str, int]] = {
@@ -89,16 +89,16 @@ def change(
 
     The key is read in the writing transaction, so that it cannot be changed in between.
     """
-    before = get(c, key_file, patient_id)
+    previous = get(c, key_file, patient_id)
     checked = {name: _check(name, value) for name, value in values.items()}
-    changed = sorted(name for name, value in checked.items() if getattr(before, name) != value)
+    changed = sorted(name for name, value in checked.items() if getattr(previous, name) != value)
     if not changed:
-        return before
-    after = {name: checked.get(name, getattr(before, name)) for name in FIELDS}
+        return previous
+    updated = {name: checked.get(name, getattr(previous, name)) for name in FIELDS}
     mine = patient_identity.c.patient_id == patient_id
     c.execute(delete(patient_identity).where(mine))
-    if any(value is not None for value in after.values()):
-        sealed = _seal(_read_sealing(c, key_file), patient_id, after)
+    if any(value is not None for value in updated.values()):
+        sealed = _seal(_read_sealing(c, key_file), patient_id, updated)
         c.execute(insert(patient_identity).values(patient_id=patient_id, changed_at=now(), **sealed))
     audit.record(c, actor, "identity.changed", "patient", patient_id, {"fields": changed})
     return get(c, key_file, patient_id)
@@ -204,13 +204,13 @@ def find_problems(c: Connection, key_file: Path) -> list[str]:
         keys = _read_keys(c, key_file)
     except KeyUnusable as error:
         return [f"{key_file}: {error.message}"]
-    found = []
+    problems = []
     for row in c.execute(select(patient_identity).order_by(patient_identity.c.patient_id)):
         try:
             _open(keys, row._asdict())
         except SagittalError as error:
-            found.append(f"patient {row.patient_id}: {error.message}")
-    return found
+            problems.append(f"patient {row.patient_id}: {error.message}")
+    return problems
 
 
 def _open_all(c: Connection, keys: FieldKeys) -> None:
@@ -240,14 +240,15 @@ def _read_keys(c: Connection, key_file: Path) -> FieldKeys:
     """Keys in the file, which must include the one in use; raises Conflict, KeyUnusable."""
     if not are_kept(c, key_file):
         raise Conflict(
-            "identities_off", "This clinic keeps no names: the operator makes a key for them first."
+            "identities_off",
+            "This clinic does not store names: the administrator must create an encryption key first.",
         )
     keys, sealing = read_keys(key_file), _find_sealing(c)
     if sealing is not None and not keys.has(sealing):
         raise KeyUnusable(
             "identity_key_wrong",
-            f"Names are encrypted by key {sealing}; the key file of this computer holds {keys.name}. "
-            "The operator puts the right file there.",
+            f"Names are encrypted with key {sealing}, but the key file on this computer holds "
+            f"{keys.name}. The administrator must install the right file.",
         )
     return keys
 

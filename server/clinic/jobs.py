@@ -28,10 +28,10 @@ class ListedJob(JobView):
 
 
 def list_jobs(
-    c: Connection, who: Identity | None, *, active_only: bool = False, limit: int = 100
+    c: Connection, user: Identity | None, *, active_only: bool = False, limit: int = 100
 ) -> list[ListedJob]:
     """Jobs of the patients that a user may open, newest first; None = the system, all."""
-    query = only_seen(_QUERY, who).order_by(job.c.seq.desc()).limit(limit)
+    query = only_seen(_QUERY, user).order_by(job.c.seq.desc()).limit(limit)
     if active_only:
         query = query.where(job.c.state.in_(ACTIVE_STATES))
     return [_listed(row) for row in c.execute(query)]
@@ -45,16 +45,16 @@ def list_active(c: Connection, patient_ids: Collection[str]) -> list[ListedJob]:
     ]
 
 
-def count_active(db: Database, who: Identity) -> int:
+def count_active(db: Database, user: Identity) -> int:
     """Number of queued and running jobs of the patients that a user may open."""
-    [[count]] = db.ask(select_active_count(who))
+    [[count]] = db.ask(select_active_count(user))
     return int(count)
 
 
-def select_active_count(who: Identity) -> Select[Any]:
+def select_active_count(user: Identity) -> Select[Any]:
     """SQL statement for `count_active`."""
     query = select(func.count()).select_from(_JOBS).where(job.c.state.in_(ACTIVE_STATES))
-    return only_seen(query, who)
+    return only_seen(query, user)
 
 
 def of_session(c: Connection, session_id: str, *, kind: str | None = None) -> list[JobView]:

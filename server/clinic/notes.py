@@ -68,13 +68,13 @@ def remove(c: Connection, actor: audit.Actor | None, note_id: str, *, of_others:
     ----------
     of_others : also permit notes of other authors.
     """
-    found = get(c, note_id)
-    if not may_remove(found, actor, of_others=of_others):
+    note = get(c, note_id)
+    if not may_remove(note, actor, of_others=of_others):
         raise NotAllowed(
-            "not_yours", f"{found.by} wrote this note. Ask that person or an administrator to remove it."
+            "not_yours", f"{note.by} wrote this note. Ask that person or an administrator to remove it."
         )
     c.execute(delete(patient_note).where(patient_note.c.id == note_id))
-    audit.record(c, actor, "note.removed", "patient", found.patient_id, {"note_id": note_id})
+    audit.record(c, actor, "note.removed", "patient", note.patient_id, {"note_id": note_id})
 
 
 def get(c: Connection, note_id: str) -> PatientNote:

@@ -125,9 +125,9 @@ def change(
     c: Connection, actor: audit.Actor | None, patient_id: str, values: Mapping[str, object]
 ) -> Patient:
     """Update some of CHANGEABLE; raises NotFound, CodeTaken, ServiceError bad_value."""
-    before = get(c, patient_id)
+    previous = get(c, patient_id)
     checked = _checked(values)
-    changed = {name: value for name, value in checked.items() if getattr(before, name) != value}
+    changed = {name: value for name, value in checked.items() if getattr(previous, name) != value}
     if "code" in changed:
         _refuse_alike(c, str(changed["code"]), patient_id)
     if changed:
@@ -145,45 +145,45 @@ def get(c: Connection, patient_id: str) -> Patient:
     return Patient(**row._asdict())
 
 
-def count(c: Connection, who: Identity | None) -> int:
+def count(c: Connection, user: Identity | None) -> int:
     """Number of patients that a user may open; None = the system, all."""
-    return int(c.execute(_count(who)).scalar_one())
+    return int(c.execute(_count(user)).scalar_one())
 
 
-def _count(who: Identity | None) -> Select[Any]:
-    return only_seen(select(func.count()).select_from(patient), who)
+def _count(user: Identity | None) -> Select[Any]:
+    return only_seen(select(func.count()).select_from(patient), user)
 
 
 def list_patients(
-    c: Connection, who: Identity | None, *, search: str = "", limit: int = 200, offset: int = 0
+    c: Connection, user: Identity | None, *, search: str = "", limit: int = 200, offset: int = 0
 ) -> list[Patient]:
     """Patients whose code or note contains `search` (case-insensitive), latest visit first.
 
     Parameters
     ----------
-    who : only those accessible to this user; None = the system, which sees all.
+    user : only those accessible to this user; None = the system, which sees all.
     """
-    return make_all(Patient, c.execute(_search(who, search).limit(limit).offset(offset)))
+    return make_all(Patient, c.execute(_search(user, search).limit(limit).offset(offset)))
 
 
-def list_counted(c: Connection, who: Identity, *, search: str = "", limit: int = 200) -> PatientList:
+def list_counted(c: Connection, user: Identity, *, search: str = "", limit: int = 200) -> PatientList:
     """Patients with the counts shown with the list, in one statement (two if none match)."""
     counts = [
-        _count(who).correlate(None).scalar_subquery(),
-        jobs.select_active_count(who).correlate(None).scalar_subquery(),
+        _count(user).correlate(None).scalar_subquery(),
+        jobs.select_active_count(user).correlate(None).scalar_subquery(),
         TEAMS_ARE_ON,
     ]
     named = [x.label(f"count_{i}") for i, x in enumerate(counts)]
-    result = c.execute(_search(who, search).add_columns(*named).limit(limit))
+    result = c.execute(_search(user, search).add_columns(*named).limit(limit))
     names = tuple(result.keys())[: -len(named)]
     rows = result.all()
     total, active, teams_on = rows[0][-len(named) :] if rows else c.execute(select(*named)).one()
-    found = [Patient(**dict(zip(names, row, strict=False))) for row in rows]
-    return PatientList(found, total, active, bool(teams_on))
+    matching = [Patient(**dict(zip(names, row, strict=False))) for row in rows]
+    return PatientList(matching, total, active, bool(teams_on))
 
 
-def _search(who: Identity | None, search: str) -> Select[Any]:
-    query = only_seen(_listing(), who).order_by(
+def _search(user: Identity | None, search: str) -> Select[Any]:
+    query = only_seen(_listing(), user).order_by(
         _LAST_VISIT.desc().nulls_last(), patient.c.created_at.desc(), patient.c.id
     )
     if search.strip():
@@ -255,8 +255,8 @@ def _checked(values: Mapping[str, object]) -> dict[str, Any]:
 
 def _refuse_alike(c: Connection, code: str, own: str | None = None) -> None:
     """Raise CodeTaken if another code differs only in case or in the Unicode form of letters."""
-    for other_id, other in c.execute(select(patient.c.id, patient.c.code)):
-        if other_id != own and normalize("NFKC", other).casefold() == code.casefold():
+    for other_id, existing_code in c.execute(select(patient.c.id, patient.c.code)):
+        if other_id != own and normalize("NFKC", existing_code).casefold() == code.casefold():
             raise CodeTaken(code, other_id)
 
 

@@ -104,11 +104,11 @@ def start(
         raise ServiceError("bad_value", f"The programme is one of {', '.join(COURSES)}, not '{template}'.")
     course = COURSES[template]
     days = course.days(require_day(starts_on))
-    for other in of_patient(c, patient_id):
-        if min(days) <= other.ends_on and other.visits[0].planned_on <= max(days):
+    for active in of_patient(c, patient_id):
+        if min(days) <= active.ends_on and active.visits[0].planned_on <= max(days):
             raise Conflict(
                 "programme_running",
-                f"This patient has a programme until {other.ends_on}; end it first or start after that day.",
+                f"This patient has a programme until {active.ends_on}; end it first or start after that day.",
             )
     programme_id = new_id()
     row = {"id": programme_id, "patient_id": patient_id, "template": template, "starts_on": starts_on}
@@ -130,10 +130,10 @@ def start(
 
 def get(c: Connection, programme_id: str) -> Programme:
     """One programme; raises NotFound."""
-    found = _programmes(c, programme.c.id == programme_id)
-    if not found:
+    matches = _programmes(c, programme.c.id == programme_id)
+    if not matches:
         raise NotFound("programme", programme_id)
-    return found[0]
+    return matches[0]
 
 
 def of_patient(c: Connection, patient_id: str) -> list[Programme]:
@@ -154,9 +154,9 @@ def list_kinds(c: Connection, patient_ids: Collection[str]) -> dict[str, VisitKi
 def read_plans(c: Connection, patient_ids: Collection[str], today: dt.date) -> Plans:
     """Summary of the programmes of these patients for lists, in one statement."""
     columns = (planned_visit.c[name] for name in ("planned_on", "session_id", "kind"))
-    known = planned_visit.c.session_id.is_not(None) | (planned_visit.c.planned_on >= today)
+    relevant = planned_visit.c.session_id.is_not(None) | (planned_visit.c.planned_on >= today)
     query = select(programme.c.patient_id, *columns).join(planned_visit)
-    rows = c.execute(query.where(programme.c.patient_id.in_(patient_ids), known)).all()
+    rows = c.execute(query.where(programme.c.patient_id.in_(patient_ids), relevant)).all()
     return Plans(
         kinds={row.session_id: row.kind for row in rows if row.session_id is not None},
         running=frozenset(row.patient_id for row in rows if row.planned_on >= today),
@@ -193,11 +193,11 @@ def change_visit(
 
 def end(c: Connection, actor: audit.Actor | None, programme_id: str) -> None:
     """Remove a programme and its plan, but not its sessions; raises NotFound."""
-    found = get(c, programme_id)
+    current = get(c, programme_id)
     c.execute(delete(planned_visit).where(planned_visit.c.programme_id == programme_id))
     c.execute(delete(programme).where(programme.c.id == programme_id))
-    said = {"programme_id": programme_id, "done": found.count("done"), "visits": len(found.visits)}
-    audit.record(c, actor, "programme.ended", "patient", found.patient_id, said)
+    detail = {"programme_id": programme_id, "done": current.count("done"), "visits": len(current.visits)}
+    audit.record(c, actor, "programme.ended", "patient", current.patient_id, detail)
 
 
 def visit_of(c: Connection, session_id: str) -> PlannedVisit | None:
@@ -218,12 +218,12 @@ def _visit(c: Connection, visit_id: str) -> Any:
 
 def _check_session(c: Connection, row: Any, session_id: str) -> None:
     if sessions.get(c, session_id).patient_id != row.patient_id:
-        raise Conflict("other_patient", "This session belongs to another patient.")
+        raise Conflict("other_patient", "This visit belongs to another patient.")
     if row.session_id not in {None, session_id}:
-        raise Conflict("visit_taken", f"{row.label} has a session already; unlink that one first.")
-    other = visit_of(c, session_id)
-    if other is not None and other.id != row.id:
-        raise Conflict("session_planned", f"This session is {other.label} already; unlink it there first.")
+        raise Conflict("visit_taken", f"{row.label} already has a visit; unlink it first.")
+    linked = visit_of(c, session_id)
+    if linked is not None and linked.id != row.id:
+        raise Conflict("session_planned", f"This visit is already {linked.label}; unlink it there first.")
 
 
 _VISITS = select(planned_visit, session.c.performed_on).join(
@@ -243,13 +243,13 @@ def _programmes(c: Connection, which: ColumnElement[bool]) -> list[Programme]:
     query = theirs.join(programme, programme.c.id == planned_visit.c.programme_id).where(which)
     rows = c.execute(query.order_by(programme.c.starts_on.desc(), programme.c.id, planned_visit.c.position))
     today = now().date()
-    found = []
+    result = []
     for _, group in itertools.groupby(rows, key=lambda row: row.programme_id):
         planned = list(group)
         own = {name: getattr(planned[0], f"of_{name}") for name in _OWN}
         visits = judge_states(tuple(_planned(row) for row in planned), today)
-        found.append(Programme(**own, words=COURSES[own["template"]].words, visits=visits))
-    return found
+        result.append(Programme(**own, words=COURSES[own["template"]].words, visits=visits))
+    return result
 
 
 _OWN = ("id", "patient_id", "template", "starts_on", "created_at")
@@ -257,14 +257,14 @@ _OWN = ("id", "patient_id", "template", "starts_on", "created_at")
 
 def judge_states(visits: tuple[PlannedVisit, ...], today: dt.date) -> tuple[PlannedVisit, ...]:
     """Determine the state of each visit: done, missed, next or planned; in order of date."""
-    found: list[PlannedVisit] = []
+    result: list[PlannedVisit] = []
     ahead = False
     for visit in sorted(visits, key=lambda v: v.planned_on):
         if visit.session_id is not None:
-            found.append(replace(visit, state="done"))
+            result.append(replace(visit, state="done"))
         elif visit.planned_on < today:
-            found.append(replace(visit, state="missing"))
+            result.append(replace(visit, state="missing"))
         else:
-            found.append(replace(visit, state="planned" if ahead else "next"))
+            result.append(replace(visit, state="planned" if ahead else "next"))
             ahead = True
-    return tuple(found)
+    return tuple(result)

@@ -136,8 +136,8 @@ def change(
     c: Connection, actor: audit.Actor | None, session_id: str, values: Mapping[str, object]
 ) -> Session:
     """Update some of CHANGEABLE; raises NotFound, ServiceError bad_value."""
-    before = get(c, session_id)
-    changed = {name: value for name, value in _checked(values).items() if getattr(before, name) != value}
+    previous = get(c, session_id)
+    changed = {name: value for name, value in _checked(values).items() if getattr(previous, name) != value}
     if changed:
         c.execute(update(session).where(session.c.id == session_id).values(**changed))
         audit.record(c, actor, "session.changed", "session", session_id, {"fields": sorted(changed)})
@@ -159,7 +159,7 @@ def of_patient(c: Connection, patient_id: str) -> list[Session]:
 
 def search(
     c: Connection,
-    who: Identity | None,
+    user: Identity | None,
     *,
     search: str = "",
     protocol: Protocol | None = None,
@@ -171,10 +171,10 @@ def search(
 
     Parameters
     ----------
-    who : None = the system, which sees all.
+    user : None = the system, which sees all.
     since, until : dates, inclusive, None = open. ids : restrict to these; empty = all.
     """
-    query = only_seen(_QUERY, who).order_by(
+    query = only_seen(_QUERY, user).order_by(
         patient.c.code, session.c.performed_on, session.c.created_at, session.c.id
     )
     if text := search.strip():
@@ -199,8 +199,8 @@ def newest_of(c: Connection, patient_ids: Collection[str]) -> dict[str, Session]
         select(session.c.id, place.label("place")).where(session.c.patient_id.in_(patient_ids)).subquery()
     )
     newest = select(ranked.c.id).where(ranked.c.place == 1)
-    found = make_all(Session, c.execute(_QUERY.where(session.c.id.in_(newest))))
-    return {s.patient_id: s for s in found}
+    rows = make_all(Session, c.execute(_QUERY.where(session.c.id.in_(newest))))
+    return {s.patient_id: s for s in rows}
 
 
 def list_walks(c: Connection, patient_ids: Collection[str]) -> dict[str, list[WalkedSession]]:
@@ -213,14 +213,18 @@ def list_walks(c: Connection, patient_ids: Collection[str]) -> dict[str, list[Wa
         .where(session.c.feedback.is_(False))
         .order_by(*_NEWEST)
     )
-    found: dict[str, list[WalkedSession]] = {}
+    walks: dict[str, list[WalkedSession]] = {}
     conditions: dict[tuple[Any, ...], WalkingCondition] = {}
     for session_id, patient_id, performed_on, *walked in c.execute(query):
-        told = tuple(walked)
-        if told not in conditions:  # a clinic has few
-            conditions[told] = WalkingCondition(**dict(zip(("protocol", *CHOICES), told, strict=True)))
-        found.setdefault(patient_id, []).append(WalkedSession(session_id, performed_on, conditions[told]))
-    return found
+        condition_key = tuple(walked)
+        if condition_key not in conditions:  # a clinic has few
+            conditions[condition_key] = WalkingCondition(
+                **dict(zip(("protocol", *CHOICES), condition_key, strict=True))
+            )
+        walks.setdefault(patient_id, []).append(
+            WalkedSession(session_id, performed_on, conditions[condition_key])
+        )
+    return walks
 
 
 _NEWEST = (session.c.performed_on.desc(), session.c.created_at.desc(), session.c.id)
@@ -259,10 +263,10 @@ _OF_PATIENT = _QUERY.where(session.c.patient_id == bindparam("of_patient")).orde
 def _checked(values: Mapping[str, object]) -> dict[str, Any]:
     unknown = values.keys() - CHANGEABLE
     if unknown:
-        raise ServiceError("bad_value", f"A session has no {', '.join(sorted(unknown))}.")
+        raise ServiceError("bad_value", f"A visit has no {', '.join(sorted(unknown))}.")
     checked = dict(values)
     if "title" in checked and not 1 <= len(str(checked["title"])) <= 200:
-        raise ServiceError("bad_value", "A session's title has 1 to 200 characters.")
+        raise ServiceError("bad_value", "A visit's title has 1 to 200 characters.")
     if checked.get("protocol", PROTOCOLS[0]) not in PROTOCOLS:
         raise ServiceError("bad_value", f"The protocol is one of {', '.join(PROTOCOLS)}.")
     for name, words in CHOICES.items():

@@ -80,8 +80,8 @@ def read_overrides(path: Path | None, estimator: str) -> dict[str, Any]:
     try:
         chosen = read_json(path.read_bytes()) if path else {}
     except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise InputError("config_unreadable", f"{path} cannot be read as JSON: {why}.") from error
+        reason = getattr(error, "strerror", None) or error
+        raise InputError("config_unreadable", f"{path} cannot be read as JSON: {reason}.") from error
     if not isinstance(chosen, dict) or not isinstance(chosen.get("poses", {}), dict):
         raise InputError("config_unreadable", f'{path} is not of the form {{"stage": {{"name": value}}}}.')
     if estimator != "auto":

@@ -101,7 +101,7 @@ def _report(database: Source) -> None:
     from sagittal.server.storage.schema.tables import job
     from sagittal.server.uploads.recordings import ANALYSE
 
-    began, told = time.monotonic(), ""
+    began, last_text = time.monotonic(), ""
     if is_compiling() or not has_compiled_filters():
         say("Compiling the filters (once for you and this version, up to a minute) …")
     pause = threading.Event()
@@ -114,8 +114,8 @@ def _report(database: Source) -> None:
                     .where(job.c.kind == ANALYSE, job.c.finished_at.is_not(None))
                 ).scalar_one()
             text = f"{ended} of {len(VISITS)} sessions analysed ({time.monotonic() - began:.0f} s)"
-            if ended and text.split(" (")[0] != told:
-                told = text.split(" (")[0]
+            if ended and text.split(" (")[0] != last_text:
+                last_text = text.split(" (")[0]
                 say(text)
             if ended >= len(VISITS):
                 return

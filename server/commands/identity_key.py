@@ -41,25 +41,25 @@ def identity_key(
         require_current(settings.database_source)
         with closing(Database(settings.database_source)) as db:
             if what == "make":
-                said = _tell_made(file, identities.make_key(db, file))
+                message = _tell_made(file, identities.make_key(db, file))
             elif what == "change":
                 name, count = identities.change_key(db, file)
-                said = (
+                message = (
                     f"{count} patients' names are encrypted by key {name} now. Keep a copy of {file} on "
                     "paper. The old copy is needed for unencrypted backups from before.\n"
                 )
             else:
                 gone = identities.discard_unreadable(db, file, really=really, without_key=without_key)
-                said = "".join(f"patient {one}\n" for one in gone)
-                said += f"{len(gone)} patients' names cannot be read with {file}"
+                message = "".join(f"patient {one}\n" for one in gone)
+                message += f"{len(gone)} patients' names cannot be read with {file}"
                 if not gone:
-                    said += ".\n"
+                    message += ".\n"
                 else:
-                    said += " and were removed.\n" if really else "; --really removes them for good.\n"
+                    message += " and were removed.\n" if really else "; --really removes them for good.\n"
     except (MigrationError, SagittalError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
-    sys.stdout.write(said)
+    sys.stdout.write(message)
     sys.stdout.flush()
     return 0
 

@@ -64,7 +64,7 @@ def research(
         with closing(Database(settings.database_source)) as db:
             if who is not None:
                 return _name_person(db, secret, who)
-            chosen, asked = _choose(db, patients, without_consent)
+            chosen, requested = _choose(db, patients, without_consent)
             target = (out or Path()).absolute()
             _write_zip(target, settings, db, secret, chosen, signals)
     except (MigrationError, SagittalError) as error:
@@ -72,19 +72,21 @@ def research(
         return 1
     if is_new:
         sys.stdout.write(f"{key} is a new key: who has it can lead pseudonyms back. Keep it in the clinic.\n")
-    sys.stdout.write(f"Written: {target}, {len(chosen)} patients; {asked - len(chosen)} have not agreed.\n")
+    sys.stdout.write(
+        f"Written: {target}, {len(chosen)} patients; {requested - len(chosen)} have not agreed.\n"
+    )
     sys.stdout.flush()
     return 0
 
 
-def _name_person(db: Database, secret: ResearchKey, who: str) -> int:
+def _name_person(db: Database, secret: ResearchKey, pseudonym: str) -> int:
     """Print the patient with a pseudonym; 1 if unknown."""
     from sagittal.server.downloads import deidentified
 
     with db.read() as c:
-        found = deidentified.find_person(c, secret, who)
-    sys.stdout.write(f"{who} is {found.code}\n" if found else f"{who} is nobody here\n")
-    return 0 if found else 1
+        person = deidentified.find_person(c, secret, pseudonym)
+    sys.stdout.write(f"{pseudonym} is {person.code}\n" if person else f"{pseudonym} is nobody here\n")
+    return 0 if person else 1
 
 
 def _choose(db: Database, codes: tuple[str, ...], without_consent: bool) -> tuple[list[Patient], int]:
@@ -93,11 +95,11 @@ def _choose(db: Database, codes: tuple[str, ...], without_consent: bool) -> tupl
     from sagittal.server.downloads import deidentified
 
     with db.read() as c:
-        asked = deidentified.list_chosen(c, codes)
-        chosen = [p for p in asked if without_consent or deidentified.has_agreed(c, p.id)]
+        requested = deidentified.list_chosen(c, codes)
+        chosen = [p for p in requested if without_consent or deidentified.has_agreed(c, p.id)]
     if not chosen:
         raise SagittalError("nobody", "None of them has agreed to research; see --without-consent.")
-    return chosen, len(asked)
+    return chosen, len(requested)
 
 
 def _write_zip(

@@ -41,22 +41,24 @@ def restore(
     try:
         clinic_key = None if key is None else read_key(key)
         if test:
-            found = restoring.try_restore(archive.absolute(), settings, clinic_key)
+            restored = restoring.try_restore(archive.absolute(), settings, clinic_key)
         else:
             gone = None if erased is None else read_tombstones(erased)
-            found = restoring.restore(archive.absolute(), settings, clinic_key, gone)
+            restored = restoring.restore(archive.absolute(), settings, clinic_key, gone)
     except (BackupFileError, TombstoneError, RestoreError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
     sys.stdout.write(
         f"{'It could be restored' if test else f'Restored into {settings.data_dir}'}: the clinic of "
-        f"{found.created_at:%Y-%m-%d %H:%M}Z, {found.patients} patients, {found.sessions} visits, "
-        f"{found.files} files; every hash, the database and the audit chain are right. "
-        f"{found.erased_again} erased again.\n"
+        f"{restored.created_at:%Y-%m-%d %H:%M}Z, {restored.patients} patients, {restored.sessions} visits, "
+        f"{restored.files} files; every hash, the database and the audit chain are right. "
+        f"{restored.erased_again} erased again.\n"
     )
-    if found.missing:
-        sys.stdout.write(f"{found.missing} files were gone when the backup was made; see `sagittal check`.\n")
-    if not found.names_open:
+    if restored.missing:
+        sys.stdout.write(
+            f"{restored.missing} files were gone when the backup was made; see `sagittal check`.\n"
+        )
+    if not restored.names_open:
         sys.stdout.write(
             "The key that opens patients' names was not in the backup. It has to be at "
             f"{settings.identity_key_file}; `sagittal check` says whether it opens them.\n"

@@ -182,11 +182,11 @@ def say(text: str) -> None:
     sys.stdout.flush()
 
 
-def _when_started(server: object, then: Callable[[], None]) -> None:
+def _when_started(server: object, callback: Callable[[], None]) -> None:
     """Call `then` once the server responds."""
     pause = threading.Event()
     while not getattr(server, "started", False):
         if getattr(server, "should_exit", False):
             return
         pause.wait(0.05)
-    then()
+    callback()

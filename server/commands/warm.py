@@ -40,6 +40,6 @@ def _analyse_walk() -> None:
     from sagittal.core.pipeline import analyse
     from sagittal.core.simulate import simulate_scenario
 
-    made = analyse(simulate_scenario("comfortable", 1).recording)
-    if made.problem is not None:
-        raise RuntimeError(f"The simulated walk was not analysed: {made.problem.message}")
+    analysis = analyse(simulate_scenario("comfortable", 1).recording)
+    if analysis.problem is not None:
+        raise RuntimeError(f"The simulated walk was not analysed: {analysis.problem.message}")

@@ -150,24 +150,24 @@ def fill(settings: Settings) -> None:
 
     with closing(Database(settings.database_source)) as db:
         blobs = open_blobs(settings)
-        known: dict[str, str] = {}
+        patient_ids: dict[str, str] = {}
         with db.write() as c:
             for person in dict.fromkeys(v.person for v in VISITS):
                 fields = {k: v for k, v in vars(person).items() if k != "code"}
-                known[person.code] = patients.create(c, None, code=person.code, **fields).id
+                patient_ids[person.code] = patients.create(c, None, code=person.code, **fields).id
             person, content = PRESCRIBED
-            prescriptions.write(c, ReviewedAnalyses(blobs), None, known[person.code], content)
+            prescriptions.write(c, ReviewedAnalyses(blobs), None, patient_ids[person.code], content)
         for visit in VISITS:
-            made = record(visit)
-            worn = label_sensors(made.recording)
-            files = mt_files(worn, visit.script, made.first_counter)
-            manifest = _manifest(made) | {"sensors": dict(worn.segments)}
-            _add(db, blobs, settings, visit, known[visit.person.code], manifest, files)
+            simulation = record(visit)
+            labelled = label_sensors(simulation.recording)
+            files = mt_files(labelled, visit.script, simulation.first_counter)
+            manifest = _manifest(simulation) | {"sensors": dict(labelled.segments)}
+            _add(db, blobs, settings, visit, patient_ids[visit.person.code], manifest, files)
 
 
-def _manifest(made: Simulation) -> dict[str, object]:
+def _manifest(simulation: Simulation) -> dict[str, object]:
     """Measurements that a therapist takes with tape measure and goniometer during quiet standing."""
-    truth = made.truth
+    truth = simulation.truth
     apart = truth.p["foot_l"][0, :2] - truth.p["foot_r"][0, :2]
     angles = {n: round(degrees(a)) for n, a in truth.zero_offset.items() if n.startswith(GONIOMETER)}
     subject = {"standing_width_m": round(float(hypot(*apart)), 2), "standing_angles_deg": angles}
@@ -184,10 +184,10 @@ def _add(
     files: Mapping[str, bytes],
 ) -> None:
     day = now().date() - dt.timedelta(days=visit.days_ago)
-    said = visit.condition.stated
+    stated_conditions = visit.condition.stated
     with db.write() as c:
         session = sessions.create(
-            c, None, patient_id, title=visit.title, performed_on=day, note=visit.note, **said
+            c, None, patient_id, title=visit.title, performed_on=day, note=visit.note, **stated_conditions
         )
     for name, content in files.items():
         with receiving.receive(db, blobs, settings, None, session.id, name) as upload:

@@ -39,7 +39,7 @@ def write_archive(
     out: IO[bytes],
     blobs: BlobStore,
     recording: StoredRecording,
-    found: AnalysisRecord,
+    record: AnalysisRecord,
     edits: EditHistory,
     report: Mapping[str, bytes],
     signed: SignedDocuments | None,
@@ -68,35 +68,35 @@ def write_archive(
 
         for name, content in _originals(blobs, recording):
             add(name, content)
-        add(EPISODE_MANIFEST, _json(found.manifest or {}))
-        add(EPISODE_CONFIG, _json(_settings(blobs, recording, found)))
-        for name, blob in found.files.items():
-            add(f"results/{name}", blobs.read(found.patient_id, blob.sha256))
+        add(EPISODE_MANIFEST, _json(record.manifest or {}))
+        add(EPISODE_CONFIG, _json(_settings(blobs, recording, record)))
+        for name, blob in record.files.items():
+            add(f"results/{name}", blobs.read(record.patient_id, blob.sha256))
         for name, content in report.items():
             add(f"report/{name}", content)
         if signed is not None:
             for name, blob in signed.files.items():
-                add(f"report/{name}", blobs.read(found.patient_id, blob.sha256))
+                add(f"report/{name}", blobs.read(record.patient_id, blob.sha256))
         mark = {
             "schema": SCHEMA,
             "written_by": CODE_VERSION,
-            "analysed_by": found.code_version,
-            "analysed_at": found.created_at.isoformat(timespec="seconds"),
-            "config_sha256": found.config_sha256,
+            "analysed_by": record.code_version,
+            "analysed_at": record.created_at.isoformat(timespec="seconds"),
+            "config_sha256": record.config_sha256,
             "edits": [m.edit.to_json() for m in edits.made],
-            "signed_report": None if signed is None else signed.describe(found, edits),
+            "signed_report": None if signed is None else signed.describe(record, edits),
             "sha256": dict(sha256),
         }
         add(EPISODE_MARK, _json(mark))
 
 
-def _settings(blobs: BlobStore, recording: StoredRecording, found: AnalysisRecord) -> Mapping[str, Any]:
+def _settings(blobs: BlobStore, recording: StoredRecording, record: AnalysisRecord) -> Mapping[str, Any]:
     """Settings of the analysis, including those of an archive among the recording's files."""
     from sagittal.server.results.analysing import choose_config  # slow imports
     from sagittal.server.storage.files.blob_source import open_source
 
     files = [open_source(blobs, recording.patient_id, f.name, f.size, f.sha256) for f in recording.files]
-    return choose_config(files, found.config)
+    return choose_config(files, record.config)
 
 
 def _originals(blobs: BlobStore, recording: StoredRecording) -> Iterator[tuple[str, bytes]]:

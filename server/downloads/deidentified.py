@@ -79,8 +79,8 @@ class ResearchKey:
         drawn = int.from_bytes(self._digest("days", patient_id)[:8], "big")
         return day - dt.timedelta(days=1 + drawn % MOST_SHIFT_DAYS)
 
-    def _digest(self, what: str, identity: str) -> bytes:
-        return hmac.digest(self.secret, f"{what}:{identity}".encode(), "sha256")
+    def _digest(self, value: str, identity: str) -> bytes:
+        return hmac.digest(self.secret, f"{value}:{identity}".encode(), "sha256")
 
 
 def open_key(path: Path) -> ResearchKey:
@@ -170,8 +170,8 @@ def export_deidentified(
 
 def _open(db: Database, blobs: BlobStore, key: ResearchKey, person: Patient, visit: Session) -> ExportContent:
     with db.read() as c:
-        found = analyses.get_shown(c, visit.id)
-        edits = edit_log.edits_of(c, found.id).edits
+        record = analyses.get_shown(c, visit.id)
+        edits = edit_log.edits_of(c, record.id).edits
     facts = VisitFacts(
         subject=key.name_person(person.id),
         visit=key.name_visit(visit.id),
@@ -181,7 +181,7 @@ def _open(db: Database, blobs: BlobStore, key: ResearchKey, person: Patient, vis
         height_m=person.find_height(visit),
         version=CODE_VERSION,
     )
-    readers = {name: partial(analyses.file_bytes, blobs, found, name) for name in found.files}
+    readers = {name: partial(analyses.file_bytes, blobs, record, name) for name in record.files}
     return open_content(readers, facts, edits)
 
 

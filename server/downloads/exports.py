@@ -61,26 +61,26 @@ class ExportOffer:
 
 
 def list_offers(
-    c: Connection, patient: Patient, session: Session, found: analyses.AnalysisRecord
+    c: Connection, patient: Patient, session: Session, record: analyses.AnalysisRecord
 ) -> list[ExportOffer]:
     """All formats in which an analysis of a session can be exported, and their progress.
 
     An export is offered again after an edit or a correction of patient or visit; formats that contain the
     signed report also after it was signed, reopened or printed.
     """
-    possible = kinds.list_possible(found.files)
-    params = _collect_params(c, patient, session, found, possible)
-    keys = {name: make_key(found, EXPORT, own) for name, own in params.items()}
+    possible = kinds.list_possible(record.files)
+    params = _collect_params(c, patient, session, record, possible)
+    keys = {name: make_key(record, EXPORT, own) for name, own in params.items()}
     query = select(*VIEW_COLUMNS, job.c.key).where(job.c.key.in_(keys.values())).order_by(job.c.seq)
     rows: list[Any] = list(c.execute(query))
     newest = {row.key: job_view(row) for row in rows}
-    return [_offer(found, kind, newest.get(keys[kind.name])) for kind in possible]
+    return [_offer(record, kind, newest.get(keys[kind.name])) for kind in possible]
 
 
-def _offer(found: analyses.AnalysisRecord, kind: ExportKind, made: JobView | None) -> ExportOffer:
-    name = None if made is None else name_file(kind, made.id)
+def _offer(record: analyses.AnalysisRecord, kind: ExportKind, view: JobView | None) -> ExportOffer:
+    name = None if view is None else name_file(kind, view.id)
     return ExportOffer(
-        kind.name, kind.label, kind.what, made, found.id, name if name in found.files else None
+        kind.name, kind.label, kind.what, view, record.id, name if name in record.files else None
     )
 
 
@@ -95,15 +95,15 @@ def submit(
         the session or its analysis. InputError unknown_export. Conflict export_not_possible.
     """
     chosen = kinds.find_kind(kind)
-    found = analyses.get_shown(c, session_id)
-    if chosen not in kinds.list_possible(found.files):
-        lacking = ", ".join(name for name in chosen.needs if name not in found.files)
+    record = analyses.get_shown(c, session_id)
+    if chosen not in kinds.list_possible(record.files):
+        lacking = ", ".join(name for name in chosen.needs if name not in record.files)
         raise Conflict(
-            "export_not_possible", f"This analysis has no {lacking}, which “{chosen.label}” is made from."
+            "export_not_possible", f"This analysis has no {lacking}, which “{chosen.label}” requires."
         )
-    session, patient = sessions.get(c, session_id), patients.get(c, found.patient_id)
-    params = _collect_params(c, patient, session, found, [chosen])
-    return submit_for(c, queue, actor, found, EXPORT, "export.requested", params[kind])
+    session, patient = sessions.get(c, session_id), patients.get(c, record.patient_id)
+    params = _collect_params(c, patient, session, record, [chosen])
+    return submit_for(c, queue, actor, record, EXPORT, "export.requested", params[kind])
 
 
 def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
@@ -134,7 +134,7 @@ def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Map
         c.execute(insert(analysis_file).values(analysis_id=claim.params["analysis_id"], **row))
 
 
-def _read_signed(files: Sequence[SourceFile], told: Mapping[str, Any]) -> SignedForm:
+def _read_signed(files: Sequence[SourceFile], report: Mapping[str, Any]) -> SignedForm:
     """The signed report of a job, as specified by `_collect_params`."""
     readers = {file.name: file.read for file in files}
     documents = tuple(
@@ -142,32 +142,32 @@ def _read_signed(files: Sequence[SourceFile], told: Mapping[str, Any]) -> Signed
         for name, media_type in MEDIA_TYPES.items()
         if SIGNED + name in readers
     )
-    known = ("version", "language", "signed_by", "signed_at", "of_these_numbers")
-    return SignedForm(**{name: told[name] for name in known}, documents=documents)
+    fields = ("version", "language", "signed_by", "signed_at", "of_these_numbers")
+    return SignedForm(**{name: report[name] for name in fields}, documents=documents)
 
 
 def _collect_params(
     c: Connection,
     patient: Patient,
     session: Session,
-    found: analyses.AnalysisRecord,
-    wanted: Sequence[ExportKind],
+    record: analyses.AnalysisRecord,
+    formats: Sequence[ExportKind],
 ) -> dict[str, dict[str, Any]]:
     """Job parameters of each format by name, fixed at submission."""
-    edits = edit_log.edits_of(c, found.id)
+    edits = edit_log.edits_of(c, record.id)
     shared: dict[str, Any] = {
-        "space": found.patient_id,
+        "space": record.patient_id,
         "files": [
             {"name": name, "size": blob.size, "sha256": blob.sha256}
-            for name, blob in found.files.items()
+            for name, blob in record.files.items()
             if not name.startswith(EXPORTED)
         ],
-        "analysis_id": found.id,
+        "analysis_id": record.id,
         "edits": [e.to_json() for e in edits.edits],
-        "visit": asdict(_describe_visit(patient, AnalysedSession(session, found, edits))),
+        "visit": asdict(_describe_visit(patient, AnalysedSession(session, record, edits))),
     }
-    params: dict[str, dict[str, Any]] = {kind.name: {**shared, "kind": kind.name} for kind in wanted}
-    handed_on = [kind.name for kind in wanted if kind.hands_on_signed]
+    params: dict[str, dict[str, Any]] = {kind.name: {**shared, "kind": kind.name} for kind in formats}
+    handed_on = [kind.name for kind in formats if kind.hands_on_signed]
     signed = signed_reports.find_documents(c, session.id) if handed_on else None
     if signed is not None:
         documents = [
@@ -177,7 +177,7 @@ def _collect_params(
         for name in handed_on:
             params[name] |= {
                 "files": shared["files"] + documents,
-                "signed": signed.describe(found, edits),
+                "signed": signed.describe(record, edits),
             }
     return params
 

@@ -12,6 +12,7 @@ from contextlib import closing
 import msgspec
 
 from sagittal.core.errors import SagittalError
+from sagittal.core.user_text import encode_user_text
 from sagittal.server.auth.identity import Identity
 from sagittal.server.downloads.studies import StudyChoice, make_study
 from sagittal.server.export.zipping import zip_files
@@ -20,7 +21,6 @@ from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.files.blob_opening import open_blobs
-from sagittal.web.user_text import encode_user_text
 
 
 class StudyReply(msgspec.Struct, frozen=True):
@@ -45,9 +45,9 @@ def main() -> None:
     line.send(msgspec.msgpack.encode(reply, enc_hook=encode_user_text))
 
 
-def _make(settings: Settings, who: Identity, choice: StudyChoice) -> StudyReply:
+def _make(settings: Settings, user: Identity, choice: StudyChoice) -> StudyReply:
     with closing(Database(settings.database_source)) as db:
-        tables, visits = make_study(db, ReviewedAnalyses(open_blobs(settings)), who, choice)
+        tables, visits = make_study(db, ReviewedAnalyses(open_blobs(settings)), user, choice)
     return StudyReply(zip_files(tables.files), tuple(visits))
 
 

@@ -65,13 +65,13 @@ def write_c3d(content: ExportContent) -> bytes:
             "C3D files need the library ezc3d, which is not installed; the administrator can add it with "
             "pip install 'sagittal[c3d]'.",
         ) from error
-    found = collect_trajectories(content)
+    trajectories = collect_trajectories(content)
     events = content.bundle.events.events
-    parts = find_parts(len(found.t_s), found.t_s, events)
+    parts = find_parts(len(trajectories.t_s), trajectories.t_s, events)
     files = {}
     for i, (first, last) in enumerate(parts, start=1):
         name = "walk.c3d" if len(parts) == 1 else f"walk-{i}.c3d"
-        files[name] = _write_part(ezc3d.c3d(), content, found, first, last)
+        files[name] = _write_part(ezc3d.c3d(), content, trajectories, first, last)
     return zip_files(files)
 
 
@@ -96,22 +96,22 @@ def collect_trajectories(content: ExportContent) -> Trajectories:
 
 
 def _joints(angles: JointAngles) -> dict[str, Floats]:
-    found = {}
+    centres = {}
     for side in SIDES:
         for joint, parts in SIGNS.items():
             names = [f"{name}_{SUFFIX[side]}" for name, _, _ in parts]
             if all(name in angles.angles for name in names):
                 columns = [np.degrees(angles.angles[name]) for name in names]
-                found[f"{side[0].upper()}{joint.capitalize()}Angles"] = np.stack(columns, axis=1)
-    return found
+                centres[f"{side[0].upper()}{joint.capitalize()}Angles"] = np.stack(columns, axis=1)
+    return centres
 
 
 def _pelvis(angles: JointAngles) -> dict[str, Floats]:
     """Tilt, upward obliquity and rotation; rotation is the heading in the world, without a walkway axis."""
-    given, heading = angles.angles, angles.headings.get("pelvis")
-    if "pelvis_tilt" not in given or heading is None:
+    by_name, heading = angles.angles, angles.headings.get("pelvis")
+    if "pelvis_tilt" not in by_name or heading is None:
         return {}
-    tilt, up = given["pelvis_tilt"], given["pelvis_obliquity"]
+    tilt, up = by_name["pelvis_tilt"], by_name["pelvis_obliquity"]
     return {
         "RPelvisAngles": np.degrees(np.stack((tilt, up, heading), axis=1)),
         "LPelvisAngles": np.degrees(np.stack((tilt, -up, -heading), axis=1)),
@@ -136,24 +136,26 @@ def _lie_within(times: Floats, t_s: Floats, first: int, last: int) -> np.ndarray
     return np.asarray((times >= t_s[first]) & (times < end))
 
 
-def _write_part(file: Any, content: ExportContent, found: Trajectories, first: int, last: int) -> bytes:
-    columns = {**found.markers_mm, **found.angles_deg}
+def _write_part(
+    file: Any, content: ExportContent, trajectories: Trajectories, first: int, last: int
+) -> bytes:
+    columns = {**trajectories.markers_mm, **trajectories.angles_deg}
     points = np.full((4, len(columns), last - first), 1.0)
     for i, values in enumerate(columns.values()):
         points[:3, i] = values[first:last].T
-    file["parameters"]["POINT"]["RATE"]["value"] = [found.rate_hz]
+    file["parameters"]["POINT"]["RATE"]["value"] = [trajectories.rate_hz]
     file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
     file["parameters"]["POINT"]["LABELS"]["value"] = list(columns)
     file["data"]["points"] = points
-    file.add_parameter("POINT", "ANGLES", list(found.angles_deg))
+    file.add_parameter("POINT", "ANGLES", list(trajectories.angles_deg))
     file.add_parameter("POINT", "ANGLE_UNITS", ["deg"])
     if content.estimated:
         file.add_parameter("SAGITTAL", "ESTIMATED", list(content.estimated))
-    start = float(found.t_s[first])
+    start = float(trajectories.t_s[first])
     events = content.bundle.events.events
-    own = _lie_within(np.array([e.time_s for e in events]), found.t_s, first, last)
+    own = _lie_within(np.array([e.time_s for e in events]), trajectories.t_s, first, last)
     _add_events(file, content, [e for e, mine in zip(events, own, strict=True) if mine], start)
-    began = _lie_within(np.array([c.start_s for c in content.cycles]), found.t_s, first, last)
+    began = _lie_within(np.array([c.start_s for c in content.cycles]), trajectories.t_s, first, last)
     _add_cycles(file, [c for c, mine in zip(content.cycles, began, strict=True) if mine], start)
     with tempfile.TemporaryDirectory(prefix="sagittal-c3d-") as folder:
         path = Path(folder) / "walk.c3d"

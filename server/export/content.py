@@ -57,8 +57,8 @@ class VisitFacts:
     @classmethod
     def of_json(cls, values: Mapping[str, Any]) -> Self:
         """Create from job parameters; unknown keys are ignored."""
-        known = {f.name for f in fields(cls)}
-        return cls(**{k: v for k, v in values.items() if k in known})
+        names = {f.name for f in fields(cls)}
+        return cls(**{k: v for k, v in values.items() if k in names})
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,8 +218,8 @@ def open_content(
     if not edits:
         columns = read_columns(files["strides.csv"]()) if "strides.csv" in files else {}
         return replace(content, columns=columns)
-    known = tracks.read_tracks(content.read_needed(tracks.NAME), stored.events, stored.angles)
-    measured = measure_gait(known, edits)
+    stored_tracks = tracks.read_tracks(content.read_needed(tracks.NAME), stored.events, stored.angles)
+    measured = measure_gait(stored_tracks, edits)
     reviewed = apply_review(stored, measured, edits)
     # as an analysis stores them: what is not finite is undefined
     rows: list[dict[str, Any]] = [parameter_row(p) for p in reviewed.parameters]

@@ -173,44 +173,44 @@ def _ucum(unit: str) -> str:
     return UCUM.get(unit, f"{{{unit}}}")
 
 
-def _absent(why: str) -> dict[str, Any]:
+def _absent(reason: str) -> dict[str, Any]:
     system = "http://terminology.hl7.org/CodeSystem/data-absent-reason"
-    return {"coding": [{"system": system, "code": "unknown"}], "text": why}
+    return {"coding": [{"system": system, "code": "unknown"}], "text": reason}
 
 
 def _observe(p: Parameter) -> dict[str, Any]:
     """Observation of one value with its spread, or the reason of its absence."""
-    found: dict[str, Any] = {
+    observation: dict[str, Any] = {
         "resourceType": "Observation",
         "code": _code(p.name, label_parameter(p.name)),
     }
     if p.side is not None:
-        found["bodySite"] = {"text": SIDE_WORDS[p.side]}
+        observation["bodySite"] = {"text": SIDE_WORDS[p.side]}
     if p.mean is None:
-        return found | {"dataAbsentReason": _absent(reason_words(p.reason))}
-    found["valueQuantity"] = _quantity(p.mean, p.unit, _ucum(p.unit))
-    given = {"strides_behind": p.n, "standard_deviation": p.sd, "uncertainty_95": p.uncertainty}
-    found["component"] = [
+        return observation | {"dataAbsentReason": _absent(reason_words(p.reason))}
+    observation["valueQuantity"] = _quantity(p.mean, p.unit, _ucum(p.unit))
+    components = {"strides_behind": p.n, "standard_deviation": p.sd, "uncertainty_95": p.uncertainty}
+    observation["component"] = [
         {
             "code": _code(name, SPREAD[name][0]),
             "valueQuantity": _quantity(value, p.unit if own is None else "", own or _ucum(p.unit)),
         }
-        for name, value in given.items()
+        for name, value in components.items()
         if value is not None
         for own in (SPREAD[name][1],)
     ]
     if p.estimated:
-        found["note"] = [{"text": "From a model of the leg; no two sensors measure this angle."}]
-    return found
+        observation["note"] = [{"text": "From a model of the leg; no two sensors measure this angle."}]
+    return observation
 
 
 def _describe_patient(content: ExportContent) -> dict[str, Any]:
     v = content.visit
-    found = {
+    resource = {
         "resourceType": "Patient",
         "identifier": [{"system": SUBJECTS, "value": v.code or v.subject}],
     }
-    return found | ({} if v.sex is None else {"gender": v.sex})
+    return resource | ({} if v.sex is None else {"gender": v.sex})
 
 
 def _define_codes(values: Sequence[Parameter]) -> dict[str, Any]:

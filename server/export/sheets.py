@@ -64,7 +64,7 @@ TABLE_COLUMNS: Final = {
 
 def list_about(content: ExportContent) -> TableSheet:
     """Table of patient, visit, conditions and software."""
-    v, made = content.visit, content.bundle.provenance
+    v, origin = content.visit, content.bundle.provenance
     quality, angles = content.bundle.quality, content.bundle.angles
     rows: list[Row] = [
         ("subject", v.subject),
@@ -83,9 +83,9 @@ def list_about(content: ExportContent) -> TableSheet:
         ("angle_zero", None if angles is None else angles.zero),
         ("edits", len(content.edits)),
         ("exported_by", f"Sagittal {v.version}".strip()),
-        ("analysed_by", made.get("version")),
-        ("parameters_sha256", made.get("parameters_sha256")),
-        *((f"input_sha256 {name}", digest) for name, digest in (made.get("input_sha256") or {}).items()),
+        ("analysed_by", origin.get("version")),
+        ("parameters_sha256", origin.get("parameters_sha256")),
+        *((f"input_sha256 {name}", digest) for name, digest in (origin.get("input_sha256") or {}).items()),
         ("notice", "Research and documentation software, not a medical device, not for diagnosis."),
     ]
     return TableSheet("About", ("what", "value"), tuple(rows))

@@ -37,6 +37,6 @@ class ZipSink(io.RawIOBase):
 
     def take(self) -> bytes:
         """Return the bytes written since the last call."""
-        taken = b"".join(self._pieces)
+        content = b"".join(self._pieces)
         self._pieces.clear()
-        return taken
+        return content

@@ -34,11 +34,11 @@ async def carry_messages(
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
-        why = over.result() if over is not None and over.done() else None
+        end_reason = over.result() if over is not None and over.done() else None
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        code, reason = _close_code(up) if why is None else (WS_1008_POLICY_VIOLATION, why)
+        code, reason = _close_code(up) if end_reason is None else (WS_1008_POLICY_VIOLATION, end_reason)
         # the client may be gone already
         with contextlib.suppress(RuntimeError, WebSocketDisconnect):
             await ws.close(code, reason)

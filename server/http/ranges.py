@@ -30,18 +30,18 @@ def answer_range(
     """
     tag = f'"{version}"'
     ours = {"Accept-Ranges": "bytes", "ETag": tag}
-    asked = _RANGE.fullmatch(headers.get("range", "").replace(" ", ""))
-    if asked is None or asked.group(1, 2) == ("", "") or headers.get("if-range", tag) != tag:
+    match = _RANGE.fullmatch(headers.get("range", "").replace(" ", ""))
+    if match is None or match.group(1, 2) == ("", "") or headers.get("if-range", tag) != tag:
         return _stream(read, 0, size, media_type, 200, ours)
-    first, last = asked.groups()
+    first, last = match.groups()
     start = max(size - int(last), 0) if not first else int(first)
     stop = min(int(last) + 1, size) if first and last else size
     if first and last and int(last) < int(first):
         return _stream(read, 0, size, media_type, 200, ours)  # no range at all
     if start >= size:
         return Response(status_code=416, headers={**ours, "Content-Range": f"bytes */{size}"})
-    said = {**ours, "Content-Range": f"bytes {start}-{stop - 1}/{size}"}
-    return _stream(read, start, stop, media_type, 206, said)
+    response_headers = {**ours, "Content-Range": f"bytes {start}-{stop - 1}/{size}"}
+    return _stream(read, start, stop, media_type, 206, response_headers)
 
 
 def _stream(
@@ -57,8 +57,8 @@ def _stream(
 
     def rest() -> Iterator[bytes]:
         yield first
-        for at in range(start + PIECE, stop, PIECE):
-            yield read(at, min(at + PIECE, stop))
+        for position in range(start + PIECE, stop, PIECE):
+            yield read(position, min(position + PIECE, stop))
 
     length = {"Content-Length": str(stop - start)}
     return StreamingResponse(rest(), status, {**headers, **length}, media_type)

@@ -67,8 +67,13 @@ class RequestObserver:
         if self._observe is not None:
             self._observe(scope["method"], pattern, status, took_s)
         if self._line:
-            told = {"method": scope["method"], "route": pattern, "status": status, "took_s": round(took_s, 4)}
-            log.info("request", extra=told)
+            fields = {
+                "method": scope["method"],
+                "route": pattern,
+                "status": status,
+                "took_s": round(took_s, 4),
+            }
+            log.info("request", extra=fields)
 
 
 def _find_pattern(scope: Scope) -> str:

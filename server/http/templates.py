@@ -106,16 +106,16 @@ def load_templates(language: str) -> Jinja2Templates:
     folder = FOLDER / "templates"
     is_source = language == SOURCE
     loader = FlushLeftLoader(folder) if is_source else SpokenLoader(folder)
-    kept = KeptBytecode(language) if VARIABLE in os.environ else None
+    bytecode = KeptBytecode(language) if VARIABLE in os.environ else None
     templates = Jinja2Templates(
-        env=SettledEnvironment(loader=loader, autoescape=True, bytecode_cache=kept),
+        env=SettledEnvironment(loader=loader, autoescape=True, bytecode_cache=bytecode),
     )
     templates.env.filters.update(FILTERS)
     templates.env.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
     if not is_source:
-        shown = Shown(load_catalogue(language))
-        templates.env.filters.update(shown.filters)
-        templates.env.globals.update(shown.functions)
+        display = Shown(load_catalogue(language))
+        templates.env.filters.update(display.filters)
+        templates.env.globals.update(display.functions)
         templates.env.globals["script_texts"] = f"/texts/{language}/{script_texts(language)[0]}.json"
     templates.env.globals["conditions"] = CHOICES
     templates.env.globals["plural"] = plural
@@ -138,8 +138,8 @@ def language_of(connection: HTTPConnection) -> str:
 
 
 def render(
-    request: Request, template: str, context: Mapping[str, Any], status_code: int = 200, **others: Any
+    request: Request, template: str, context: Mapping[str, Any], status_code: int = 200, **options: Any
 ) -> Response:
     """Render a page in the language of the user."""
     templates = TEMPLATES[language_of(request)]
-    return templates.TemplateResponse(request, template, dict(context), status_code=status_code, **others)
+    return templates.TemplateResponse(request, template, dict(context), status_code=status_code, **options)

@@ -102,11 +102,11 @@ class DeliveryLine:
     def close(self) -> None:
         """End the thread; accepted but unstarted jobs are picked up by another worker's polling."""
         self._closed.set()
-        told = None
+        cancelled = None
         while self._thread.is_alive():
             running = self._running
-            if running is not None and running is not told:
-                told = running
+            if running is not None and running is not cancelled:
+                cancelled = running
                 with suppress(RuntimeError):  # its loop has just ended
                     running.get_loop().call_soon_threadsafe(running.cancel)
             self._let_go()

@@ -68,9 +68,9 @@ class TableQueue:
     ) -> JobView:
         """See JobQueue."""
         same = and_(job.c.key == key, job.c.state.in_((*ACTIVE_STATES, "done")), ~job.c.cancel_requested)
-        found = c.execute(select(*VIEW_COLUMNS).where(same)).first()
-        if found:
-            return job_view(found)
+        row = c.execute(select(*VIEW_COLUMNS).where(same)).first()
+        if row:
+            return job_view(row)
         # one that is being cancelled still holds the key; it is not the one that was asked for now
         c.execute(
             update(job)
@@ -97,8 +97,8 @@ class TableQueue:
 
     def get(self, job_id: str) -> JobView | None:
         """See JobQueue."""
-        found = self._db.ask(select(*VIEW_COLUMNS).where(job.c.id == job_id))
-        return job_view(found[0]) if found else None
+        rows = self._db.ask(select(*VIEW_COLUMNS).where(job.c.id == job_id))
+        return job_view(rows[0]) if rows else None
 
     def cancel(self, c: Connection, job_id: str) -> JobView | None:
         """See JobQueue."""
@@ -128,7 +128,7 @@ class TableQueue:
                 .with_for_update(skip_locked=True)
                 .scalar_subquery()
             )
-            taken = (
+            claimed = (
                 update(job)
                 .where(job.c.seq == first)
                 .values(
@@ -143,11 +143,11 @@ class TableQueue:
                 )
                 .returning(*_CLAIMED)
             )
-            row = c.execute(taken).first()
+            row = c.execute(claimed).first()
         if row is None:
             return None
-        job_id, attempt, *rest = row
-        return Claim(job_id, attempt, worker, *rest)
+        job_id, attempt, *claim_values = row
+        return Claim(job_id, attempt, worker, *claim_values)
 
     def heartbeat(self, claim: Claim) -> LeaseState:
         """See JobQueue."""
@@ -159,10 +159,10 @@ class TableQueue:
 
     def look(self, claim: Claim) -> LeaseState:
         """See JobQueue."""
-        found = self._db.ask(select(job.c.cancel_requested, job.c.priority).where(_fence(claim)))
-        if not found:
+        rows = self._db.ask(select(job.c.cancel_requested, job.c.priority).where(_fence(claim)))
+        if not rows:
             return LeaseState.LOST
-        [row] = found
+        [row] = rows
         if row.cancel_requested:
             return LeaseState.CANCEL
         if row.priority < Priority.BEHIND:

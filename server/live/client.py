@@ -76,7 +76,7 @@ async def stream(
 async def _until_finished(sender: Sender, url: str, patience_s: float) -> None:
     pause, trouble = FIRST_PAUSE_S, ""
     while not sender.finished:
-        before = sender.progress
+        progress_before = sender.progress
         try:
             async with connect(
                 url,
@@ -104,7 +104,7 @@ async def _until_finished(sender: Sender, url: str, patience_s: float) -> None:
             trouble = str(error) or type(error).__name__
         if sender.finished:
             return
-        if sender.progress > before:
+        if sender.progress > progress_before:
             pause = FIRST_PAUSE_S
         elif time.monotonic() - sender.progressed_at > patience_s:
             raise LiveError(

@@ -47,9 +47,9 @@ class LoopMailbox:
         self._calls: deque[tuple[Callable[[Any], None], Any]] = deque()
         self._under_way = False
 
-    def post(self, what: Callable[[Any], None], value: object) -> None:
+    def post(self, callback: Callable[[Any], None], value: object) -> None:
         """Call `what(value)` on the loop, after everything posted earlier."""
-        self._calls.append((what, value))
+        self._calls.append((callback, value))
         if not self._under_way:
             self._under_way = True
             with contextlib.suppress(RuntimeError):  # the loop has ended: nobody is left to be told
@@ -59,8 +59,8 @@ class LoopMailbox:
         # before the first is taken: what is posted from here on is taken too, or wakes the loop again
         self._under_way = False
         while self._calls:
-            what, value = self._calls.popleft()
-            what(value)
+            callback, value = self._calls.popleft()
+            callback(value)
 
 
 class LaneOwner(Protocol):

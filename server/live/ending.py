@@ -87,19 +87,19 @@ class Ending:
 
     async def complete(self, take: ActiveTake, end: TakeEnd, forget: Callable[[], None]) -> None:
         """Carry out all steps; `forget` is called once the trial has ended in the database."""
-        here = take.id in self._asked
+        is_local = take.id in self._asked
         actor = self._asked.pop(take.id, None)
         try:
             with contextlib.suppress(NotFound):
                 await asyncio.to_thread(self._journal.write)
-                state = "closed" if here else "finished"
+                state = "closed" if is_local else "finished"
                 await asyncio.to_thread(self._rows.end, actor, take.id, state, end)
             self._draining[take.id] = take
             forget()
             await take.recorder.close()
             take.problem = end.problem
             take.recording_id = await self._store(take.id)
-            self._tell(take, here)
+            self._tell(take, is_local)
             with contextlib.suppress(NotFound):
                 self._over(await asyncio.to_thread(self._rows.take, take.id))
             take.over.set()
@@ -113,12 +113,12 @@ class Ending:
             self._draining.pop(take.id, None)
             self._pool.leave(take.id)
 
-    def _tell(self, take: ActiveTake, here: bool) -> None:
+    def _tell(self, take: ActiveTake, is_local: bool) -> None:
         if take.tablet is None:
             return
         if take.recording_id is not None:
             take.tablet.say(protocol.announce_finish(take.recording_id, take.problem))
-        if here or take.recording_id is None:
+        if is_local or take.recording_id is None:
             take.tablet.shut(CloseCode.ENDED, "take_ended")
 
     async def _store(self, take_id: str) -> str | None:
@@ -126,12 +126,12 @@ class Ending:
         path = live_recordings.log_path(self._settings.live, take_id)
         while True:
             try:
-                kept = await asyncio.to_thread(live_recordings.keep, *self._keep, path)
+                recording_id = await asyncio.to_thread(live_recordings.keep, *self._keep, path)
             except Exception as error:  # noqa: BLE001 - logged, whatever it is
                 self._disk.note_refusal(error, f"live take {take_id}")
             else:
                 self._disk.note_success()
-                return kept
+                return recording_id
             await asyncio.sleep(AGAIN_S)
 
     async def _drain(self, take: ActiveTake) -> None:

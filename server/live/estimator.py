@@ -84,9 +84,9 @@ class EstimatorWorker:
         self._takes[order.take] = Follower(order, self._say)
 
     def _drop(self, take: str) -> None:
-        found = self._takes.pop(take, None)
-        if found is not None:
-            found.close()
+        follower = self._takes.pop(take, None)
+        if follower is not None:
+            follower.close()
 
     def _guarded(self, take: str, action: Callable[[], None]) -> None:
         try:
@@ -97,8 +97,8 @@ class EstimatorWorker:
             if not isinstance(error, SagittalError):
                 log.exception("the estimate of live take %s failed", take)
             self._drop(take)
-            said = follower.describe_failure(error)
-            self._say(EstimateFailed(take, said.code, said.message))
+            notice = follower.describe_failure(error)
+            self._say(EstimateFailed(take, notice.code, notice.message))
 
 
 def main() -> None:

@@ -109,10 +109,10 @@ class Follower:
         """Time of the next picture; None = nothing new to show."""
         return None if self._last is None else self._sent_at + EVERY_S
 
-    def grow(self, size: int, at: float) -> None:
-        """Register a log size of `size` bytes at time `at`."""
+    def grow(self, size: int, time: float) -> None:
+        """Register a log size of `size` bytes at `time`."""
         self._size = size
-        self._arrived.append((size, at))
+        self._arrived.append((size, time))
 
     def command(self, command: Command) -> None:
         """Schedule a command before the batch it refers to."""
@@ -129,14 +129,14 @@ class Follower:
             self._file = _open_log(self._begin.path)
         self._file.seek(self._read)
         data = self._file.read(min(CHUNK_BYTES, self._size - self._read))
-        found, used = scan(data) if self._read == 0 else scan_records(data)
+        records, used = scan(data) if self._read == 0 else scan_records(data)
         if not used and len(data) >= CHUNK_BYTES:  # a record longer than a chunk
             data += self._file.read(self._size - self._read - len(data))
-            found, used = scan(data) if self._read == 0 else scan_records(data)
+            records, used = scan(data) if self._read == 0 else scan_records(data)
         if not used:
             raise ValueError(f"the log cannot be read from byte {self._read} on")
         start = self._read
-        for record in found:
+        for record in records:
             self._use(record, start + record.end)
         self._read = start + used
 
@@ -156,8 +156,8 @@ class Follower:
         delay = None if self._late else self._delays.now(now)
         guided = self._guided
         say = None if guided is None else tell_person(guided.protocol, guided.phase)
-        pose, seen = wire.pose(frame), self._read
-        self._say(Picture(self.take, frame.t_s, frame.seq, frame.stage, body, delay, seen, pose, say))
+        pose, read_bytes = wire.pose(frame), self._read
+        self._say(Picture(self.take, frame.t_s, frame.seq, frame.stage, body, delay, read_bytes, pose, say))
         self._last = None
         self._trail.clear()
         self._sent_at = now
@@ -274,14 +274,14 @@ class _Delays:
         self._fastest: dict[int, tuple[float, float]] = {}
         self._due: float | None = None
 
-    def arrived(self, batch: SampleBatch, rate_hz: float, at: float) -> None:
+    def arrived(self, batch: SampleBatch, rate_hz: float, time: float) -> None:
         n = len(batch.samples)
         last = (n - 1) / rate_hz if batch.offsets_us is None else float(batch.offsets_us[-1]) * 1e-6
         sampled = batch.t0_us * 1e-6 + last
-        way = at - sampled
-        before, when = self._fastest.get(batch.stream, (way, at))
-        fastest = min(way, before + DRIFT * (at - when))
-        self._fastest[batch.stream] = (fastest, at)
+        way = time - sampled
+        previous, when = self._fastest.get(batch.stream, (way, time))
+        fastest = min(way, previous + DRIFT * (time - when))
+        self._fastest[batch.stream] = (fastest, time)
         self._due = sampled + fastest
 
     def now(self, now: float) -> float | None:
@@ -303,13 +303,13 @@ class _Phase:
         self._length[stride.side] = stride.end_s - stride.start_s
 
     def at(self, t_s: float) -> dict[Side, float | None]:
-        found: dict[Side, float | None] = {}
+        phases: dict[Side, float | None] = {}
         for side in SIDES:
             contact, length = self._contact.get(side), self._length.get(side)
             share = None if contact is None or not length else 100.0 * (t_s - contact) / length
             # half a cycle too late: the person has stopped
-            found[side] = None if share is None or not 0.0 <= share <= 150.0 else min(share, 100.0)
-        return found
+            phases[side] = None if share is None or not 0.0 <= share <= 150.0 else min(share, 100.0)
+        return phases
 
 
 def _open_log(path: str) -> BinaryIO:
@@ -339,7 +339,7 @@ def describe_failure(error: Exception) -> Notice:
         return Notice(error.code, error.message, severity="error")
     return Notice(
         "live_estimate_failed",
-        "The live estimate of this take stopped on an error of the program; the take itself is recorded and "
-        "will be analysed at its end. The server's log has the details; please report it.",
+        "The live estimate of this trial stopped due to a program error; the trial is still being "
+        "recorded and will be analysed afterwards. Details are in the server log; please report them.",
         severity="error",
     )

@@ -186,12 +186,14 @@ class Hub:
         take = self._takes.get(row.id)
         if take is None:
             self.owner.require(row)
-            raise Conflict("no_tablet", "No tablet has joined this take yet; enter its code on the tablet.")
+            raise Conflict(
+                "no_tablet", "No tablet has joined this recording yet; enter the code on the tablet."
+            )
         live_events.check_value(name, value)
         if name in ("start", "stop"):
             if take.tablet is None:
                 raise Conflict(
-                    "tablet_lost", "The tablet is not connected; wait for it, or end the take here."
+                    "tablet_lost", "The tablet is not connected; wait for it, or end the recording here."
                 )
             take.tablet.say(protocol.command("start" if name == "start" else "stop"))
         if name == "undo_mark" and not take.steered.marks:
@@ -220,7 +222,9 @@ class Hub:
         answer = take.recorder.finish()
         if answer.close is not None:
             self._ending.unask(take)
-            raise Conflict(answer.reason, "The server's disk refuses; make room and try again.")
+            raise Conflict(
+                answer.reason, "The server cannot write to its disk; free some space and try again."
+            )
         await take.over.wait()
         return await asyncio.to_thread(self.rows.take, row.id)
 
@@ -263,10 +267,10 @@ class Hub:
         if take is not None:
             return take.standing()
         row = self.rows.current(session_id)
-        found = describe_unjoined(row)
+        state = describe_unjoined(row)
         if row is not None and row.is_open and not self.owner.has(row):
-            found["problem"] = NODE_AWAY
-        return found
+            state["problem"] = NODE_AWAY
+        return state
 
     def tell_state(self, take: ActiveTake) -> None:
         """Send the state of a trial to browsers, unless it has ended (see `_tell_over`)."""
@@ -303,7 +307,7 @@ class Hub:
         for take_id in takes:
             take = self._takes.get(take_id)
             if take is not None:
-                _notify(take, "warn", "The live estimate starts again; nothing recorded is lost.")
+                _notify(take, "warn", "The live estimate restarts; no recorded data is lost.")
 
     def _report(self, report: Report) -> None:
         name = getattr(report, "take", "")
@@ -346,11 +350,11 @@ class Hub:
         self.leave(row.session_id)
 
     async def _tick(self) -> None:
-        told = 0.0
+        sent_at = 0.0
         while True:
             await asyncio.sleep(TICK_S)
             now = time.monotonic()
-            tell = now - told >= STATE_S
+            tell = now - sent_at >= STATE_S
             for take in tuple(self._takes.values()):
                 take.look(now)
                 if take.tablet is None and now - take.grown_at > ABANDONED_S and not take.over.is_set():
@@ -358,7 +362,7 @@ class Hub:
                     take.recorder.finish()
                 if tell and take.state == "streaming":
                     self.tell_state(take)
-            told = now if tell else told
+            sent_at = now if tell else sent_at
 
     async def _mind_rows(self) -> None:
         """Release trials that were erased or taken over elsewhere, and end those ended there."""

@@ -66,12 +66,12 @@ class Journal:
             return
         try:
             with self._db.write() as c:
-                wanted = {row["take_id"] for row in rows}
-                there = set(c.execute(select(live_take.c.id).where(live_take.c.id.in_(wanted))).scalars())
-                kept = [row for row in rows if row["take_id"] in there]
-                if kept:
-                    c.execute(insert(live_event), kept)
-                    note_feedback(c, {row["take_id"] for row in kept if _told(row)})
+                ids = {row["take_id"] for row in rows}
+                existing = set(c.execute(select(live_take.c.id).where(live_take.c.id.in_(ids))).scalars())
+                valid = [row for row in rows if row["take_id"] in existing]
+                if valid:
+                    c.execute(insert(live_event), valid)
+                    note_feedback(c, {row["take_id"] for row in valid if _told(row)})
         except SQLAlchemyError as error:
             self._disk.note_refusal(error, "live events")
             with self._guard:

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 
 import msgspec
 
-from sagittal.web.user_text import encode_user_text
+from sagittal.core.user_text import encode_user_text
 
 STALE_S: Final = 0.5
 """Data older than this are not fed back (docs/science/feedback.md, "Which strides get a cue")."""

@@ -45,22 +45,23 @@ def pair(address: str, code: str) -> PairingResult:
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
         with opener.open(request, timeout=20) as answer:
-            said: Any = read_json(answer.read())
+            reply: Any = read_json(answer.read())
     except urllib.error.HTTPError as refused:
         raise _refusal(refused) from None
     except (OSError, ValueError) as error:
         cause = getattr(error, "reason", error)
-        why = getattr(cause, "strerror", None) or cause
+        reason = getattr(cause, "strerror", None) or cause
         raise LiveError(
-            "unreachable", f"{base} cannot be reached ({why}); is the server running, and the address right?"
+            "unreachable",
+            f"{base} cannot be reached ({reason}); is the server running, and the address right?",
         ) from None
     scheme = "wss" if parts.scheme == "https" else "ws"
     return PairingResult(
-        token=said["token"],
-        take=said["take"],
-        session_title=said.get("session_title") or "",
-        patient_code=said.get("patient_code") or "",
-        socket=urlunsplit((scheme, parts.netloc, said["socket"], "", "")),
+        token=reply["token"],
+        take=reply["take"],
+        session_title=reply.get("session_title") or "",
+        patient_code=reply.get("patient_code") or "",
+        socket=urlunsplit((scheme, parts.netloc, reply["socket"], "", "")),
     )
 
 

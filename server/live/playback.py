@@ -50,9 +50,13 @@ class _Grid:
 
     def ticks(self, stream: ImuStream) -> Floats | None:
         """Ticks of a sensor's samples, None if they are not on this grid."""
-        at: Floats = (stream.t_s - self.start_s) * self.rate_hz
-        whole: Floats = np.rint(at)
-        return whole if np.abs(at - whole).max() <= ON_GRID and len(np.unique(whole)) == len(at) else None
+        positions: Floats = (stream.t_s - self.start_s) * self.rate_hz
+        whole: Floats = np.rint(positions)
+        return (
+            whole
+            if np.abs(positions - whole).max() <= ON_GRID and len(np.unique(whole)) == len(positions)
+            else None
+        )
 
 
 def hello_of(recording: Recording, take: str) -> Hello:
@@ -91,11 +95,11 @@ def cut(recording: Recording, per_batch: int) -> list[DueBatch]:
         (piece for number, grid in enumerate(grids) for piece in _pieces(number, grid, per_batch, begin_s)),
         key=lambda piece: (piece[0], piece[1].stream),
     )
-    found = []
+    batches = []
     for seq, (at_us, b) in enumerate(pieces):
         batch = SampleBatch(b.stream, seq, b.t0_us, at_us, b.samples, b.offsets_us)
-        found.append(DueBatch(at_us * 1e-6, encode_batch(batch)))
-    return found
+        batches.append(DueBatch(at_us * 1e-6, encode_batch(batch)))
+    return batches
 
 
 async def pace_batches(batches: Sequence[DueBatch], speed: float) -> AsyncIterator[bytes]:
@@ -140,16 +144,16 @@ def _pieces(number: int, grid: _Grid, per_batch: int, begin_s: float) -> Iterato
     samples = np.full((max(int(t[-1]) for t in ticks) - lowest + 1, len(ticks), CHANNELS), np.nan, np.float32)
     for k, ((_, stream), t) in enumerate(zip(grid.sensors, ticks, strict=True)):
         samples[t - lowest, k] = _channels(stream)
-    there = np.zeros(len(samples), bool)
-    there[np.concatenate(ticks) - lowest] = True
-    for i, j in _runs(there, per_batch):
+    present = np.zeros(len(samples), bool)
+    present[np.concatenate(ticks) - lowest] = True
+    for i, j in _runs(present, per_batch):
         t0, last = (round((grid.start_s - begin_s + (lowest + x) / grid.rate_hz) * 1e6) for x in (i, j - 1))
         yield last, SampleBatch(number, 0, t0, 0, samples[i:j])
 
 
-def _runs(there: np.ndarray[tuple[int], np.dtype[np.bool_]], most: int) -> Iterator[tuple[int, int]]:
+def _runs(present: np.ndarray[tuple[int], np.dtype[np.bool_]], most: int) -> Iterator[tuple[int, int]]:
     """Runs of limited length without ticks at which no sensor measured."""
-    for start, stop in find_runs(there):
+    for start, stop in find_runs(present):
         for i in range(start, stop, most):
             yield i, min(i + most, stop)
 

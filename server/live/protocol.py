@@ -103,9 +103,9 @@ def parse(text: str) -> Said:
                 return _battery(root)
     except InputError as error:
         raise ProtocolError(error.code, error.message) from None
-    shown = repr(kind)[:40]
+    kind_text = repr(kind)[:40]
     raise ProtocolError(
-        "message_unknown", f"The message's type is {shown}; expected hello, batch, finish or battery."
+        "message_unknown", f"The message's type is {kind_text}; expected hello, batch, finish or battery."
     )
 
 
@@ -140,9 +140,9 @@ def welcome(next_seq: int) -> str:
     return _text("welcome", next_seq=next_seq, max_unacked=MAX_UNACKED)
 
 
-def ack(below: int) -> str:
+def ack(seq: int) -> str:
     """Acknowledge: all batches below this one are durable."""
-    return _text("ack", ack=below)
+    return _text("ack", ack=seq)
 
 
 def error(code: str, detail: str, **more: object) -> str:

@@ -34,7 +34,7 @@ class RecorderListener(Protocol):
         must restart.
         """
 
-    def note_acknowledged(self, below: int) -> None:
+    def note_acknowledged(self, seq: int) -> None:
         """All batches below this one are durable and can be acknowledged to the tablet (`protocol.ack`)."""
 
     def note_end(self, end: TakeEnd) -> None:
@@ -156,9 +156,9 @@ class Recorder:
 
     def note_synced(self, records: int) -> None:
         """Callback of the committer's lane: number of synced records."""
-        before, was_over = self._intake.durable, self._intake.ended
+        durable_before, was_over = self._intake.durable, self._intake.ended
         self._intake.note_synced(records)
-        if self._intake.durable > before:
+        if self._intake.durable > durable_before:
             self._listener.note_acknowledged(self._intake.durable)
         if self._intake.ended and not was_over:
             self._listener.note_end(self._intake.ended)

@@ -55,8 +55,8 @@ class BrowserQueue:
         await self._wake.wait()
         self._wake.clear()
         state = self._newest.pop("state", None)
-        rest = [self._newest.pop(kind) for kind in STATES if kind in self._newest]
-        messages = [*([state] if state else []), *self._once, *rest]
+        states = [self._newest.pop(kind) for kind in STATES if kind in self._newest]
+        messages = [*([state] if state else []), *self._once, *states]
         self._once.clear()
         return messages
 
@@ -146,7 +146,7 @@ class Room:
             self._watchers.remove(watcher)
 
 
-def _keep(kept: dict[int, bytes], k: int, body: bytes) -> None:
-    kept[k] = body
-    while len(kept) > KEPT:
-        del kept[min(kept)]
+def _keep(messages: dict[int, bytes], k: int, body: bytes) -> None:
+    messages[k] = body
+    while len(messages) > KEPT:
+        del messages[min(messages)]

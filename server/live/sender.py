@@ -224,9 +224,9 @@ class Sender:
         self.report.recording, self.report.problem = str(message["recording"]), message.get("problem")
         self.finished = True
 
-    def _acknowledged(self, below: int) -> None:
+    def _acknowledged(self, seq: int) -> None:
         now = time.monotonic()
-        while self._acked < below and self._first_sent:
+        while self._acked < seq and self._first_sent:
             self._kept.popleft()
             self.report.ack_s.append(now - self._first_sent.popleft())
             self._acked += 1

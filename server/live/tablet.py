@@ -48,9 +48,9 @@ class Tablet:
         self._texts.append(text)
         self._wake.set()
 
-    def ack(self, below: int) -> None:
+    def ack(self, seq: int) -> None:
         """Queue an acknowledgement."""
-        self._ack = below
+        self._ack = seq
         self._wake.set()
 
     def shut(self, code: int, reason: str) -> None:
@@ -63,9 +63,9 @@ class Tablet:
         while True:
             await self._wake.wait()
             self._wake.clear()
-            below, self._ack = self._ack, None
-            if below is not None:
-                await self._ws.send_text(protocol.ack(below))
+            seq, self._ack = self._ack, None
+            if seq is not None:
+                await self._ws.send_text(protocol.ack(seq))
             while self._texts:
                 await self._ws.send_text(self._texts.popleft())
             if self._closing is not None:
@@ -105,7 +105,7 @@ async def stream(ws: WebSocket) -> None:
 def _not_valid() -> ProtocolError:
     return ProtocolError(
         "token_not_valid",
-        "The token is not valid for this take, or has expired; pair with a new code.",
+        "The token is not valid for this recording, or has expired; pair with a new code.",
         CloseCode.UNAUTHORISED,
     )
 
@@ -117,10 +117,10 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None
             message = await _message(ws)
         if message is None:
             raise WebSocketDisconnect
-        said = protocol.parse(message) if isinstance(message, str) else None
-        if not isinstance(said, Hello):
+        hello = protocol.parse(message) if isinstance(message, str) else None
+        if not isinstance(hello, Hello):
             raise ProtocolError("hello_missing", "The first message must be a hello.")
-        row = await asyncio.to_thread(hub.rows.admit, said.take, said.token)
+        row = await asyncio.to_thread(hub.rows.admit, hello.take, hello.token)
         if row is None:
             raise _not_valid()
         if not row.is_open:
@@ -128,10 +128,11 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None
             return None
         if not hub.owner.has(row):
             await _carry(ws, hub, row, message)
-        take = await hub.enter(row, said)
+        take = await hub.enter(row, hello)
     except TimeoutError:
         _refuse(
-            tablet, ProtocolError("no_hello", "No hello came in time; connect again.", CloseCode.NO_HELLO)
+            tablet,
+            ProtocolError("no_hello", "No hello message arrived in time; connect again.", CloseCode.NO_HELLO),
         )
     except ProtocolError as error:
         _refuse(tablet, error)
@@ -142,7 +143,7 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None
     except InputError as error:
         _refuse(tablet, ProtocolError(error.code, error.message))
     else:
-        answer = take.recorder.greet(said)
+        answer = take.recorder.greet(hello)
         _heed(tablet, take, answer)
         if answer.close is None:
             hub.attach(take, tablet)
@@ -196,7 +197,7 @@ def _say_over(tablet: Tablet, row: live.LiveTakeRecord) -> None:
         tablet.say(protocol.announce_finish(row.recording_id, row.problem))
         tablet.shut(CloseCode.DONE if row.state == "finished" else CloseCode.ENDED, "take_ended")
     else:
-        _refuse(tablet, ProtocolError("take_ended", "This take is over.", CloseCode.ENDED))
+        _refuse(tablet, ProtocolError("take_ended", "This recording has ended.", CloseCode.ENDED))
 
 
 def _refuse(tablet: Tablet, error: ProtocolError) -> None:

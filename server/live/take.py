@@ -39,7 +39,7 @@ class TabletLink(Protocol):
     def say(self, text: str) -> None:
         """Send a message."""
 
-    def ack(self, below: int) -> None:
+    def ack(self, seq: int) -> None:
         """Acknowledge all batches below this one."""
 
     def shut(self, code: int, reason: str) -> None:
@@ -171,18 +171,18 @@ class ActiveTake:
     def note_growth(self, size: int) -> None:
         """The log is readable up to `size`; if it was longer before, it is processed again from the start."""
         self.grown_at = time.monotonic()
-        before, self._size = self._size, size
-        if size < before:
+        previous, self._size = self._size, size
+        if size < previous:
             self._house.pool.follow(self.id)
         else:
             self._house.pool.grow(self.id, size)
         if self.steered.stale and not self._house.pool.follows(self.id):
             self.mind_silence(False)
 
-    def note_acknowledged(self, below: int) -> None:
+    def note_acknowledged(self, seq: int) -> None:
         """Batches are durable."""
         if self.tablet is not None:
-            self.tablet.ack(below)
+            self.tablet.ack(seq)
 
     def note_end(self, end: TakeEnd) -> None:
         """The end is durable."""

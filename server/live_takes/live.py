@@ -112,7 +112,7 @@ def open_take(
     earlier = current(c, session_id)
     if earlier is not None and earlier.is_open:
         raise Conflict(
-            "take_open", "This session has an open live take; ask for a new code or close it first."
+            "take_open", "This visit has an open live recording; request a new code or close it first."
         )
     code, take_id = _new_code(), new_id()
     c.execute(
@@ -148,21 +148,21 @@ class CodeNotValid(ServiceError):  # noqa: N818 - what the person reads
     def __init__(self) -> None:
         super().__init__(
             "code_not_valid",
-            "This code has been used, has expired, or was mistyped. Ask for a new one on the live page.",
+            "This code has been used, has expired, or was mistyped. Request a new one on the live page.",
         )
 
 
 def pair(c: Connection, code: str) -> TabletAccess:
     """Consume a code; raises CodeNotValid. The caller counts failures (server/auth/throttle.py)."""
     plain = "".join(code.split()).replace("-", "").upper()
-    token, at = new_token(), now()
+    token, issued_at = new_token(), now()
     row = c.execute(
         select(live_take.c.id, live_take.c.session_id, live_take.c.state, session.c.title, patient.c.code)
         .join(session, session.c.id == live_take.c.session_id)
         .join(patient, patient.c.id == session.c.patient_id)
         .where(
             live_take.c.code_sha256 == token_hash(plain),
-            live_take.c.code_expires_at > at,
+            live_take.c.code_expires_at > issued_at,
             live_take.c.state.in_(OPEN_TAKE_STATES),
         )
     ).first()
@@ -173,7 +173,7 @@ def pair(c: Connection, code: str) -> TabletAccess:
         "code_sha256": None,
         "code_expires_at": None,
         "token_sha256": token_hash(token),
-        "token_expires_at": at + TOKEN_LIFE,
+        "token_expires_at": issued_at + TOKEN_LIFE,
     }
     c.execute(update(live_take).where(live_take.c.id == row.id).values(values))
     audit.record(c, None, "live.paired", "session", row.session_id, {"take_id": row.id})
@@ -236,7 +236,7 @@ def get(c: Connection, take_id: str) -> LiveTakeRecord:
     """One take; raises NotFound."""
     row = c.execute(_QUERY.where(live_take.c.id == take_id)).first()
     if row is None:
-        raise NotFound("live take", take_id)
+        raise NotFound("live recording", take_id)
     return LiveTakeRecord(**row._asdict())
 
 
@@ -257,7 +257,7 @@ def require_open(c: Connection, session_id: str) -> LiveTakeRecord:
     sessions.get(c, session_id)
     this = current(c, session_id)
     if this is None or not this.is_open:
-        raise Conflict("no_open_take", "This session has no open live take; start one first.")
+        raise Conflict("no_open_take", "This visit has no open live recording; start one first.")
     return this
 
 

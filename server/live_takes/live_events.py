@@ -69,8 +69,8 @@ def _are_limits(value: object) -> bool:
 
 def read_test_limits(c: Connection, take_id: str) -> dict[str, float] | None:
     """Latest start and end set for the functional test of a trial; cleared by a repetition."""
-    said = [e.content["value"] for e in events(c, take_id) if e.kind == "test"]
-    last = said[-1] if said else None
+    limits = [e.content["value"] for e in events(c, take_id) if e.kind == "test"]
+    last = limits[-1] if limits else None
     return dict(last) if isinstance(last, Mapping) else None
 
 

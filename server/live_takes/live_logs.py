@@ -63,9 +63,9 @@ class LiveLog:
 def list_logs(c: Connection, settings: Settings) -> Iterator[LiveLog]:
     """All logs in `live/`, by name; one that disappears meanwhile (its trial ended) is skipped."""
     for path in _list_files(settings, "*.log"):
-        found = c.execute(select(live_take.c.id).where(live_take.c.id == path.stem)).first()
+        row = c.execute(select(live_take.c.id).where(live_take.c.id == path.stem)).first()
         try:
-            yield read_log(path, known=found is not None)
+            yield read_log(path, is_known=row is not None)
         except FileNotFoundError:
             continue
 
@@ -79,9 +79,9 @@ def _list_files(settings: Settings, pattern: str) -> list[Path]:
     return sorted(path for folder in settings.live_folders for path in folder.glob(pattern))
 
 
-def read_log(path: Path, *, known: bool) -> LiveLog:
+def read_log(path: Path, *, is_known: bool) -> LiveLog:
     """Scan one log; raises OSError."""
-    found = path.stat()
+    status = path.stat()
     source, sensors, batches, size, sent = None, 0, 0, 0, []
     for size, one in segments.read_records(path):  # noqa: B007 - the last one is used
         try:
@@ -96,9 +96,9 @@ def read_log(path: Path, *, known: bool) -> LiveLog:
     return LiveLog(
         path.stem,
         path,
-        known,
-        dt.datetime.fromtimestamp(found.st_mtime, dt.UTC),
-        found.st_size,
+        is_known,
+        dt.datetime.fromtimestamp(status.st_mtime, dt.UTC),
+        status.st_size,
         source,
         sensors,
         batches,
@@ -127,13 +127,13 @@ def adopt(
     path = next(iter(_list_files(settings, f"{take_id}.log")), None)
     if path is None:
         raise NotFound("live log", take_id)
-    log = read_log(path, known=False)
+    log = read_log(path, is_known=False)
     if not log.batches:
-        raise Conflict("take_empty", f"{path.name} holds no sample that can be read; it was left as it is.")
+        raise Conflict("take_empty", f"{path.name} has no readable sample; it was left unchanged.")
     with db.write() as c:
         sessions.get(c, session_id)
         if c.execute(select(live_take.c.id).where(live_take.c.id == take_id)).first():
-            raise Conflict("take_known", f"The take {take_id} belongs to a session already.")
+            raise Conflict("take_known", f"Recording {take_id} already belongs to a visit.")
         c.execute(
             insert(live_take).values(
                 id=take_id,
@@ -148,8 +148,8 @@ def adopt(
         )
         detail = {"take_id": take_id, "count": log.batches}
         audit.record(c, actor, "live.adopted", "session", session_id, detail)
-    made = live_recordings.keep(db, blobs, queue, path)
-    if made is None:
+    recording_id = live_recordings.keep(db, blobs, queue, path)
+    if recording_id is None:
         raise NotFound("session", session_id)
     fs.remove_file(path)
-    return made
+    return recording_id

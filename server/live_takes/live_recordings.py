@@ -128,9 +128,9 @@ def _take_in(db: Database, settings: Settings) -> None:
 
 def _note_owner(db: Database, settings: Settings) -> None:
     """Assign trials whose files are here to this server, also after a crash during the move."""
-    here = {path.name.partition(".")[0] for path in settings.live.iterdir()}
+    take_ids = {path.name.partition(".")[0] for path in settings.live.iterdir()}
     node = settings.node_name or None
-    strange = live_take.c.id.in_(here) & live_take.c.node.is_distinct_from(node)
+    strange = live_take.c.id.in_(take_ids) & live_take.c.node.is_distinct_from(node)
     with db.read() as c:
         if c.execute(select(live_take.c.id).where(strange).limit(1)).first() is None:
             return
@@ -185,10 +185,10 @@ def _chunks(path: Path) -> Iterator[bytes]:
 def _hello_of_data(path: Path) -> bytes | None:
     """The hello of a log with at least one batch, otherwise None."""
     hello = None
-    for _, found in segments.read_records(path):
-        if found.kind == "H":
-            hello = found.body
-        elif found.kind == "B":
+    for _, record in segments.read_records(path):
+        if record.kind == "H":
+            hello = record.body
+        elif record.kind == "B":
             return hello
     return None
 
@@ -200,15 +200,15 @@ def _publish(
     if take.recording_id is not None:
         return take
     blobs.require(take.patient_id, blob.sha256)
-    recording_id, at = new_id(), now()
-    said: dict[str, Any] = {"sensors": _sensors(hello)}
+    recording_id, time = new_id(), now()
+    declared: dict[str, Any] = {"sensors": _sensors(hello)}
     if (limits := live_events.read_test_limits(c, take_id)) is not None:
-        said["test_limits"] = limits
-    manifest = analyses.complete_manifest(c, take.session_id, said)
+        declared["test_limits"] = limits
+    manifest = analyses.complete_manifest(c, take.session_id, declared)
     # alone in its set: files that were uploaded to this session before are another take
     c.execute(
         insert(recording).values(
-            id=recording_id, session_id=take.session_id, manifest=manifest, created_at=at
+            id=recording_id, session_id=take.session_id, manifest=manifest, created_at=time
         )
     )
     c.execute(
@@ -217,7 +217,7 @@ def _publish(
             name=file_name(take),
             size=blob.size,
             sha256=blob.sha256,
-            added_at=at,
+            added_at=time,
         )
     )
     c.execute(update(live_take).where(live_take.c.id == take_id).values(recording_id=recording_id))

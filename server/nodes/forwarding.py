@@ -78,10 +78,10 @@ class Forwarding:
 
 
 async def _pass_request(nodes: Nodes, node: WebNode, scope: Scope, receive: Receive, send: Send) -> None:
-    at = urlsplit(node.address)
+    url = urlsplit(node.address)
     try:
         async with asyncio.timeout(CONNECT_S):
-            reader, writer = await asyncio.open_connection(at.hostname, at.port, ssl=_is_tls(node) or None)
+            reader, writer = await asyncio.open_connection(url.hostname, url.port, ssl=_is_tls(node) or None)
     except (OSError, TimeoutError) as error:
         raise UnreachableError from error
     with contextlib.closing(writer):
@@ -91,15 +91,16 @@ async def _pass_request(nodes: Nodes, node: WebNode, scope: Scope, receive: Rece
         headers = [one for one in scope["headers"] if one[0] not in _HOPS]
         headers.append((passage.HEADER, nodes.write_line(node, scope)))
         headers += [(b"connection", b"close"), (b"content-length", str(len(body)).encode())]
-        asked = h11.Request(method=scope["method"], target=_target(scope), headers=headers)
+        request = h11.Request(method=scope["method"], target=_target(scope), headers=headers)
         try:
             async with asyncio.timeout(ANSWER_S):
-                answer = await _ask(reader, writer, asked, body)
+                answer = await _ask(reader, writer, request, body)
         except (OSError, TimeoutError, h11.ProtocolError):
             problem = Problem(
                 503,
                 "node_lost",
-                f"The web server '{node.name}' did not answer. See whether it was done before trying again.",
+                f"The web server '{node.name}' did not respond. Check whether the request was carried out "
+                "before trying again.",
                 headers={"Retry-After": "5"},
             )
             await send_problem(problem, scope, receive, send)
@@ -115,10 +116,10 @@ async def _pass_line(nodes: Nodes, node: WebNode, ws: WebSocket) -> None:
             await carry_messages(ws, up)
     except InvalidStatus as refused:
         answer = refused.response
-        kept = {
+        forwarded = {
             name: value for name, value in answer.headers.raw_items() if name.lower().encode() not in _HOPS
         }
-        denial = Response(answer.body, answer.status_code, kept)
+        denial = Response(answer.body, answer.status_code, forwarded)
         if "websocket.http.response" in ws.scope.get("extensions", {}):
             await ws.send_denial_response(denial)
         else:
@@ -145,7 +146,7 @@ async def carry_tablet(nodes: Nodes, node: WebNode, ws: WebSocket, first: str | 
 @contextlib.asynccontextmanager
 async def open_line(node: WebNode, ws: WebSocket, line: bytes) -> AsyncIterator[ClientConnection]:
     """Open a websocket to another server on behalf of the client; raises UnreachableError, InvalidStatus."""
-    at = urlsplit(node.address)
+    url = urlsplit(node.address)
     own = {b"host", b"user-agent"}
     headers = [
         (name.decode("latin-1"), value.decode("latin-1"))
@@ -155,13 +156,13 @@ async def open_line(node: WebNode, ws: WebSocket, line: bytes) -> AsyncIterator[
     headers.append((passage.HEADER.decode(), line.decode("latin-1")))
     host = ws.headers["host"]
     scheme = "wss" if _is_tls(node) else "ws"
-    options: dict[str, Any] = {"server_hostname": at.hostname} if _is_tls(node) else {}
+    options: dict[str, Any] = {"server_hostname": url.hostname} if _is_tls(node) else {}
     try:
         up = await connect(
             f"{scheme}://{host}{_target(ws.scope).decode('latin-1')}",
             # the name is the one that the client asked for, the place is the other server's
-            host=at.hostname,
-            port=at.port,
+            host=url.hostname,
+            port=url.port,
             additional_headers=headers,
             user_agent_header=ws.headers.get("user-agent"),
             subprotocols=ws.scope.get("subprotocols") or None,
@@ -180,11 +181,11 @@ async def open_line(node: WebNode, ws: WebSocket, line: bytes) -> AsyncIterator[
 
 
 async def _ask(
-    reader: asyncio.StreamReader, writer: asyncio.StreamWriter, asked: h11.Request, body: bytes
+    reader: asyncio.StreamReader, writer: asyncio.StreamWriter, request: h11.Request, body: bytes
 ) -> Response:
     """Send a request and return the complete response."""
     line = h11.Connection(h11.CLIENT)
-    for part in (asked, h11.Data(data=body), h11.EndOfMessage()):
+    for part in (request, h11.Data(data=body), h11.EndOfMessage()):
         writer.write(line.send(part) or b"")
     await writer.drain()
     head: h11.Response | None = None

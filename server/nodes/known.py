@@ -25,12 +25,12 @@ class KnownNodes:
         if scope["type"] in {"http", "websocket"}:
             lines = [value for name, value in scope["headers"] if name == HEADER]
             if lines:
-                told = _read(scope["app"].state.nodes, lines, scope)
-                if told is None:
-                    detail = "The request pretends to come from another server. Ask without its header."
+                sender = _read(scope["app"].state.nodes, lines, scope)
+                if sender is None:
+                    detail = "The request claims to come from another server. Send it without that header."
                     await send_problem(Problem(403, "not_a_node", detail), scope, receive, send)
                     return
-                asks, client, scheme = told
+                asks, client, scheme = sender
                 headers = [one for one in scope["headers"] if one[0] != HEADER]
                 scope = {**scope, "headers": headers, "client": (client, 0), "scheme": scheme, ASKED_BY: asks}
         await self.app(scope, receive, send)
@@ -45,7 +45,7 @@ def _read(nodes: Nodes, lines: list[bytes], scope: Scope) -> tuple[str, str, str
     right = sign(nodes.key, line, scope).encode()
     if len(lines) != 1 or len(parts) != 5 or not hmac.compare_digest(right, mac.encode("latin-1")):
         return None
-    asks, asked, at, client, scheme = parts
-    if asked != nodes.name or abs(time.time() - int(at)) > LIFE_S:
+    asks, receiver, timestamp, client, scheme = parts
+    if receiver != nodes.name or abs(time.time() - int(timestamp)) > LIFE_S:
         return None
     return asks, client, scheme

@@ -39,17 +39,17 @@ def read_key(path: Path) -> bytes:
     return key
 
 
-def write_line(key: bytes, asks: str, asked: str, scope: Mapping[str, Any]) -> bytes:
+def write_line(key: bytes, asks: str, receiver: str, scope: Mapping[str, Any]) -> bytes:
     """Header value for a request that is forwarded unchanged."""
     client = scope["client"][0] if scope.get("client") else ""
-    line = f"{asks};{asked};{int(time.time())};{client};{scope['scheme']}"
+    line = f"{asks};{receiver};{int(time.time())};{client};{scope['scheme']}"
     return f"{line};{sign(key, line, scope)}".encode("latin-1")
 
 
 def sign(key: bytes, line: str, scope: Mapping[str, Any]) -> str:
     """HMAC of a header and the request it belongs to, as hexadecimal digits."""
     bound: Headers = sorted(one for one in scope["headers"] if one[0] in _BOUND)
-    asked = (
+    parts = (
         line.encode("latin-1"),
         scope.get("method", "GET").encode(),
         scope.get("raw_path") or scope["path"].encode(),
@@ -57,6 +57,6 @@ def sign(key: bytes, line: str, scope: Mapping[str, Any]) -> str:
         *(part for one in bound for part in one),
     )
     digest = hmac.new(key, digestmod=hashlib.sha256)
-    for part in asked:
+    for part in parts:
         digest.update(len(part).to_bytes(4, "big") + part)
     return digest.hexdigest()

@@ -54,12 +54,12 @@ class Owner:
 def find_pin(scope: Scope) -> Pin | None:
     """Resource in a path that one particular server must serve; None = any server."""
     path = scope["path"]
-    if found := _SESSION.fullmatch(path):
-        return Pin("session", found[1] or found[2])
-    if found := _TAKE.fullmatch(path):
-        return Pin("take", found[1])
-    if found := _VIEW.fullmatch(path):
-        return Pin("view", found[1])
+    if match := _SESSION.fullmatch(path):
+        return Pin("session", match[1] or match[2])
+    if match := _TAKE.fullmatch(path):
+        return Pin("take", match[1])
+    if match := _VIEW.fullmatch(path):
+        return Pin("view", match[1])
     if _REPLAY.fullmatch(path):
         names = parse_qs(scope["query_string"].decode("latin-1")).get("view", [""])
         return Pin("view", names[-1]) if re.fullmatch(_ID, names[-1]) else None

@@ -78,22 +78,22 @@ class Nodes:
         if self.name is None:
             return
         self.key = read_key(self._key_file)
-        at = now()
+        time = now()
         with self._db.write() as c:
             mine = web_node.c.name == self.name
-            before = c.execute(select(web_node.c.run).where(mine)).scalar()
+            last_run = c.execute(select(web_node.c.run).where(mine)).scalar()
             claimed = select(func.max(live_take.c.node_run)).where(live_take.c.node == self.name)
-            self.run = max(before or 0, c.execute(claimed).scalar() or 0) + 1
+            self.run = max(last_run or 0, c.execute(claimed).scalar() or 0) + 1
             heard = func.coalesce(web_node.c.beat_at, web_node.c.started_at)
-            c.execute(delete(web_node).where(web_node.c.name != self.name, heard < at - FORGOTTEN))
+            c.execute(delete(web_node).where(web_node.c.name != self.name, heard < time - FORGOTTEN))
             values = {
                 "address": self._address,
                 "key_sha256": hashlib.sha256(self.key).hexdigest(),
                 "run": self.run,
-                "started_at": at,
-                "beat_at": at,
+                "started_at": time,
+                "beat_at": time,
             }
-            if before is None:
+            if last_run is None:
                 c.execute(insert(web_node).values(name=self.name, **values))
             else:
                 c.execute(update(web_node).where(mine).values(**values))
@@ -109,11 +109,11 @@ class Nodes:
         """Raise StrangersError if the data folder differs from that of the other live servers; blocks."""
         if self.name is None:
             return
-        mine, at = hashlib.sha256(read_key(self._key_file)).hexdigest(), now()
+        mine, time = hashlib.sha256(read_key(self._key_file)).hexdigest(), now()
         strangers = [
-            other.name
-            for other in self.list_all()
-            if other.name != self.name and other.key_sha256 != mine and self.is_living(other, at)
+            peer.name
+            for peer in self.list_all()
+            if peer.name != self.name and peer.key_sha256 != mine and self.is_living(peer, time)
         ]
         if strangers:
             raise StrangersError(
@@ -138,14 +138,14 @@ class Nodes:
 
     def find(self, name: str) -> WebNode | None:
         """Another server by name, None if unknown or unavailable."""
-        other = self._others.get(name)
-        return other if other is not None and self.is_living(other, now()) else None
+        peer = self._others.get(name)
+        return peer if peer is not None and self.is_living(peer, now()) else None
 
     def find_home(self, word: str) -> WebNode | None:
         """Server assigned to an unowned resource by hashing its id; None = here."""
-        at = now()
-        living = [other for other in self._others.values() if self.is_living(other, at)]
-        home = max((other.name for other in living), key=lambda name: _weigh(name, word), default=None)
+        time = now()
+        living = [peer for peer in self._others.values() if self.is_living(peer, time)]
+        home = max((peer.name for peer in living), key=lambda name: _weigh(name, word), default=None)
         if home is None or self.name is None or _weigh(self.name, word) > _weigh(home, word):
             return None
         return self._others[home]
@@ -153,21 +153,21 @@ class Nodes:
     def make_id_here(self, make: Callable[[], str]) -> str:
         """A new id that is assigned to this server."""
         while True:
-            found = make()
-            if self.find_home(found) is None:
-                return found
+            candidate = make()
+            if self.find_home(candidate) is None:
+                return candidate
 
-    def write_line(self, other: WebNode, scope: Mapping[str, Any]) -> bytes:
+    def write_line(self, peer: WebNode, scope: Mapping[str, Any]) -> bytes:
         """Header that authenticates a forwarded request (server/nodes/passage.py)."""
-        return write_line(self.key, self.name or "", other.name, scope)
+        return write_line(self.key, self.name or "", peer.name, scope)
 
-    def suspect(self, other: WebNode) -> None:
+    def suspect(self, peer: WebNode) -> None:
         """Treat an unreachable server as unavailable until its next heartbeat."""
-        self._suspected[other.name] = other.beat_at
+        self._suspected[peer.name] = peer.beat_at
 
-    def is_living(self, node: WebNode, at: dt.datetime) -> bool:
+    def is_living(self, node: WebNode, time: dt.datetime) -> bool:
         """Whether a server has a recent heartbeat and is reachable."""
-        if node.beat_at is None or (at - node.beat_at).total_seconds() > self._lease_s:
+        if node.beat_at is None or (time - node.beat_at).total_seconds() > self._lease_s:
             return False
         suspected_at = self._suspected.get(node.name)
         return suspected_at is None or node.beat_at > suspected_at
@@ -187,10 +187,10 @@ class Nodes:
     def _look(self) -> None:
         self._others = {node.name: node for node in self.list_all() if node.name != self.name}
 
-    def _write_beat(self, at: dt.datetime | None) -> bool:
+    def _write_beat(self, time: dt.datetime | None) -> bool:
         with self._db.write() as c:
             mine = (web_node.c.name == self.name, web_node.c.run == self.run)
-            return bool(c.execute(update(web_node).where(*mine).values(beat_at=at)).rowcount)
+            return bool(c.execute(update(web_node).where(*mine).values(beat_at=time)).rowcount)
 
     def _beat_for_ever(self) -> None:
         while not self._stop.wait(self._lease_s / 3):

@@ -18,11 +18,11 @@ def view_job(view: JobView) -> dict[str, Any]:
     return {**vars(view), "active": not view.finished, "live": not view.finished}
 
 
-def follow_few(found: Sequence[dict[str, Any] | None]) -> None:
+def follow_few(views: Sequence[dict[str, Any] | None]) -> None:
     """Enable live updates for the first jobs of a list only, as each uses one of a browser's six
     connections.
     """
-    active = [j for j in found if j is not None and j["active"]]
+    active = [j for j in views if j is not None and j["active"]]
     active.sort(key=lambda j: j["state"] != "running")
     for j in active[FOLLOWED:]:
         j["live"] = False
@@ -40,9 +40,9 @@ def find_active_jobs(
 
     Restricted to these patients, as any number of jobs may be queued.
     """
-    found: dict[str | None, dict[str, Any]] = {}
+    jobs_by_owner: dict[str | None, dict[str, Any]] = {}
     for listed in jobs.list_active(c, patient_ids):
         if listed.kind in BESIDE:
             continue
-        found.setdefault(whose(listed), view_job(listed))
-    return found
+        jobs_by_owner.setdefault(whose(listed), view_job(listed))
+    return jobs_by_owner

@@ -24,5 +24,5 @@ def load_texts(
     if language not in LANGUAGES or language == SOURCE:
         raise Problem(404, "not_found", SENTENCES["not_found"])
     present, content = script_texts(language)
-    kept = KEPT if version == present else "no-cache"
-    return Response(content, media_type="application/json", headers={"Cache-Control": kept})
+    cache_control = KEPT if version == present else "no-cache"
+    return Response(content, media_type="application/json", headers={"Cache-Control": cache_control})

@@ -32,13 +32,13 @@ FAR_BEHIND: Final = 2 * BEHIND
 
 
 def start_child(
-    module: str, settings: Settings, behind: int = 0
+    module: str, settings: Settings, niceness: int = 0
 ) -> tuple[subprocess.Popen[bytes], socket.socket]:
     """Run a module that begins with `enter_child`; return the process and our end of the channel.
 
     Parameters
     ----------
-    behind : increment of the nice value relative to this process, applied at start.
+    niceness : increment of the nice value relative to this process, applied at start.
     """
     ours, theirs = socket.socketpair()
     with theirs:
@@ -48,30 +48,30 @@ def start_child(
             stdin=subprocess.PIPE,
             pass_fds=[theirs.fileno()],
         )
-    _put_behind(process.pid, behind)
+    _put_behind(process.pid, niceness)
     return process, ours
 
 
-def start_module(module: str, settings: Settings, behind: int = 0) -> subprocess.Popen[bytes]:
+def start_module(module: str, settings: Settings, niceness: int = 0) -> subprocess.Popen[bytes]:
     """Run one of our modules without a channel; it ends with this process (lifeline.py).
 
     A module that needs to clean up first calls `call_when_parent_ends`.
 
     Parameters
     ----------
-    behind : increment of the nice value relative to this process, applied at start.
+    niceness : increment of the nice value relative to this process, applied at start.
     """
     process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
         [sys.executable, "-m", BOUND, module], env=make_environment(settings), stdin=subprocess.PIPE
     )
-    _put_behind(process.pid, behind)
+    _put_behind(process.pid, niceness)
     return process
 
 
-def _put_behind(pid: int, behind: int) -> None:
+def _put_behind(pid: int, niceness: int) -> None:
     """Increase a process's nice value relative to this one, if it is still running."""
     with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + behind)
+        os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + niceness)
 
 
 def end_process(process: subprocess.Popen[bytes]) -> None:

@@ -38,19 +38,19 @@ class ErrandTurn:
             self._places.release()
 
 
-def run_errand(module: str, settings: Settings, order: bytes, longest_s: float, behind: int = 0) -> bytes:
+def run_errand(module: str, settings: Settings, order: bytes, longest_s: float, niceness: int = 0) -> bytes:
     """Start a module that begins with `enter_child`, send it a request and return the response.
 
     Parameters
     ----------
-    behind : increment of the nice value relative to this process.
+    niceness : increment of the nice value relative to this process.
 
     Raises
     ------
     TimeoutError
         no response within `longest_s`. EOFError, OSError: the process ended without one.
     """
-    process, end = start_child(module, settings, behind)
+    process, end = start_child(module, settings, niceness)
     line = Channel(end)
     try:
         line.send(order)

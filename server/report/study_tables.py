@@ -104,18 +104,22 @@ def _summarise(take: StudyTake) -> dict[str, object]:
     row: dict[str, object] = {"take": take.name, **take.labels, "files": take.files, "error": code}
     if code is not None:
         return row
-    found = take.read_analysis()
-    estimator = (found["estimator"] or {}).get("name")
-    row |= {"quality": found["quality"]["level"], "estimator": estimator, "warnings": len(found["warnings"])}
-    row["estimated_angles"] = " ".join(_list_estimated(found)) or None
-    for p in found["parameters"]:
+    analysis = take.read_analysis()
+    estimator = (analysis["estimator"] or {}).get("name")
+    row |= {
+        "quality": analysis["quality"]["level"],
+        "estimator": estimator,
+        "warnings": len(analysis["warnings"]),
+    }
+    row["estimated_angles"] = " ".join(_list_estimated(analysis)) or None
+    for p in analysis["parameters"]:
         row["_".join(part for part in (p["name"], p["side"]) if part)] = p["mean"]
     return row
 
 
-def _list_estimated(found: Mapping[str, Any]) -> list[str]:
+def _list_estimated(analysis: Mapping[str, Any]) -> list[str]:
     """Angles with their side that are estimated by a leg model rather than measured by two sensors."""
-    return sorted(list_estimated_angles(found["estimator"]))
+    return sorted(list_estimated_angles(analysis["estimator"]))
 
 
 def _value(cell: str) -> object:

@@ -61,7 +61,10 @@ def parameters_csv(report: ReportModel) -> bytes:
                         *numbers,
                         r.unit,
                         r.difference,
-                        *(None if r.symmetry is None else getattr(r.symmetry, what) for what in SYMMETRY),
+                        *(
+                            None if r.symmetry is None else getattr(r.symmetry, index_name)
+                            for index_name in SYMMETRY
+                        ),
                         *norm,
                         *usual,
                         (r.reason or r.side_reason) if c is None else None,
@@ -71,7 +74,7 @@ def parameters_csv(report: ReportModel) -> bytes:
     return write_csv(header, rows())
 
 
-def trends_csv(visits: Sequence[AnalysedVisit], found: Sequence[Trend]) -> bytes:
+def trends_csv(visits: Sequence[AnalysedVisit], trends: Sequence[Trend]) -> bytes:
     """One row per parameter, side and visit, with the change since the first assessment and its limits."""
     header = (
         *("name", "side", "unit", "date", "session_id", "visit", "kind"),
@@ -80,7 +83,7 @@ def trends_csv(visits: Sequence[AnalysedVisit], found: Sequence[Trend]) -> bytes
     )
 
     def rows() -> Iterator[Sequence[object]]:
-        for trend in found:
+        for trend in trends:
             for line in trend.lines:
                 for p in line.points:
                     v, c = visits[p.visit], p.change

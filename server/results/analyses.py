@@ -116,10 +116,10 @@ def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob], config_sha2
 
 def get(c: Connection, analysis_id: str) -> AnalysisRecord:
     """One analysis; raises NotFound."""
-    found = _analyses(c, c.execute(_QUERY.where(analysis.c.id == analysis_id)))
-    if not found:
+    records = _analyses(c, c.execute(_QUERY.where(analysis.c.id == analysis_id)))
+    if not records:
         raise NotFound("analysis", analysis_id)
-    return found[0]
+    return records[0]
 
 
 def of_session(c: Connection, session_id: str) -> list[AnalysisRecord]:
@@ -148,7 +148,7 @@ def latest_of(
         result = c.execute(_select_latest(session_ids), dict(values))
     else:
         result = c.execute(_select_latest(_IDS), {"session_ids": list(session_ids)})
-    return {found.session_id: found for found in _analyses(c, result)}
+    return {record.session_id: record for record in _analyses(c, result)}
 
 
 @cache
@@ -161,17 +161,17 @@ def _select_latest(session_ids: Select[tuple[str]]) -> Select[Any]:
 def get_shown(c: Connection, session_id: str) -> AnalysisRecord:
     """The displayed analysis of a session; raises NotFound if there is no session or result."""
     sessions.get(c, session_id)
-    found = latest(c, session_id)
-    if found is None:
-        raise NotFound("analysis of session", session_id)
-    return found
+    record = latest(c, session_id)
+    if record is None:
+        raise NotFound("analysis of visit", session_id)
+    return record
 
 
-def file_bytes(blobs: BlobStore, found: AnalysisRecord, name: str) -> bytes:
+def file_bytes(blobs: BlobStore, record: AnalysisRecord, name: str) -> bytes:
     """Read and verify a result file; raises NotFound, IntegrityError."""
-    if name not in found.files:
+    if name not in record.files:
         raise NotFound("file", name)
-    return blobs.read(found.patient_id, found.files[name].sha256)
+    return blobs.read(record.patient_id, record.files[name].sha256)
 
 
 def _joined(query: Select[Any]) -> Select[Any]:
@@ -202,29 +202,29 @@ _FILES = (
 def _analyses(c: Connection, result: Result[Any]) -> list[AnalysisRecord]:
     """Analyses with their files, read in one statement."""
     files: defaultdict[str, dict[str, Blob]] = defaultdict(dict)
-    made = make_all(lambda **row: AnalysisRecord(**row, files=files[row["id"]]), result)
-    for of, name, sha256, size in c.execute(_FILES, {"analysis_ids": list(files)}) if files else ():
-        files[of][name] = Blob(sha256, size)
-    return made
+    records = make_all(lambda **row: AnalysisRecord(**row, files=files[row["id"]]), result)
+    for analysis_id, name, sha256, size in c.execute(_FILES, {"analysis_ids": list(files)}) if files else ():
+        files[analysis_id][name] = Blob(sha256, size)
+    return records
 
 
 def complete_manifest(c: Connection, session_id: str, manifest: Mapping[str, Any] | None) -> dict[str, Any]:
     """Complete a manifest with height and protocol of the session (or the patient)."""
-    said = dict(manifest or {})
+    completed = dict(manifest or {})
     row = c.execute(
         select(session.c.protocol, session.c.height_m, patient.c.height_m.label("usual_height_m"))
         .join(patient, patient.c.id == session.c.patient_id)
         .where(session.c.id == session_id)
     ).one()
     height = row.height_m if row.height_m is not None else row.usual_height_m
-    subject = dict(said.get("subject") or {})
+    subject = dict(completed.get("subject") or {})
     if subject.get("height_m") is None and height is not None:
         subject["height_m"] = height
     if subject:
-        said["subject"] = subject
-    if said.get("protocol") is None:
-        said["protocol"] = row.protocol
-    return said
+        completed["subject"] = subject
+    if completed.get("protocol") is None:
+        completed["protocol"] = row.protocol
+    return completed
 
 
 def digest_json(value: object) -> str:

@@ -36,13 +36,13 @@ def run(
     results = [analyse_files(files, manifest, config, progress, resumable=False)]
     setup = results[0].setup
     # by no name here: what is written is let go of
-    found = analysis_files(results.pop(), give_memory_back)
+    result_files = analysis_files(results.pop(), give_memory_back)
     if setup is not None and setup.can_be_applied:
         declared = read_json(manifest) if manifest is not None else {}
         assert isinstance(declared, dict)  # noqa: S101 - `parse_manifest` has read it
         repaired = setup.complete_manifest(declared)
-        found[REPAIRED] = json.dumps(repaired, ensure_ascii=False, indent=1).encode()
-    return found
+        result_files[REPAIRED] = json.dumps(repaired, ensure_ascii=False, indent=1).encode()
+    return result_files
 
 
 def analyse_files(
@@ -123,12 +123,12 @@ def choose_config(files: Sequence[SourceFile], config: Mapping[str, Any] | None)
 
     if config:
         return config
-    said = read_episode_config(files)
+    archived = read_episode_config(files)
     try:
-        found = {} if said is None else read_json(said)
+        settings = {} if archived is None else read_json(archived)
     except ValueError as error:
         raise ArchiveError("zip_bad", f"The archive's settings are not valid JSON: {error}.") from error
-    return found if isinstance(found, dict) else {}
+    return settings if isinstance(settings, dict) else {}
 
 
 def inspect(files: Sequence[SourceFile], manifest: Mapping[str, Any] | None, progress: Progress) -> bytes:

@@ -38,27 +38,27 @@ class SessionPair:
     @property
     def cautions(self) -> tuple[str, ...]:
         """Differences in walking condition or measurement that may explain a change, as sentences."""
-        said = []
+        reasons = []
         old, new = self.before, self.after
         if unlike := compare_conditions(old.condition, new.condition):
-            said.append(
-                f"The conditions differ: {'; '.join(unlike)}. What differs may come from that, so no "
-                "difference is called a change."
+            reasons.append(
+                f"The conditions differ: {'; '.join(unlike)}. Differences may be due to this and are not "
+                "reported as changes."
             )
         elif old.session.feedback:
-            said.append("Both were walked with feedback, so no difference is called a change.")
+            reasons.append("Both were walked with feedback, so differences are not reported as changes.")
         elif unstated := new.condition.unstated:
-            said.append(f"Not stated in either session: {', '.join(unstated)}. They are taken to be alike.")
+            reasons.append(f"Not stated for either visit: {', '.join(unstated)}. Assumed to be the same.")
         if _sensors(old) != _sensors(new):
-            said.append("Other segments carried sensors in the two sessions.")
+            reasons.append("The two visits used sensors on different segments.")
         if old.found.config_sha256 != new.found.config_sha256:
-            said.append("The two analyses have different settings; run the earlier one again to compare.")
+            reasons.append("The two analyses have different settings; run the earlier one again to compare.")
         elif old.found.code_version != new.found.code_version:
-            said.append(
+            reasons.append(
                 f"The analyses are of different versions ({old.found.code_version}, "
                 f"{new.found.code_version}); run the earlier one again to compare."
             )
-        return tuple(said)
+        return tuple(reasons)
 
 
 def pair(c: Connection, session_id: str, other_id: str) -> SessionPair:
@@ -69,12 +69,12 @@ def pair(c: Connection, session_id: str, other_id: str) -> SessionPair:
     NotFound: a session or its result. Conflict: other_patient, same_session.
     """
     if session_id == other_id:
-        raise Conflict("same_session", "A session is compared with another one, not with itself.")
-    both = [_analysed(c, sid) for sid in (session_id, other_id)]
-    if both[0].session.patient_id != both[1].session.patient_id:
-        raise Conflict("other_patient", "These sessions belong to different patients.")
-    both.sort(key=lambda a: _moment(a.session))
-    return SessionPair(patients.get(c, both[0].session.patient_id), *both)
+        raise Conflict("same_session", "A visit cannot be compared with itself.")
+    ends = [_analysed(c, sid) for sid in (session_id, other_id)]
+    if ends[0].session.patient_id != ends[1].session.patient_id:
+        raise Conflict("other_patient", "These visits belong to different patients.")
+    ends.sort(key=lambda a: _moment(a.session))
+    return SessionPair(patients.get(c, ends[0].session.patient_id), *ends)
 
 
 def list_comparable(
@@ -118,19 +118,23 @@ def _moment(session: Session) -> tuple[dt.date, dt.datetime]:
     return session.performed_on, session.created_at
 
 
-def compare_sessions(reviewed: ReviewedAnalyses, found: SessionPair) -> tuple[ComparedRow, ...]:
+def compare_sessions(reviewed: ReviewedAnalyses, session_pair: SessionPair) -> tuple[ComparedRow, ...]:
     """Table of a comparison; raises IntegrityError."""
-    old = reviewed.read_numbers(found.before.found, found.before.edits)
-    new = reviewed.read_numbers(found.after.found, found.after.edits)
-    known = pair_norms(found.patient, (found.before.session, old), (found.after.session, new))
-    return compare_rows(old, new, known, found.patient.affected_side, comparable=found.comparable)
+    old = reviewed.read_numbers(session_pair.before.found, session_pair.before.edits)
+    new = reviewed.read_numbers(session_pair.after.found, session_pair.after.edits)
+    norm_pair = pair_norms(
+        session_pair.patient, (session_pair.before.session, old), (session_pair.after.session, new)
+    )
+    return compare_rows(
+        old, new, norm_pair, session_pair.patient.affected_side, comparable=session_pair.comparable
+    )
 
 
 def pair_norms(
-    patient: Patient, before: tuple[Session, Numbers], after: tuple[Session, Numbers]
+    patient: Patient, earlier: tuple[Session, Numbers], later: tuple[Session, Numbers]
 ) -> tuple[Norms, Norms]:
     """Norms for a patient at two sessions, each at its own gait speed."""
-    return find_norms(patient, *before), find_norms(patient, *after)
+    return find_norms(patient, *earlier), find_norms(patient, *later)
 
 
 def find_norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
@@ -150,8 +154,8 @@ def find_norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
 
 def _analysed(c: Connection, session_id: str) -> AnalysedSession:
     session = sessions.get(c, session_id)
-    found = analyses.get_shown(c, session_id)
-    return AnalysedSession(session, found, edit_log.edits_of(c, found.id))
+    record = analyses.get_shown(c, session_id)
+    return AnalysedSession(session, record, edit_log.edits_of(c, record.id))
 
 
 def _sensors(a: AnalysedSession) -> frozenset[str]:

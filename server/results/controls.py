@@ -41,12 +41,12 @@ def list_visits(c: Connection, this: Patient, session: Session) -> tuple[Control
     Visits are not selected by pace here: `make_group` selects those with a similar gait speed.
     """
     values = {"this_id": this.id, "this_protocol": session.protocol}
-    shown = analyses.latest_of(c, _THEIRS, values)
-    edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
+    records = analyses.latest_of(c, _THEIRS, values)
+    edits = edit_log.edits_of_all(c, [record.id for record in records.values()])
     return tuple(
-        ControlVisit(row.code, row.sex, row.birth_year, row.performed_on, found, edits[found.id])
+        ControlVisit(row.code, row.sex, row.birth_year, row.performed_on, record, edits[record.id])
         for row in c.execute(_PEOPLE, values)
-        if (found := shown.get(row.id)) is not None
+        if (record := records.get(row.id)) is not None
         and WalkingCondition(aid=row.aid, orthosis=row.orthosis, feedback=row.feedback).is_unaided
     )
 
@@ -72,13 +72,13 @@ _PEOPLE: Final = (
 
 
 def make_group(
-    reviewed: ReviewedAnalyses, known: Sequence[ControlVisit], speed_mps: float | None
+    reviewed: ReviewedAnalyses, visits: Sequence[ControlVisit], speed_mps: float | None
 ) -> ControlGroup | None:
     """Controls with a gait speed similar to the patient's; None without any control or without a speed."""
-    if not known or speed_mps is None:
+    if not visits or speed_mps is None:
         return None
     near = (round(speed_mps - NEAR_MPS, 2), round(speed_mps + NEAR_MPS, 2))
-    return control_group([_session(reviewed, v) for v in known], speed_mps=near)
+    return control_group([_session(reviewed, v) for v in visits], speed_mps=near)
 
 
 def _session(reviewed: ReviewedAnalyses, visit: ControlVisit) -> ControlSession:

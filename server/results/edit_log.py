@@ -76,13 +76,13 @@ _OF_ALL: Final = (
 
 def edits_of_all(c: Connection, analysis_ids: Collection[str]) -> dict[str, EditHistory]:
     """The edits in effect of many analyses, by analysis, in one statement."""
-    made: dict[str, list[MadeEdit]] = {found: [] for found in analysis_ids}
-    undone: dict[str, list[Edit]] = {found: [] for found in made}
-    version = dict.fromkeys(made, 0)
+    by_analysis: dict[str, list[MadeEdit]] = {analysis_key: [] for analysis_key in analysis_ids}
+    undone: dict[str, list[Edit]] = {analysis_key: [] for analysis_key in by_analysis}
+    version = dict.fromkeys(by_analysis, 0)
     changed_at: dict[str, dt.datetime] = {}
-    for row in c.execute(_OF_ALL, {"analysis_ids": list(made)}) if made else ():
+    for row in c.execute(_OF_ALL, {"analysis_ids": list(by_analysis)}) if by_analysis else ():
         version[row.analysis_id], changed_at[row.analysis_id] = row.seq, row.at
-        live, stack = made[row.analysis_id], undone[row.analysis_id]
+        live, stack = by_analysis[row.analysis_id], undone[row.analysis_id]
         if row.kind == UNDO:
             stack.append(live.pop().edit)
             continue
@@ -93,6 +93,8 @@ def edits_of_all(c: Connection, analysis_ids: Collection[str]) -> dict[str, Edit
             stack.clear()
         live.append(MadeEdit(row.seq, edit, row.display_name, row.at))
     return {
-        found: EditHistory(version[found], tuple(live), changed_at.get(found), tuple(undone[found]))
-        for found, live in made.items()
+        analysis_key: EditHistory(
+            version[analysis_key], tuple(live), changed_at.get(analysis_key), tuple(undone[analysis_key])
+        )
+        for analysis_key, live in by_analysis.items()
     }

@@ -66,30 +66,30 @@ def gather(
     ----------
     done : the analysed sessions of the patient (histories.analysed).
     """
-    at = {a.session.id: a for a in done}
-    given = prescriptions.trainings(c, patient.id)
-    here = [t for t in given if t.session_id == session_id]
-    if not here:
+    by_session = {a.session.id: a for a in done}
+    history = prescriptions.trainings(c, patient.id)
+    of_this_session = [t for t in history if t.session_id == session_id]
+    if not of_this_session:
         return FeedbackRecords(patient, None, reason="no_feedback")
-    this = _analysed_take(at.get(session_id), here)
+    this = _analysed_take(by_session.get(session_id), of_this_session)
     if isinstance(this, str):
         return FeedbackRecords(patient, None, reason=this)
     earlier = (
         t
-        for t in reversed(given[: given.index(here[0])])
+        for t in reversed(history[: history.index(of_this_session[0])])
         if prescriptions.same_training(t.content, this.content)
-        and _analysed_take(at.get(t.session_id), [t]) is t
-        and is_alike(at[t.session_id].condition, at[session_id].condition)
+        and _analysed_take(by_session.get(t.session_id), [t]) is t
+        and is_alike(by_session[t.session_id].condition, by_session[session_id].condition)
     )
-    both = [this, *itertools.islice(earlier, 1)]
-    cues = prescriptions.cues(c, [t.take_id for t in both])
-    trained = [TrainedSession(at[t.session_id], t, tuple(cues[t.take_id])) for t in both]
+    sessions_compared = [this, *itertools.islice(earlier, 1)]
+    cues = prescriptions.cues(c, [t.take_id for t in sessions_compared])
+    trained = [TrainedSession(by_session[t.session_id], t, tuple(cues[t.take_id])) for t in sessions_compared]
     return FeedbackRecords(patient, trained[0], trained[1] if len(trained) == 2 else None)
 
 
 def view(reviewed: ReviewedAnalyses, gathered: FeedbackRecords) -> FeedbackView | None:
     """Combine cues and strides; None if there are none, with a `reason`; raises IntegrityError."""
-    this, before = gathered.this, gathered.before
+    this, previous = gathered.this, gathered.before
     if this is None:
         return None
     content = this.training.content
@@ -97,10 +97,12 @@ def view(reviewed: ReviewedAnalyses, gathered: FeedbackRecords) -> FeedbackView 
     stood = bundle.angles is not None and bundle.angles.zero == "standing"
     curves = cycle_curves(bundle.angles, bundle.strides) if stood and bundle.angles else None
     earlier = None
-    if before is not None:
-        there = before.at.session
+    if previous is not None:
+        previous_session = previous.at.session
         earlier = PreviousTraining(
-            there.id, there.performed_on, split(_strides(reviewed, before)[1], before.cues)
+            previous_session.id,
+            previous_session.performed_on,
+            split(_strides(reviewed, previous)[1], previous.cues),
         )
     return report.feedback_view(
         content,
@@ -122,11 +124,11 @@ def _strides(
     return bundle, report.list_analysed_strides(bundle.strides, column)
 
 
-def _analysed_take(at: AnalysedSession | None, takes: Sequence[TrainedTake]) -> TrainedTake | str:
+def _analysed_take(analysed: AnalysedSession | None, takes: Sequence[TrainedTake]) -> TrainedTake | str:
     """The live trial on which a session's analysis is based, or the reason why there is none."""
-    if at is None:
+    if analysed is None:
         return "not_analysed"
-    take = next((t for t in takes if t.recording_id == at.found.recording_id), None)
+    take = next((t for t in takes if t.recording_id == analysed.found.recording_id), None)
     if take is not None:
         return take
     return "not_analysed" if takes[-1].recording_id is None else "other_recording"

@@ -116,17 +116,17 @@ def submit(
         the session, its analysis, or the reference. ParameterError: see `require_filters`.
     """
     require_filters(filters)
-    found = analyses.get_shown(c, session_id)
+    record = analyses.get_shown(c, session_id)
     against = None if reference is None else reference_files.get(c, session_id, reference)
     return submit_on_shown(
         c,
         queue,
         actor,
-        found,
+        record,
         COMPARE_FILTERS,
         "filters.requested",
         against=against,
-        edits=[e.to_json() for e in edit_log.edits_of(c, found.id).edits],
+        edits=[e.to_json() for e in edit_log.edits_of(c, record.id).edits],
         settings={"filters": list(dict.fromkeys(filters)), "magnetometer": magnetometer},
         reference=None if against is None else {"name": against.name, "sha256": against.sha256},
     )
@@ -154,10 +154,10 @@ def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Map
 
 def get(c: Connection, run_id: str) -> FilterRunRecord:
     """One comparison; raises NotFound."""
-    found = _runs(c, _QUERY.where(filter_run.c.id == run_id))
-    if not found:
+    runs = _runs(c, _QUERY.where(filter_run.c.id == run_id))
+    if not runs:
         raise NotFound("filter run", run_id)
-    return found[0]
+    return runs[0]
 
 
 def of_session(c: Connection, session_id: str) -> list[FilterRunRecord]:
@@ -166,11 +166,11 @@ def of_session(c: Connection, session_id: str) -> list[FilterRunRecord]:
     return _runs(c, _QUERY.where(session.c.id == session_id).order_by(*newest))
 
 
-def file_bytes(blobs: BlobStore, found: FilterRunRecord, name: str) -> bytes:
+def file_bytes(blobs: BlobStore, run: FilterRunRecord, name: str) -> bytes:
     """Read and verify a result file; raises NotFound, IntegrityError."""
-    if name not in found.files:
+    if name not in run.files:
         raise NotFound("file", name)
-    return blobs.read(found.patient_id, found.files[name].sha256)
+    return blobs.read(run.patient_id, run.files[name].sha256)
 
 
 _QUERY = (

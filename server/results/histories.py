@@ -92,13 +92,13 @@ class AnalysedSession:
 
 def list_analysed(c: Connection, patient_id: str) -> list[AnalysedSession]:
     """Sessions of a patient with a result, oldest first."""
-    there = sessions.of_patient(c, patient_id)
-    shown = analyses.latest_of(c, [s.id for s in there])
-    edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
+    patient_sessions = sessions.of_patient(c, patient_id)
+    records = analyses.latest_of(c, [s.id for s in patient_sessions])
+    edits = edit_log.edits_of_all(c, [record.id for record in records.values()])
     return [
-        AnalysedSession(s, found, edits[found.id])
-        for s in reversed(there)
-        if (found := shown.get(s.id)) is not None
+        AnalysedSession(s, record, edits[record.id])
+        for s in reversed(patient_sessions)
+        if (record := records.get(s.id)) is not None
     ]
 
 
@@ -133,26 +133,26 @@ def read_history(
     protocol : only visits with this protocol. like : use the condition of this session; None = of `baseline`,
         otherwise of the newest visit.
     """
-    asked = [a for a in done if protocol in {None, a.session.protocol}]
+    candidates = [a for a in done if protocol in {None, a.session.protocol}]
     if like is None:
-        chosen = baseline(asked) or (asked[-1] if asked else None)
+        chosen = baseline(candidates) or (candidates[-1] if candidates else None)
     else:
         chosen = next((a for a in done if a.session.id == like), None)
         if chosen is None:
             raise NotFound("analysed visit of this patient", like)
     planned = {v.session_id: v for plan in plans for v in plan.visits if v.session_id is not None}
     visits = []
-    for a in asked:
+    for a in candidates:
         if chosen is None or not is_alike(a.condition, chosen.condition):
             continue
         plan = planned.get(a.session.id)
         label = None if plan is None else plan.label
         kind = classify_visit(a.session, None if plan is None else plan.kind)
         visits.append(read_visit(reviewed, a, kind, label))
-    shown = {v.session_id for v in visits}
-    rest = [a for a in done if a.session.id not in shown]
+    listed = {v.session_id for v in visits}
+    unlisted = [a for a in done if a.session.id not in listed]
     condition = None if chosen is None else replace(chosen.condition, feedback=False)
-    return PatientHistory(patient, condition, tuple(visits), _others(rest), tuple(plans))
+    return PatientHistory(patient, condition, tuple(visits), _others(unlisted), tuple(plans))
 
 
 def read_visit(
@@ -174,10 +174,10 @@ def read_performance(reviewed: ReviewedAnalyses, done: Sequence[AnalysedSession]
     """Read the days of all daily-life recordings, oldest first; raises IntegrityError."""
 
     def read(a: AnalysedSession) -> list[PerformanceDay]:
-        found = reviewed.read_bundle(a.found, a.edits).activity
-        if found is None:
+        daily = reviewed.read_bundle(a.found, a.edits).activity
+        if daily is None:
             return []
-        return daily_trend.read_performance(a.session.id, a.session.performed_on, found)
+        return daily_trend.read_performance(a.session.id, a.session.performed_on, daily)
 
     days: list[PerformanceDay] = []
     for a in done:
@@ -188,12 +188,12 @@ def read_performance(reviewed: ReviewedAnalyses, done: Sequence[AnalysedSession]
 
 def read_capacity(history: PatientHistory) -> list[CapacityVisit]:
     """Walking capacity from the walks of a history, oldest first, excluding daily life."""
-    found = (
+    capacities = (
         daily_trend.read_capacity(v.session_id, v.performed_on, v.title, v.numbers.parameters)
         for v in history.visits
         if v.condition.protocol != "activity"
     )
-    return [v for v in found if v is not None]
+    return [v for v in capacities if v is not None]
 
 
 def classify_visit(session: Session, planned: VisitKind | None) -> VisitKind:
@@ -203,10 +203,10 @@ def classify_visit(session: Session, planned: VisitKind | None) -> VisitKind:
     return planned or "assessment"
 
 
-def _others(rest: Sequence[AnalysedSession]) -> tuple[OtherWalks, ...]:
+def _others(unlisted: Sequence[AnalysedSession]) -> tuple[OtherWalks, ...]:
     """Visits by condition, in order of the newest."""
     groups: list[list[AnalysedSession]] = []
-    for a in reversed(rest):
+    for a in reversed(unlisted):
         alike = next((g for g in groups if is_alike(g[0].condition, a.condition)), None)
         if alike is None:
             groups.append([a])

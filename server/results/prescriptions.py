@@ -65,29 +65,29 @@ def write(
     given for a bilateral parameter.
     """
     patient = patients.get(c, patient_id)
-    asked = Prescription.from_json(content)
-    entry = CATALOGUE[asked.parameter]
-    if entry.shared and asked.side is not None:
+    draft = Prescription.from_json(content)
+    entry = CATALOGUE[draft.parameter]
+    if entry.shared and draft.side is not None:
         raise ServiceError(
             "both_sides",
-            f"{entry.label} is the same for both sides of a walk, so the {asked.side} side is not trained "
+            f"{entry.label} is common to both sides of a walk, so the {draft.side} side cannot be trained "
             "alone. Expected both sides, or another parameter.",
         )
-    made = _with_target(c, reviewed, patient, asked)
-    before = in_force(c, patient_id)
-    if before is not None:
-        _end(c, actor, before)
+    targeted = _with_target(c, reviewed, patient, draft)
+    previous = in_force(c, patient_id)
+    if previous is not None:
+        _end(c, actor, previous)
     written_id = new_id()
     c.execute(
         insert(prescription).values(
             id=written_id,
             patient_id=patient_id,
-            content=made.to_json(),
+            content=targeted.to_json(),
             created_at=now(),
             created_by=actor.user_id if actor else None,
         )
     )
-    audit.record(c, actor, "prescription.written", "patient", patient_id, _said(written_id, made))
+    audit.record(c, actor, "prescription.written", "patient", patient_id, _said(written_id, targeted))
     return get(c, written_id)
 
 
@@ -135,7 +135,7 @@ def for_take(
     patient = patients.get(c, this.patient_id)
     content = written.content
     by_norm = content.target.source == "norm"
-    walk = targets.last_walk(c, reviewed, patient, before=this, with_controls=by_norm)
+    walk = targets.last_walk(c, reviewed, patient, reference=this, with_controls=by_norm)
     if by_norm:
         fresh = targets.offer(walk, "norm", content.parameter, content.side).target
         content = content if fresh is None else replace(content, target=fresh)
@@ -149,10 +149,10 @@ def cues(c: Connection, take_ids: Sequence[str]) -> dict[str, list[Cue]]:
         .where(live_event.c.kind == "cue", live_event.c.take_id.in_(take_ids))
         .order_by(live_event.c.seq)
     )
-    given: dict[str, list[Cue]] = {take: [] for take in take_ids}
+    by_take: dict[str, list[Cue]] = {take: [] for take in take_ids}
     for take, content in c.execute(query):
-        given[take].append(Cue.from_json(content))
-    return given
+        by_take[take].append(Cue.from_json(content))
+    return by_take
 
 
 @dataclass(frozen=True)
@@ -226,23 +226,23 @@ def same_training(a: Prescription, b: Prescription) -> bool:
 
 
 def _with_target(
-    c: Connection, reviewed: ReviewedAnalyses, patient: Patient, asked: Prescription
+    c: Connection, reviewed: ReviewedAnalyses, patient: Patient, requested: Prescription
 ) -> Prescription:
-    source = asked.target.source
+    source = requested.target.source
     if source == "manual":
-        _refuse_impossible(asked)
-        return replace(asked, target=replace(asked.target, words="entered", session_id=None))
-    chosen = None if source == "norm" else asked.target.session_id
+        _refuse_impossible(requested)
+        return replace(requested, target=replace(requested.target, words="entered", session_id=None))
+    chosen = None if source == "norm" else requested.target.session_id
     walk = targets.last_walk(c, reviewed, patient, session_id=chosen)
-    found = targets.offer(walk, source, asked.parameter, asked.side)
-    if found.target is None:
-        raise ServiceError("no_target", found.reason or "")
-    return replace(asked, target=replace(found.target, source=source))
+    target_offer = targets.offer(walk, source, requested.parameter, requested.side)
+    if target_offer.target is None:
+        raise ServiceError("no_target", target_offer.reason or "")
+    return replace(requested, target=replace(target_offer.target, source=source))
 
 
-def _refuse_impossible(asked: Prescription) -> None:
+def _refuse_impossible(requested: Prescription) -> None:
     """Raise ServiceError bad_prescription for an implausible target, such as 60 typed for 0.60."""
-    entry, mean, sd = CATALOGUE[asked.parameter], asked.target.mean, asked.target.sd
+    entry, mean, sd = CATALOGUE[requested.parameter], requested.target.mean, requested.target.sd
     low, high = entry.target_range
     unit = f" {entry.printed_unit}" if entry.printed_unit else ""
     if mean is not None and not low <= mean <= high:
@@ -260,11 +260,11 @@ def _baseline(
     c: Connection, written: PatientPrescription, patient: Patient, walk: AnalysedWalk | None, session_id: str
 ) -> Baseline:
     content = written.content
-    given = trainings(c, patient.id)
-    alike = [t for t in given if same_training(t.content, content)]
+    trained = trainings(c, patient.id)
+    alike = [t for t in trained if same_training(t.content, content)]
     today = any(t.session_id == session_id for t in alike)
     baseline = Baseline(
-        last_level=_last_level(c, [t for t in given if t.prescription_id == written.id]),
+        last_level=_last_level(c, [t for t in trained if t.prescription_id == written.id]),
         # the block opens the visit, not its later takes
         after_training=bool(alike) and not today,
     )
@@ -281,8 +281,8 @@ def _mdc(
     patient: Patient, content: Prescription, walk: AnalysedWalk | None, side: Side
 ) -> ChangeLimit | None:
     """MDC of the untrained side, at its usual value or otherwise at the target."""
-    there = None if walk is None else targets.find_usual_value(walk, content.parameter, side)
-    value = content.target.mean if there is None else there.mean
+    usual = None if walk is None else targets.find_usual_value(walk, content.parameter, side)
+    value = content.target.mean if usual is None else usual.mean
     limb: Limb | None = None
     if patient.affected_side is not None:
         limb = "affected" if side == patient.affected_side else "unaffected"
@@ -292,8 +292,8 @@ def _mdc(
 def _last_level(c: Connection, own: Sequence[TrainedTake]) -> int | None:
     """Level of the last cue of the training itself; probe blocks at the start may have none yet."""
     for training in reversed(own):
-        given = cues(c, [training.take_id])[training.take_id]
-        levels = [q.level for q in given if q.why_not not in {"baseline", "retention"}]
+        trial_cues = cues(c, [training.take_id])[training.take_id]
+        levels = [q.level for q in trial_cues if q.why_not not in {"baseline", "retention"}]
         if levels:
             return levels[-1]
     return None

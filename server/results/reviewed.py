@@ -66,9 +66,9 @@ class StoredAnalysis:
         if stopped is not None:
             return f"The analysis stopped before events were looked for. {speak_places(stopped)}"
         if self.bundle.repetitions is not None:
-            return "Squats have no contacts and no strides. The overview lists every squat."
+            return "Squats have no contacts or strides. The overview lists all squats."
         return (
-            "This analysis was made by an earlier version, which did not keep what an edit is measured on. "
+            "This analysis was made by an earlier version that did not store the data needed for edits. "
             "Run the analysis again."
         )
 
@@ -92,11 +92,11 @@ class ReviewedAnalyses:
         self._parts: RecentValues[Any] = RecentValues(PARTS_KEPT)
         self._pages: RecentValues[Any] = RecentValues(PAGES_KEPT)
 
-    def open(self, found: analyses.AnalysisRecord) -> StoredAnalysis:
+    def open(self, record: analyses.AnalysisRecord) -> StoredAnalysis:
         """Return an analysis as stored, cached while in use; raises IntegrityError."""
 
         def read() -> StoredAnalysis:
-            files = self._read_files(found, NOT_READ)
+            files = self._read_files(record, NOT_READ)
             stored = load_bundle(files)
             if tracks.NAME not in files:
                 return StoredAnalysis(stored, None)
@@ -104,45 +104,45 @@ class ReviewedAnalyses:
                 stored, tracks.read_tracks(files[tracks.NAME], stored.events, stored.angles)
             )
 
-        return self._analyses.get(found.id, read)
+        return self._analyses.get(record.id, read)
 
-    def measure(self, found: analyses.AnalysisRecord, edits: EditHistory) -> MeasuredGait | None:
+    def measure(self, record: analyses.AnalysisRecord, edits: EditHistory) -> MeasuredGait | None:
         """Return results recomputed with the edits; None without edits, when the stored results apply."""
         if not edits.made:
             return None
-        return self._results.get((found.id, edits.key), lambda: self.measure_anew(found, edits.edits))
+        return self._results.get((record.id, edits.key), lambda: self.measure_anew(record, edits.edits))
 
-    def measure_anew(self, found: analyses.AnalysisRecord, edits: tuple[Edit, ...]) -> MeasuredGait:
+    def measure_anew(self, record: analyses.AnalysisRecord, edits: tuple[Edit, ...]) -> MeasuredGait:
         """Recompute with these edits, bypassing the cache.
 
         Raises
         ------
         Conflict no_tracks, IntegrityError, ParameterError of sagittal.core.events.edits.
         """
-        known = self.open(found)
-        if known.tracks is None:
-            raise Conflict("no_tracks", known.fixed_because or "")
-        return measure_gait(known.tracks, edits)
+        stored = self.open(record)
+        if stored.tracks is None:
+            raise Conflict("no_tracks", stored.fixed_because or "")
+        return measure_gait(stored.tracks, edits)
 
-    def keep_result(self, found: analyses.AnalysisRecord, edits: EditHistory, result: MeasuredGait) -> None:
+    def keep_result(self, record: analyses.AnalysisRecord, edits: EditHistory, result: MeasuredGait) -> None:
         """Cache the result of `measure_anew` for these edits."""
-        self._results.put((found.id, edits.key), result)
+        self._results.put((record.id, edits.key), result)
 
-    def read_columns(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Mapping[str, Column]:
+    def read_columns(self, record: analyses.AnalysisRecord, edits: EditHistory) -> Mapping[str, Column]:
         """Return current values of all strides, by parameter; raises IntegrityError."""
-        result = self.measure(found, edits)
+        result = self.measure(record, edits)
         if result is not None:
             return result.columns
-        if "strides.csv" not in found.files:
+        if "strides.csv" not in record.files:
             return {}
-        return read_columns(analyses.file_bytes(self.blobs, found, "strides.csv"))
+        return read_columns(analyses.file_bytes(self.blobs, record, "strides.csv"))
 
-    def read_bundle(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
+    def read_bundle(self, record: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
         """Return the analysis with its edits applied; raises IntegrityError."""
-        stored, result = self.open(found).bundle, self.measure(found, edits)
+        stored, result = self.open(record).bundle, self.measure(record, edits)
         return stored if result is None else apply_review(stored, result, edits.edits)
 
-    def read_without_tracks(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
+    def read_without_tracks(self, record: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
         """Return an analysis that is not being edited; without edits its tracks are neither read nor cached.
 
         Raises
@@ -150,14 +150,14 @@ class ReviewedAnalyses:
         IntegrityError, FormatError as `read_bundle`.
         """
         if edits.made:
-            return self.read_bundle(found, edits)
-        return load_bundle(self._read_files(found, {*NOT_READ, tracks.NAME}))
+            return self.read_bundle(record, edits)
+        return load_bundle(self._read_files(record, {*NOT_READ, tracks.NAME}))
 
-    def _read_files(self, found: analyses.AnalysisRecord, left_out: Collection[str]) -> dict[str, bytes]:
-        names = [n for n in found.files if n not in left_out and not n.startswith(EXPORTED)]
-        return {name: analyses.file_bytes(self.blobs, found, name) for name in names}
+    def _read_files(self, record: analyses.AnalysisRecord, left_out: Collection[str]) -> dict[str, bytes]:
+        names = [n for n in record.files if n not in left_out and not n.startswith(EXPORTED)]
+        return {name: analyses.file_bytes(self.blobs, record, name) for name in names}
 
-    def read_numbers(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Numbers:
+    def read_numbers(self, record: analyses.AnalysisRecord, edits: EditHistory) -> Numbers:
         """Return current parameters and scores; without edits no signal is read.
 
         Raises
@@ -168,14 +168,14 @@ class ReviewedAnalyses:
 
         def read() -> Numbers:
             if not edits.made:
-                stored = read_numbers(analyses.file_bytes(self.blobs, found, "analysis.json"))
+                stored = read_numbers(analyses.file_bytes(self.blobs, record, "analysis.json"))
                 if stored is not None:
                     return stored
-            return numbers_of(self.read_bundle(found, edits))
+            return numbers_of(self.read_bundle(record, edits))
 
-        return self._numbers.get((found.id, edits.key), read)
+        return self._numbers.get((record.id, edits.key), read)
 
-    def read_means(self, found: analyses.AnalysisRecord, edits: EditHistory) -> WalkMeans:
+    def read_means(self, record: analyses.AnalysisRecord, edits: EditHistory) -> WalkMeans:
         """Return the contribution of a control's walk to a reference; without edits no angles are read.
 
         Raises
@@ -183,33 +183,33 @@ class ReviewedAnalyses:
         IntegrityError, FormatError as `read_bundle`.
         """
         if not edits.made:
-            stored = read_means(analyses.file_bytes(self.blobs, found, "analysis.json"))
+            stored = read_means(analyses.file_bytes(self.blobs, record, "analysis.json"))
             if stored is not None:
                 return stored
-        return means_of(self.read_without_tracks(found, edits))
+        return means_of(self.read_without_tracks(record, edits))
 
-    def read_verdict(self, found: analyses.AnalysisRecord, edits: EditHistory) -> tuple[str, str]:
+    def read_verdict(self, record: analyses.AnalysisRecord, edits: EditHistory) -> tuple[str, str]:
         """Return symbol and word for the data quality of an analysis, for lists; raises IntegrityError."""
-        return self._verdicts.get((found.id, edits.key), lambda: self.read_numbers(found, edits).verdict)
+        return self._verdicts.get((record.id, edits.key), lambda: self.read_numbers(record, edits).verdict)
 
-    def read_speed(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Parameter | None:
+    def read_speed(self, record: analyses.AnalysisRecord, edits: EditHistory) -> Parameter | None:
         """Return the gait speed of an analysis, for lists; raises IntegrityError."""
 
         def read() -> Parameter | None:
-            numbers = self.read_numbers(found, edits)
+            numbers = self.read_numbers(record, edits)
             return next((p for p in numbers.parameters if p.name == "gait_speed_mps"), None)
 
-        return self._speeds.get((found.id, edits.key), read)
+        return self._speeds.get((record.id, edits.key), read)
 
     def keep_part(self, key: tuple[str, ...], make_value: Callable[[], _Value]) -> _Value:
         """Cache a frequently used part by a key that begins with the analysis's id."""
         return cast("_Value", self._parts.get(key, make_value))
 
     def keep_control(
-        self, found: analyses.AnalysisRecord, edits: EditHistory, make_value: Callable[[], ControlSession]
+        self, record: analyses.AnalysisRecord, edits: EditHistory, make_value: Callable[[], ControlSession]
     ) -> ControlSession:
         """Cache the reference data of a finished analysis of a control."""
-        return self._controls.get((found.id, edits.key), make_value)
+        return self._controls.get((record.id, edits.key), make_value)
 
     def keep_page(self, key: Hashable, make_value: Callable[[], _Value]) -> _Value:
         """Cache page content derived from analyses; `key` must identify all of them."""

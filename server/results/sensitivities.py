@@ -73,8 +73,8 @@ def read_reference(content: bytes, name: str, *, from_standing: bool) -> Referen
             "reference_unreadable", f"“{name}” is not the angles.parquet of an analysis or a simulation."
         ) from error
     offset: Mapping[str, float] = {} if from_standing else angles.zero_offset
-    known = {n: values + offset.get(n, 0.0) for n, values in angles.angles.items()}
-    return ReferenceAngles(angles.t_s, known)
+    by_name = {n: values + offset.get(n, 0.0) for n, values in angles.angles.items()}
+    return ReferenceAngles(angles.t_s, by_name)
 
 
 def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
@@ -98,10 +98,10 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
         reference = read_reference(last.read(), last.name, from_standing=settings["from_standing"])
     take = analysing.analyse_again(files, params, attempt, ANALYSED)
     if take.calibrated is None or take.legs is None:
-        why = "" if take.problem is None else f" {take.problem.message}"
-        raise EstimationError("no_squats", f"The legs of this take were not followed.{why}")
+        reason = "" if take.problem is None else f" {take.problem.message}"
+        raise EstimationError("no_squats", f"The legs of this take were not followed.{reason}")
     height = take.recording.subject.height_m
-    found = analyse_legs(
+    tables = analyse_legs(
         take.calibrated,
         [LegGeometry.from_height(height, side) for side in take.legs],
         reference,
@@ -109,8 +109,8 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
         params=take.config.squat.chain,
         progress=lambda _, share: attempt.progress("parameters", ANALYSED + (1.0 - ANALYSED) * share),
     )
-    told = summarise_sensitivity(found, settings["reference"], from_standing=settings["from_standing"])
-    return sensitivity_files(told, "sensitivity")
+    summary = summarise_sensitivity(tables, settings["reference"], from_standing=settings["from_standing"])
+    return sensitivity_files(summary, "sensitivity")
 
 
 def submit(
@@ -134,12 +134,12 @@ def submit(
         the session, its analysis, or the reference. Conflict: not_squats.
     """
     if sessions.get(c, session_id).protocol != "squat":
-        raise Conflict("not_squats", "This is analysed for squats; the visit has another protocol.")
-    found = analyses.get_shown(c, session_id)
+        raise Conflict("not_squats", "This analysis is for squats; the visit has another protocol.")
+    record = analyses.get_shown(c, session_id)
     against = None if reference is None else reference_files.get(c, session_id, reference)
     settings = {"reference": reference, "from_standing": from_standing}
     return submit_on_shown(
-        c, queue, actor, found, SENSITIVITY, "sensitivity.requested", against=against, settings=settings
+        c, queue, actor, record, SENSITIVITY, "sensitivity.requested", against=against, settings=settings
     )
 
 
@@ -165,9 +165,9 @@ def of_session(c: Connection, session_id: str) -> list[StoredSensitivity]:
     return [_stored(row) for row in rows]
 
 
-def find_file(c: Connection, found: StoredSensitivity) -> tuple[analyses.AnalysisRecord, str]:
+def find_file(c: Connection, stored: StoredSensitivity) -> tuple[analyses.AnalysisRecord, str]:
     """The analysis that stores the result, and the name of its JSON."""
-    return analyses.get(c, found.analysis_id), found.files[0]
+    return analyses.get(c, stored.analysis_id), stored.files[0]
 
 
 def _name(job_id: str, name: str) -> str:

@@ -99,11 +99,13 @@ def measure_visit(
     reviewed: ReviewedAnalyses, visit: ClinicVisit
 ) -> Mapping[tuple[str, Side | None], TakesFigure]:
     """All parameters of a visit by name and side; raises IntegrityError."""
-    by: dict[tuple[str, Side | None], dict[str, Parameter]] = {}
+    by_parameter: dict[tuple[str, Side | None], dict[str, Parameter]] = {}
     for take in visit.takes:
         for p in reviewed.read_numbers(take.found, take.edits).parameters:
-            by.setdefault((p.name, p.side), {})[take.session.id] = p
-    return {key: TakesFigure(found, join_takes(list(found.values()))) for key, found in by.items()}
+            by_parameter.setdefault((p.name, p.side), {})[take.session.id] = p
+    return {
+        key: TakesFigure(by_take, join_takes(list(by_take.values()))) for key, by_take in by_parameter.items()
+    }
 
 
 def find_before(
@@ -153,39 +155,39 @@ def choose_newest_walks(
 def read_newest_speeds(
     reviewed: ReviewedAnalyses,
     chosen: Mapping[str, Sequence[sessions.WalkedSession]],
-    shown: Mapping[str, analyses.AnalysisRecord],
+    records: Mapping[str, analyses.AnalysisRecord],
     edits: Mapping[str, edit_log.EditHistory],
 ) -> dict[str, NewestSpeed]:
     """Gait speed at the newest visit of each patient; unreadable ones are omitted.
 
     Parameters
     ----------
-    chosen : result of `choose_newest_walks`. shown : displayed analyses, by session.
+    chosen : result of `choose_newest_walks`. records : displayed analyses, by session.
     edits : by analysis.
     """
     speeds = {}
     for pid, walks in chosen.items():
         days: dict[dt.date, list[Parameter]] = {}
         for w in walks:
-            found = shown[w.id]
-            speed = _read_speed(reviewed, found, edits[found.id])
+            record = records[w.id]
+            speed = _read_speed(reviewed, record, edits[record.id])
             if speed is not None:
                 days.setdefault(w.performed_on, []).append(speed)
-        made = [join_takes(days[day]) for day in sorted(days)]
-        if made and max(days) == walks[0].performed_on and made[-1].mean is not None:
-            before = made[0] if len(made) > 1 else None
-            change = None if before is None else parameter_changes([before], [made[-1]])[0]
-            speeds[pid] = NewestSpeed(made[-1], change)
+        daily_means = [join_takes(days[day]) for day in sorted(days)]
+        if daily_means and max(days) == walks[0].performed_on and daily_means[-1].mean is not None:
+            previous = daily_means[0] if len(daily_means) > 1 else None
+            change = None if previous is None else parameter_changes([previous], [daily_means[-1]])[0]
+            speeds[pid] = NewestSpeed(daily_means[-1], change)
     return speeds
 
 
 def _read_speed(
-    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, edits: edit_log.EditHistory
+    reviewed: ReviewedAnalyses, record: analyses.AnalysisRecord, edits: edit_log.EditHistory
 ) -> Parameter | None:
-    if "analysis.json" not in found.files:
+    if "analysis.json" not in record.files:
         return None
     try:
-        return reviewed.read_speed(found, edits)
+        return reviewed.read_speed(record, edits)
     except UNREADABLE:
         return None
 

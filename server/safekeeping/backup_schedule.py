@@ -90,26 +90,26 @@ def read_state(settings: Settings) -> BackupState:
         return BackupState()
 
 
-def next_time(settings: Settings, at: dt.datetime) -> dt.datetime:
-    """Next occurrence of `backup_at`, in the time zone of `at`."""
+def next_time(settings: Settings, time: dt.datetime) -> dt.datetime:
+    """Next occurrence of `backup_at`, in the time zone of `time`."""
     hour, minute = map(int, settings.backup_at.split(":"))
-    day = at.replace(hour=hour, minute=minute, second=0, microsecond=0)
-    return day if day > at else day + dt.timedelta(days=1)
+    day = time.replace(hour=hour, minute=minute, second=0, microsecond=0)
+    return day if day > time else day + dt.timedelta(days=1)
 
 
-def is_due(settings: Settings, at: dt.datetime) -> bool:
+def is_due(settings: Settings, time: dt.datetime) -> bool:
     """Whether a backup is due: none since the last `backup_at`, and no failure within the hour.
 
     Parameters
     ----------
-    at : local time.
+    time : local time.
     """
     if not settings.backup_dir:
         return False
     state = read_state(settings)
-    if state.backup is not None and not state.backup.ok and at - state.backup.at < TRY_AGAIN:
+    if state.backup is not None and not state.backup.ok and time - state.backup.at < TRY_AGAIN:
         return False
-    last = next_time(settings, at) - dt.timedelta(days=1)
+    last = next_time(settings, time) - dt.timedelta(days=1)
     return state.good is None or state.good.at < last
 
 
@@ -124,14 +124,14 @@ def run(settings: Settings) -> BackupState:
         require_current(settings.database_source)
         key = read_key(Path(settings.backup_key)) if settings.backup_key else None
         with closing(Database(settings.database_source)) as db:
-            made = make_backup(db, settings, folder, key)
+            new_backup = make_backup(db, settings, folder, key)
         prune(folder)
-        said = ""
-        if made.left_out is not None:
-            said = LEFT_OUT
-        if made.missing:
-            said = f"{len(made.missing)} stored files are gone or damaged; see sagittal check."
-        backup = Outcome(now(), not made.missing, made.path.name, said, made.size)
+        message = ""
+        if new_backup.left_out is not None:
+            message = LEFT_OUT
+        if new_backup.missing:
+            message = f"{len(new_backup.missing)} stored files are gone or damaged; see sagittal check."
+        backup = Outcome(now(), not new_backup.missing, new_backup.path.name, message, new_backup.size)
     except (BackupFileError, BackupError, MigrationError, TombstoneError, OSError) as error:
         log.error("no backup was made: %s", error)
         backup = Outcome(now(), False, "", str(error))
@@ -153,22 +153,22 @@ def _test(settings: Settings, folder: Path, key: ClinicKey | None) -> Outcome:
     if key is not None and not key.opens:
         return Outcome(now(), None, newest.name, NOT_TESTED)
     try:
-        found = try_restore(newest, settings, key)
+        restored = try_restore(newest, settings, key)
     except (BackupFileError, RestoreError, TombstoneError) as error:
         log.error("the newest backup could not be restored: %s", error)
         return Outcome(now(), False, newest.name, str(error))
-    said = f"{found.patients} patients, {found.sessions} visits, {found.files} files."
-    if found.names_open:
-        return Outcome(now(), True, newest.name, said)
+    message = f"{restored.patients} patients, {restored.sessions} visits, {restored.files} files."
+    if restored.names_open:
+        return Outcome(now(), True, newest.name, message)
     # what is not encrypted never holds the key; what is should
-    return Outcome(now(), key is None, newest.name, f"{said} {CLOSED}")
+    return Outcome(now(), key is None, newest.name, f"{message} {CLOSED}")
 
 
 def _parse(tree: Any) -> Outcome | None:
     if tree is None:
         return None
-    at = dt.datetime.fromisoformat(tree["at"])
-    return Outcome(at, tree["ok"], tree["name"], tree["said"], tree["size"])
+    time = dt.datetime.fromisoformat(tree["at"])
+    return Outcome(time, tree["ok"], tree["name"], tree["said"], tree["size"])
 
 
 def _write(settings: Settings, state: BackupState) -> BackupState:

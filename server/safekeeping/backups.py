@@ -109,10 +109,10 @@ def make_backup(
     BackupError
         another backup is in progress, or the target cannot be written.
     """
-    at = now()
+    time = now()
     is_file = target.name.endswith(ENDS)
     folder = target.parent if is_file else target
-    path = target if is_file else target / _name(at, key)
+    path = target if is_file else target / _name(time, key)
     if not folder.is_dir():
         raise BackupError(f"There is no folder {folder}. Make it, or connect the disk, and try again.")
     if path.is_relative_to(settings.data_dir):
@@ -125,7 +125,7 @@ def make_backup(
         try:
             _clear(settings.backups, 0.0)
             _clear(folder, _OLD_S)
-            made = _write(db, settings, path, key, at)
+            backup = _write(db, settings, path, key, time)
             with db.read() as c:
                 keep_tombstones(find_tombstones(c), folder)
         finally:
@@ -137,44 +137,44 @@ def make_backup(
     except StoreAway as error:
         raise BackupError(f"The stored files cannot be read ({error.detail}); no backup was made.") from error
     with db.write() as c:
-        detail = {"files": made.files, "size": made.size, "missing": len(made.missing)}
+        detail = {"files": backup.files, "size": backup.size, "missing": len(backup.missing)}
         audit.record(c, actor, "backup.made", "database", None, detail)
-    return made
+    return backup
 
 
 def list_backups(folder: Path) -> list[Backup]:
     """Backups in a folder, newest first; other files are ignored."""
-    found = []
+    backups = []
     for path in folder.iterdir() if folder.is_dir() else ():
         named = _NAME.fullmatch(path.name)
         with contextlib.suppress(ValueError, FileNotFoundError):
             if named is not None:
-                at = dt.datetime.strptime(named[1], _STAMP).replace(tzinfo=dt.UTC)
-                found.append(Backup(path, at, path.stat().st_size))
-    return sorted(found, key=lambda one: one.at, reverse=True)
+                time = dt.datetime.strptime(named[1], _STAMP).replace(tzinfo=dt.UTC)
+                backups.append(Backup(path, time, path.stat().st_size))
+    return sorted(backups, key=lambda one: one.at, reverse=True)
 
 
 def choose_kept(times: Iterable[dt.datetime]) -> set[dt.datetime]:
     """Backups to retain: the newest of each of the last days, weeks and months that have any."""
     newest_first = sorted(times, reverse=True)
-    kept: set[dt.datetime] = set()
+    retained: set[dt.datetime] = set()
     for most, period in (
         (DAYS, lambda t: t.date()),
         (WEEKS, lambda t: t.isocalendar()[:2]),
         (MONTHS, lambda t: (t.year, t.month)),
     ):
         first: dict[object, dt.datetime] = {}
-        for at in newest_first:
-            first.setdefault(period(at), at)
-        kept |= set(list(first.values())[:most])
-    return kept
+        for moment in newest_first:
+            first.setdefault(period(moment), moment)
+        retained |= set(list(first.values())[:most])
+    return retained
 
 
 def prune(folder: Path) -> list[Path]:
     """Remove the backups of a folder not selected by `choose_kept`; return their names."""
-    found = list_backups(folder)
-    kept = choose_kept(one.at for one in found)
-    gone = [one.path for one in found if one.at not in kept]
+    backups = list_backups(folder)
+    retained = choose_kept(one.at for one in backups)
+    gone = [one.path for one in backups if one.at not in retained]
     for path in gone:
         fs.remove_file(path)
     if gone:
@@ -189,7 +189,7 @@ def count_patients_and_sessions(c: Connection) -> tuple[int, int]:
 
 
 def _write(
-    db: Database, settings: Settings, path: Path, key: ClinicKey | None, at: dt.datetime
+    db: Database, settings: Settings, path: Path, key: ClinicKey | None, time: dt.datetime
 ) -> MadeBackup:
     content = _Content()
     with fs.IncomingFile(path.parent) as file:
@@ -214,7 +214,7 @@ def _write(
             left_out = _add_names_key(archive, settings, content, encrypted=key is not None)
             manifest = {
                 "format": FORMAT,
-                "created_at": at.isoformat(),
+                "created_at": time.isoformat(),
                 "code_version": CODE_VERSION,
                 "revision": revision,
                 "audit_head": None if head is None else {"seq": head.seq, "hash": head.hash},
@@ -292,8 +292,8 @@ def _add_blobs(
             continue
         with source:
             _add_open(archive, f"blobs/{space}/{sha256}", source, content)
-        name, _, found = content.files[-1]
-        if found != sha256:
+        name, _, digest = content.files[-1]
+        if digest != sha256:
             # its bytes stay in the archive for whoever can mend them; a restore takes it for what it is
             log.error("%s has changed on the disk; see `sagittal check`", name)
             content.missing.append((space, sha256))
@@ -301,9 +301,9 @@ def _add_blobs(
 
 def _open(blobs: BlobStore, space: str, sha256: str) -> BinaryIO | None:
     """Open a stored file, or its copy in the trash since the snapshot; None = neither exists."""
-    found = blobs.open_unverified(space, sha256)
-    if found is not None:
-        return found
+    file = blobs.open_unverified(space, sha256)
+    if file is not None:
+        return file
     for one in blobs.trash.files():
         if (one.space, one.name) == (space, sha256):
             with contextlib.suppress(FileNotFoundError):
@@ -320,5 +320,5 @@ def _clear(folder: Path, least_age_s: float) -> None:
                 fs.remove_file(path)
 
 
-def _name(at: dt.datetime, key: ClinicKey | None) -> str:
-    return f"sagittal-{at:{_STAMP}}.tar{'' if key is None else '.age'}"
+def _name(time: dt.datetime, key: ClinicKey | None) -> str:
+    return f"sagittal-{time:{_STAMP}}.tar{'' if key is None else '.age'}"

@@ -162,8 +162,8 @@ def _strangers(settings: Settings, erased: set[str]) -> str | None:
     # a folder that was never a clinic's is left as it is: opening would make one
     stored = open_blobs(settings).files() if settings.bucket or settings.blobs.exists() else ()
     files = sum(1 for f in stored if f.space not in leaving)
-    found = (path for folder in settings.live_folders for path in folder.glob("*.log"))
-    logs = sum(1 for path in found if path.stem not in takes)
+    paths = (path for folder in settings.live_folders for path in folder.glob("*.log"))
+    logs = sum(1 for path in paths if path.stem not in takes)
     if not files and not logs:
         return None
     return (

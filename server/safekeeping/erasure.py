@@ -75,10 +75,10 @@ def erase_patient(
 ) -> None:
     """Erase a patient with all data; `confirm` repeats the code, otherwise Conflict not_confirmed."""
     with db.write() as c:
-        found = patients.get(c, patient_id)
-        if confirm.strip() != found.code:
+        target = patients.get(c, patient_id)
+        if confirm.strip() != target.code:
             raise Conflict(
-                "not_confirmed", f"To delete this patient for good, repeat the code '{found.code}'."
+                "not_confirmed", f"To delete this patient for good, repeat the code '{target.code}'."
             )
         mine = select(session.c.id).where(session.c.patient_id == patient_id)
         parts = list(c.execute(select(file_upload.c.id).where(file_upload.c.session_id.in_(mine))).scalars())
@@ -95,7 +95,7 @@ def erase_patient(
         for table in (patient_identity, consent, care_team_member, emergency_access):
             c.execute(delete(table).where(table.c.patient_id == patient_id))
         c.execute(delete(patient).where(patient.c.id == patient_id))
-        audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": found.sessions})
+        audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": target.sessions})
         _note(settings, spaces=[patient_id], takes=takes, parts=parts)
     reviewed.forget()
     finish(db, reviewed.blobs, settings)
@@ -106,12 +106,12 @@ def erase_session(
 ) -> None:
     """Erase one session with its recordings and results; raises NotFound."""
     with db.write() as c:
-        found = sessions.get(c, session_id)
-        own = _files_of(c, session_id, found.patient_id)
+        target = sessions.get(c, session_id)
+        own = _files_of(c, session_id, target.patient_id)
         mine = select(file_upload.c.id).where(file_upload.c.session_id == session_id)
         parts = list(c.execute(mine).scalars())
         takes = _erase_session_rows(c, session_id)
-        audit.record(c, actor, SESSION_ERASED, "session", session_id, {"patient_id": found.patient_id})
+        audit.record(c, actor, SESSION_ERASED, "session", session_id, {"patient_id": target.patient_id})
         _note(settings, files=sorted(own), takes=takes, parts=parts)
     reviewed.forget()
     finish(db, reviewed.blobs, settings)
@@ -176,8 +176,8 @@ def list_erased_spaces(c: Connection, among: Collection[str] | None = None) -> s
     query = select(audit_table.c.resource_id).where(audit_table.c.action == ERASED)
     if among is not None:
         query = query.where(audit_table.c.resource == "patient", audit_table.c.resource_id.in_(among))
-    found = set(c.execute(query).scalars())
-    return found - set(c.execute(select(patient.c.id)).scalars())
+    ids = set(c.execute(query).scalars())
+    return ids - set(c.execute(select(patient.c.id)).scalars())
 
 
 def list_unfinished(settings: Settings) -> tuple[set[str], set[str]]:

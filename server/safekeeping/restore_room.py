@@ -50,15 +50,15 @@ def make_empty(settings: Settings) -> None:
                 fs.remove_file(path)
             fs.sync_folder(settings.data_dir)
         clear_stage(stage)
-    found = _find_others(settings)
+    names = _find_others(settings)
     if _has_database(settings) and settings.database_url:
         raise RestoreError(
             "The PostgreSQL database holds a clinic already; nothing was changed. Make an empty one and set "
             "SAGITTAL_DATABASE_URL to it."
         )
-    if found:
+    if names:
         raise RestoreError(
-            f"{settings.data_dir} is not empty ({', '.join(found[:5])}). Restore into an empty folder; move "
+            f"{settings.data_dir} is not empty ({', '.join(names[:5])}). Restore into an empty folder; move "
             "the old one aside first, and keep it."
         )
     fs.remove_tree(settings.blobs)  # no file is in it

@@ -181,8 +181,8 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
     fs.make_folder(stage.live)
     with closing(Database(stage.database)) as db:
         with db.read() as c:
-            head, counted = read_newest(c), count_patients_and_sessions(c)
-        if head != manifest.audit_head or counted != (manifest.patients, manifest.sessions):
+            head, counts = read_newest(c), count_patients_and_sessions(c)
+        if head != manifest.audit_head or counts != (manifest.patients, manifest.sessions):
             raise RestoreError(f"{archive.name}: its database is not the one that its manifest describes.")
         defects = [
             defect
@@ -191,7 +191,7 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
         ]
         if defects:
             raise RestoreError(f"{archive.name}: {defects[0].area}: {defects[0].message}")
-        again = _erase_again(db, blobs, stage, gone | manifest.erased)
+        erased_counts = _erase_again(db, blobs, stage, gone | manifest.erased)
         with db.write() as c:
             # who had signed in then has not signed in here; what was revoked since must not work again
             for table in (login_session, failed_attempt, web_node):
@@ -201,7 +201,7 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
             c.execute(delete(one_time_token))
             c.execute(update(report_link).where(report_link.c.revoked_at.is_(None)).values(revoked_at=now()))
             care_teams.end_all_emergencies(c)
-            detail = {"created_at": manifest.created_at.isoformat(), "erased_again": again}
+            detail = {"created_at": manifest.created_at.isoformat(), "erased_again": erased_counts}
             audit.record(c, None, RESTORED, "database", None, detail)
         with db.read() as c:
             people, visits = count_patients_and_sessions(c)
@@ -210,13 +210,13 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
     fs.sync_file(stage.database)
     files = sum(1 for _ in blobs.files()) + sum(1 for _ in stage.live.iterdir())
     return RestoredClinic(
-        manifest.created_at, people, visits, files, again, len(manifest.missing), names_open
+        manifest.created_at, people, visits, files, erased_counts, len(manifest.missing), names_open
     )
 
 
 def _extract(archive: Path, stage: Settings, key: ClinicKey | None) -> BackupManifest:
     """Extract every file of the archive and compare it with the manifest, which comes last."""
-    found: set[tuple[str, int, str]] = set()
+    extracted: set[tuple[str, int, str]] = set()
     manifest: BackupManifest | None = None
     with closing(read_archive(archive, key)) as members:
         for name, size, content in members:
@@ -227,13 +227,13 @@ def _extract(archive: Path, stage: Settings, key: ClinicKey | None) -> BackupMan
                     raise RestoreError(f"{archive.name}: a manifest of {size} bytes is none of ours.")
                 manifest = _read_manifest(archive, content.read(size))
             elif name == DATABASE or _OURS.fullmatch(name):
-                found.add((name, size, _write(stage.data_dir / name, content)))
+                extracted.add((name, size, _write(stage.data_dir / name, content)))
             else:
                 raise RestoreError(f"{archive.name} holds '{name[:80]}', which no backup does.")
     if manifest is None:
         raise RestoreError(f"{archive.name} is damaged or was cut: it has no manifest. Use another backup.")
-    if found != manifest.files:
-        wrong = sorted(one[0] for one in found ^ manifest.files)
+    if extracted != manifest.files:
+        wrong = sorted(one[0] for one in extracted ^ manifest.files)
         raise RestoreError(
             f"{archive.name} is damaged: {wrong[0]} is not what was stored. Use another backup."
         )

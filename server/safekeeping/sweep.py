@@ -55,36 +55,36 @@ def _sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
     uploads.drop_abandoned(db, blobs)
     with db.read() as c:
         used = _list_used(c)
-    trash, at, taken, step = blobs.trash, now(), 0, blobs.moved_at_once
+    trash, time, count, step = blobs.trash, now(), 0, blobs.moved_at_once
     idle = [f for f in old if (f.space, f.name) not in used]
     for group in (idle[i : i + step] for i in range(0, len(idle), step)):
         going = [(f.space, f.name) for f in group if f.space != INCOMING and f.space not in erased]
-        kept, gone = [], []
-        trash.prepare(going, at)
+        removable, gone = [], []
+        trash.prepare(going, time)
         with db.write() as c:
             # again: somebody may have been erased while copies were made
             used, since = _list_used(c), erasure.list_erased_spaces(c, {f.space for f in group})
             for stored in group:
                 if (stored.space, stored.name) in used or not blobs.is_older(stored, settings.sweep_grace_s):
                     continue
-                taken += 1
+                count += 1
                 if stored.space == INCOMING or stored.space in since:
                     gone.append(stored)
                 else:
-                    kept.append((stored.space, stored.name))
+                    removable.append((stored.space, stored.name))
             blobs.discard(gone)
-            trash.take(kept, at)
-        trash.forget(set(going) - set(kept), at)
-        trash.settle(kept, at)
-        if kept:
-            log.warning("%d stored files that nothing refers to are in %s now", len(kept), trash.place)
+            trash.take(removable, time)
+        trash.forget(set(going) - set(removable), time)
+        trash.settle(removable, time)
+        if removable:
+            log.warning("%d stored files that nothing refers to are in %s now", len(removable), trash.place)
     trash.expire(now())
     with db.read() as c:
         erased = erasure.list_erased_spaces(c)
     # a sweep that was killed between copying and taking leaves copies
     if left := [one for one in trash.files() if one.space in erased]:
         trash.drop(left)
-    return taken
+    return count
 
 
 def _list_used(c: Connection) -> set[tuple[str, str]]:

@@ -32,8 +32,8 @@ class Tombstones:
     patients: frozenset[str] = frozenset()
     sessions: frozenset[str] = frozenset()
 
-    def __or__(self, other: Tombstones) -> Tombstones:
-        return Tombstones(self.patients | other.patients, self.sessions | other.sessions)
+    def __or__(self, operand: Tombstones) -> Tombstones:
+        return Tombstones(self.patients | operand.patients, self.sessions | operand.sessions)
 
     def tree(self) -> dict[str, list[str]]:
         """Convert to JSON."""
@@ -73,9 +73,9 @@ def read_tombstones(path: Path) -> Tombstones:
         ) from error
 
 
-def keep_tombstones(found: Tombstones, folder: Path) -> None:
+def keep_tombstones(erased: Tombstones, folder: Path) -> None:
     """Add to the list in a backup folder; nothing is written if all are included."""
     path = folder / NAME
-    known = read_tombstones(path)
-    if not path.exists() or known | found != known:
-        fs.write_file(path, json.dumps((known | found).tree()).encode())
+    stored = read_tombstones(path)
+    if not path.exists() or stored | erased != stored:
+        fs.write_file(path, json.dumps((stored | erased).tree()).encode())

@@ -87,11 +87,11 @@ def switch_on(c: Connection, actor: audit.Actor, *, begin_with_past: bool) -> No
     """
     if are_on(c):
         return
-    at = now()
+    time = now()
     rows = _list_past(c) if begin_with_past else []
     if rows:
-        c.execute(insert(care_team_member), [{"patient_id": p, "user_id": u, "since": at} for p, u in rows])
-    c.execute(insert(clinic_option).values(name=CARE_TEAMS, since=at))
+        c.execute(insert(care_team_member), [{"patient_id": p, "user_id": u, "since": time} for p, u in rows])
+    c.execute(insert(clinic_option).values(name=CARE_TEAMS, since=time))
     audit.record(c, actor, "care_teams.on", "clinic", None, {"members": len(rows)})
     report_links.end_orphaned(c, actor)
 
@@ -137,33 +137,33 @@ def set_team(
         the patient does not exist, or an id belongs to no active account.
     """
     patients.get(c, patient_id)
-    wanted = set(user_ids)
-    known = {one.user_id: is_in for one, is_in in list_people(c, patient_id)}
-    before = {user_id for user_id, is_in in known.items() if is_in}
-    unknown = wanted - known.keys()
+    members = set(user_ids)
+    membership = {one.user_id: is_in for one, is_in in list_people(c, patient_id)}
+    previous = {user_id for user_id, is_in in membership.items() if is_in}
+    unknown = members - membership.keys()
     if unknown:
         raise NotFound("account for a team", min(unknown))
-    gone = care_team_member.c.user_id.in_(before - wanted)
+    gone = care_team_member.c.user_id.in_(previous - members)
     c.execute(delete(care_team_member).where(care_team_member.c.patient_id == patient_id, gone))
-    for user_id in sorted(wanted - before):
+    for user_id in sorted(members - previous):
         c.execute(insert(care_team_member).values(patient_id=patient_id, user_id=user_id, since=now()))
-    if wanted != before:
-        detail = {"added": sorted(wanted - before), "removed": sorted(before - wanted)}
+    if members != previous:
+        detail = {"added": sorted(members - previous), "removed": sorted(previous - members)}
         audit.record(c, actor, "care_team.changed", "patient", patient_id, detail)
         report_links.end_orphaned(c, actor)
     return list_team(c, patient_id)
 
 
-def add_maker(c: Connection, who: Identity, patient_id: str) -> None:
+def add_maker(c: Connection, user: Identity, patient_id: str) -> None:
     """Add the user who creates a patient to its team; otherwise only administrators would have access."""
-    if who.role is not Role.ADMIN and are_on(c):
-        c.execute(insert(care_team_member).values(patient_id=patient_id, user_id=who.user_id, since=now()))
+    if user.role is not Role.ADMIN and are_on(c):
+        c.execute(insert(care_team_member).values(patient_id=patient_id, user_id=user.user_id, since=now()))
         audit.record(
-            c, who, "care_team.changed", "patient", patient_id, {"added": [who.user_id], "removed": []}
+            c, user, "care_team.changed", "patient", patient_id, {"added": [user.user_id], "removed": []}
         )
 
 
-def open_in_emergency(c: Connection, who: Identity, code: str, reason: str) -> EmergencyAccess:
+def open_in_emergency(c: Connection, user: Identity, code: str, reason: str) -> EmergencyAccess:
     """Give a user outside the team temporary access to a patient.
 
     Requires the exact code, so that it cannot be used to search for patients.
@@ -175,52 +175,60 @@ def open_in_emergency(c: Connection, who: Identity, code: str, reason: str) -> E
     care_teams_off, seen_already.
     """
     if not are_on(c):
-        raise Conflict("care_teams_off", "This clinic has no care teams: you see every patient in the list.")
-    why = " ".join(reason.split())
-    if not REASON[0] <= len(why) <= REASON[1]:
+        raise Conflict(
+            "care_teams_off", "This clinic does not use care teams: all patients are in your list."
+        )
+    text = " ".join(reason.split())
+    if not REASON[0] <= len(text) <= REASON[1]:
         raise ServiceError(
             "bad_value",
-            f"The reason has {len(why)} {plural(len(why), 'character', 'characters')}. "
+            f"The reason has {len(text)} {plural(len(text), 'character', 'characters')}. "
             f"Expected {REASON[0]} to {REASON[1]}.",
         )
-    wanted = normalize("NFKC", code).strip()
-    found = c.execute(select(patient.c.id).where(patient.c.code == wanted)).scalar()
-    if found is None:
-        raise NotFound("patient", wanted)
-    if may_open(c, who, {"patient_id": found}):
-        raise Conflict("seen_already", "You may open this patient already; look in the list of patients.")
-    at = now()
-    row = {"id": new_id(), "patient_id": found, "reason": why, "opened_at": at, "ends_at": at + EMERGENCY}
-    c.execute(insert(emergency_access).values(**row, user_id=who.user_id))
+    normalized = normalize("NFKC", code).strip()
+    patient_id = c.execute(select(patient.c.id).where(patient.c.code == normalized)).scalar()
+    if patient_id is None:
+        raise NotFound("patient", normalized)
+    if may_open(c, user, {"patient_id": patient_id}):
+        raise Conflict("seen_already", "You already have access to this patient; see the patient list.")
+    time = now()
+    row = {
+        "id": new_id(),
+        "patient_id": patient_id,
+        "reason": text,
+        "opened_at": time,
+        "ends_at": time + EMERGENCY,
+    }
+    c.execute(insert(emergency_access).values(**row, user_id=user.user_id))
     # the reason stays with the patient, and goes when the patient is erased; the row of the log does not
     detail = {"access": row["id"], "hours": EMERGENCY / dt.timedelta(hours=1)}
-    audit.record(c, who, "emergency.opened", "patient", found, detail)
+    audit.record(c, user, "emergency.opened", "patient", patient_id, detail)
     return _get_access(c, row["id"])
 
 
-def may_end(access: EmergencyAccess, who: Identity) -> bool:
+def may_end(access: EmergencyAccess, user: Identity) -> bool:
     """Whether a user may end an access: its owner or an administrator."""
-    return who.is_admin or access.by_id == who.user_id
+    return user.is_admin or access.by_id == user.user_id
 
 
-def end_emergency(c: Connection, who: Identity, access_id: str) -> EmergencyAccess:
+def end_emergency(c: Connection, user: Identity, access_id: str) -> EmergencyAccess:
     """End an emergency access and the links that depend on it; no effect if it has ended.
 
     Raises
     ------
     NotFound; NotAllowed `not_yours` for another user's access.
     """
-    found = _get_access(c, access_id)
-    if not may_end(found, who):
+    access = _get_access(c, access_id)
+    if not may_end(access, user):
         raise NotAllowed(
-            "not_yours", f"{found.by} opened this patient. Ask that person or an administrator to end it."
+            "not_yours", f"{access.by} opened this patient. Ask that person or an administrator to end it."
         )
-    if found.is_open:
+    if access.is_open:
         mine = emergency_access.c.id == access_id
         c.execute(update(emergency_access).where(mine).values(ended_at=now()))
-        report_links.end_of_emergency(c, who, access_id)
-        report_links.end_orphaned(c, who)
-        audit.record(c, who, "emergency.ended", "patient", found.patient_id, {"access": access_id})
+        report_links.end_of_emergency(c, user, access_id)
+        report_links.end_orphaned(c, user)
+        audit.record(c, user, "emergency.ended", "patient", access.patient_id, {"access": access_id})
     return _get_access(c, access_id)
 
 
@@ -247,7 +255,7 @@ def _select_accesses() -> Select[Any]:
 def _get_access(c: Connection, access_id: str) -> EmergencyAccess:
     row = c.execute(_select_accesses().where(emergency_access.c.id == access_id)).first()
     if row is None:
-        raise NotFound("access in an emergency", access_id)
+        raise NotFound("emergency access", access_id)
     return _make_access(row)
 
 

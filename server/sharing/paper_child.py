@@ -10,9 +10,9 @@ import logging
 import msgspec
 
 from sagittal.core.errors import SagittalError
+from sagittal.core.user_text import encode_user_text
 from sagittal.server.processes.child import enter_child
 from sagittal.server.report.pdf import render_pdf
-from sagittal.web.user_text import encode_user_text
 
 
 class PaperReply(msgspec.Struct, frozen=True):

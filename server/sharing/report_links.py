@@ -67,7 +67,7 @@ class LinkNotFound(ServiceError):  # noqa: N818 - as NotFound
     def __init__(self) -> None:
         super().__init__(
             "link_not_valid",
-            "This address leads to no report any more. Ask the clinic for a new one.",
+            "This link is no longer valid. Ask the clinic for a new one.",
         )
 
 
@@ -81,14 +81,14 @@ def make(
     NotFound
         the report. ServiceError: bad_value. Conflict: not_in_force, if the report was reopened.
     """
-    found = signed_reports.get(c, report_id)
-    if not found.in_force:
-        raise Conflict("not_in_force", f"Version {found.number} was reopened. Share the one that is signed.")
+    report = signed_reports.get(c, report_id)
+    if not report.in_force:
+        raise Conflict("not_in_force", f"Version {report.number} was reopened. Share the signed version.")
     if not 1 <= days <= MOST_DAYS:
-        raise ServiceError("bad_value", f"A link lives {days} days, expected 1 to {MOST_DAYS}.")
+        raise ServiceError("bad_value", f"A link is valid for {days} days; expected 1 to {MOST_DAYS}.")
     token, link_id, time = new_token(), new_id(), now()
     expires_at = time + dt.timedelta(days=days)
-    patient_id = sessions.get(c, found.session_id).patient_id
+    patient_id = sessions.get(c, report.session_id).patient_id
     emergency = find_emergency(c, actor, patient_id)
     if emergency is not None:
         expires_at = min(expires_at, emergency.ends_at)
@@ -108,7 +108,7 @@ def make(
     detail = {"report_id": report_id, "link_id": link_id, "days": days}
     if emergency is not None:
         detail["access"] = emergency.id
-    audit.record(c, actor, "report_link.made", "session", found.session_id, detail)
+    audit.record(c, actor, "report_link.made", "session", report.session_id, detail)
     return get(c, link_id), token
 
 
@@ -119,11 +119,11 @@ def revoke(c: Connection, actor: audit.Actor | None, link_id: str, because: str 
     ----------
     because : reason for the audit log, None = revoked by a user.
     """
-    found = get(c, link_id)
-    if found.revoked_at is None:
+    link = get(c, link_id)
+    if link.revoked_at is None:
         c.execute(update(report_link).where(report_link.c.id == link_id).values(revoked_at=now()))
-        session_id = signed_reports.get(c, found.report_id).session_id
-        detail = {"report_id": found.report_id, "link_id": link_id}
+        session_id = signed_reports.get(c, link.report_id).session_id
+        detail = {"report_id": link.report_id, "link_id": link_id}
         if because is not None:
             detail["because"] = because
         audit.record(c, actor, "report_link.revoked", "session", session_id, detail)
@@ -155,22 +155,22 @@ def reopen_report(
     c: Connection, actor: audit.Actor | None, report_id: str, reason: str, name: str
 ) -> signed_reports.SignedReport:
     """Reopen a signed report and end its links; raises like `signed_reports.reopen`."""
-    found = signed_reports.reopen(c, actor, report_id, reason, name)
-    for link in of_session(c, found.session_id):
+    report = signed_reports.reopen(c, actor, report_id, reason, name)
+    for link in of_session(c, report.session_id):
         if link.report_id == report_id and link.is_open:
             revoke(c, actor, link.id)
-    return found
+    return report
 
 
 def find_by_token(c: Connection, token: str) -> ReportLink:
     """The valid link with this token; raises LinkNotFound."""
     row = c.execute(select(*_COLUMNS).where(report_link.c.token_sha256 == token_hash(token))).first()
-    found = None if row is None else ReportLink(**row._asdict())
-    if found is None or not found.is_open:
+    link = None if row is None else ReportLink(**row._asdict())
+    if link is None or not link.is_open:
         raise LinkNotFound
-    if c.execute(_WITH_MAKER.where(report_link.c.id == found.id, ~_may_share())).first():
+    if c.execute(_WITH_MAKER.where(report_link.c.id == link.id, ~_may_share())).first():
         raise LinkNotFound
-    return found
+    return link
 
 
 def note_opening(db: Database, link: ReportLink, address: str) -> None:

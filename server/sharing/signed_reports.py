@@ -73,7 +73,7 @@ class SignedDocuments:
     report: SignedReport
     files: Mapping[str, Blob]
 
-    def describe(self, found: AnalysisRecord, edits: EditHistory) -> dict[str, Any]:
+    def describe(self, record: AnalysisRecord, edits: EditHistory) -> dict[str, Any]:
         """Metadata for an archive or export of this analysis with these edits, as JSON.
 
         `of_these_numbers` is False if another analysis was signed or edits were made afterwards.
@@ -85,7 +85,7 @@ class SignedDocuments:
             "signed_by": signed.signed_by,
             "signed_at": signed.signed_at.isoformat(timespec="seconds"),
             "sha256": signed.sha256,
-            "of_these_numbers": signed.analysis_id == found.id and not edits.changed_after(signed.signed_at),
+            "of_these_numbers": signed.analysis_id == record.id and not edits.changed_after(signed.signed_at),
         }
 
 
@@ -124,11 +124,11 @@ def write_assessment(c: Connection, actor: audit.Actor | None, session_id: str, 
 
 def require_open(c: Connection, session_id: str) -> None:
     """Raise Conflict report_signed while a signed report of the session is in force."""
-    found = find_in_force(c, session_id)
-    if found is not None:
+    report = find_in_force(c, session_id)
+    if report is not None:
         raise Conflict(
             "report_signed",
-            f"Version {found.number} of this report is signed and locked. Reopen it first, with a reason.",
+            f"Version {report.number} of this report is signed and locked. Reopen it first, with a reason.",
         )
 
 
@@ -136,8 +136,8 @@ def prepare_signature(c: Connection, session_id: str, report_id: str, name: str)
     """Signature to be printed in the next document; raises NotFound, Conflict report_signed."""
     sessions.get(c, session_id)
     require_open(c, session_id)
-    known = select(func.max(signed_report.c.number)).where(signed_report.c.session_id == session_id)
-    return Signature(report_id, (c.execute(known).scalar_one() or 0) + 1, name, now())
+    newest = select(func.max(signed_report.c.number)).where(signed_report.c.session_id == session_id)
+    return Signature(report_id, (c.execute(newest).scalar_one() or 0) + 1, name, now())
 
 
 def keep_signed(
@@ -156,10 +156,10 @@ def keep_signed(
     NotFound
         the session. Conflict: signed by another user in the meantime, report_signed or report_changed.
     """
-    after = prepare_signature(c, session_id, signature.report_id, signature.name)
-    if after.number != signature.number:
+    expected = prepare_signature(c, session_id, signature.report_id, signature.name)
+    if expected.number != signature.number:
         raise Conflict(
-            "report_changed", "Somebody else has signed this report meanwhile. Load the page again."
+            "report_changed", "Another user has signed this report in the meantime. Reload the page."
         )
     c.execute(
         insert(signed_report).values(
@@ -174,17 +174,17 @@ def keep_signed(
     )
     for name, blob in stored.items():
         _add_file(c, signature.report_id, name, blob)
-    found = get(c, signature.report_id)
-    detail = {"report_id": found.id, "version": found.number, "sha256": found.sha256}
+    report = get(c, signature.report_id)
+    detail = {"report_id": report.id, "version": report.number, "sha256": report.sha256}
     audit.record(c, actor, "signed_report.signed", "session", session_id, detail)
-    return found
+    return report
 
 
 def reopen(c: Connection, actor: audit.Actor | None, report_id: str, reason: str, name: str) -> SignedReport:
     """Reopen a signed report, which remains readable. Raises NotFound, Conflict, bad_value."""
-    found = get(c, report_id)
-    if not found.in_force:
-        raise Conflict("not_in_force", f"Version {found.number} has been reopened already.")
+    report = get(c, report_id)
+    if not report.in_force:
+        raise Conflict("not_in_force", f"Version {report.number} has already been reopened.")
     text = reason.strip()
     if not 1 <= len(text) <= MOST_CHARACTERS:
         raise ServiceError("bad_value", f"A reason has 1 to {MOST_CHARACTERS:,} characters.")
@@ -193,8 +193,8 @@ def reopen(c: Connection, actor: audit.Actor | None, report_id: str, reason: str
         .where(signed_report.c.id == report_id)
         .values(reopened_by=name, reopened_at=now(), reopened_because=text)
     )
-    detail = {"report_id": report_id, "version": found.number}
-    audit.record(c, actor, "signed_report.reopened", "session", found.session_id, detail)
+    detail = {"report_id": report_id, "version": report.number}
+    audit.record(c, actor, "signed_report.reopened", "session", report.session_id, detail)
     return get(c, report_id)
 
 

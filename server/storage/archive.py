@@ -66,7 +66,7 @@ def make_key(path: Path) -> str:
     exists.
     """
     if path.exists():
-        raise BackupFileError(f"{path} exists; a key is never written over another one.")
+        raise BackupFileError(f"{path} exists; an existing key is never overwritten.")
     private = pyrage.x25519.Identity.generate()
     public = str(private.to_public())
     fs.write_file(path, f"# public key: {public}\n{private}\n".encode())
@@ -84,8 +84,8 @@ def read_key(path: Path) -> ClinicKey:
     try:
         lines = [line.strip() for line in path.read_text("utf-8").splitlines()]
     except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise BackupFileError(f"The key {path} cannot be read ({why}).") from error
+        reason = getattr(error, "strerror", None) or error
+        raise BackupFileError(f"The key {path} cannot be read ({reason}).") from error
     text = next((line for line in lines if line and not line.startswith("#")), "")
     try:
         if text.startswith(_SECRET):

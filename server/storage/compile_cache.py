@@ -40,8 +40,8 @@ def share_compile_cache(fallback: Path) -> Path:
     -------
     The folder, now set as `NUMBA_CACHE_DIR` of this process unless the variable was already set.
     """
-    given = os.environ.get(VARIABLE)
-    folder = Path(given) if given else find_compile_cache(os.environ, fallback)
+    configured = os.environ.get(VARIABLE)
+    folder = Path(configured) if configured else find_compile_cache(os.environ, fallback)
     os.environ[VARIABLE] = str(folder)
     return folder
 
@@ -133,6 +133,6 @@ def _is_ours(folder: Path) -> bool:
 def _remove_old_versions(folder: Path) -> None:
     limit = time.time() - KEEP_S
     with suppress(OSError):
-        for other in folder.parent.glob("filters-*"):
-            if other != folder and other.stat().st_mtime < limit:
-                shutil.rmtree(other, ignore_errors=True)
+        for old_folder in folder.parent.glob("filters-*"):
+            if old_folder != folder and old_folder.stat().st_mtime < limit:
+                shutil.rmtree(old_folder, ignore_errors=True)

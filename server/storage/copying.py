@@ -37,10 +37,10 @@ def _copy_table(source: Connection, old: Table, target: Connection, new: Table) 
 
 
 def _reflect(c: Connection) -> MetaData:
-    found = MetaData()
-    found.reflect(c)
-    for table in found.tables.values():
+    reflected = MetaData()
+    reflected.reflect(c)
+    for table in reflected.tables.values():
         for column in table.columns:
             if isinstance(column.type, JSON):
                 column.type = Json  # no value is NULL, not the word null
-    return found
+    return reflected

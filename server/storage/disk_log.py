@@ -33,24 +33,24 @@ class DiskLog:
         self._since: float | None = None
         self._quiet_until: float | None = None
 
-    def note_refusal(self, error: BaseException, what: str) -> None:
+    def note_refusal(self, error: BaseException, description: str) -> None:
         """Report a failed write, once until writes succeed; other errors are logged with a traceback.
 
         Parameters
         ----------
-        what : description of the written object, for the log.
+        description : description of the written object, for the log.
         """
         refusal = refusal_of(error)
-        why = refusal.value if refusal is not None else getattr(error, "strerror", None)
-        if why is None:
-            self._log.error("%s cannot be written", what, exc_info=error)
+        reason = refusal.value if refusal is not None else getattr(error, "strerror", None)
+        if reason is None:
+            self._log.error("%s cannot be written", description, exc_info=error)
             return
         with self._guard:
-            at = self._clock()
-            if self._since is not None or (self._quiet_until is not None and at < self._quiet_until):
+            time = self._clock()
+            if self._since is not None or (self._quiet_until is not None and time < self._quiet_until):
                 return
-            self._since, self._quiet_until = at, at + QUIET_S
-        self._log.error("%s cannot be written (%s); not repeated until writes succeed", what, why)
+            self._since, self._quiet_until = time, time + QUIET_S
+        self._log.error("%s cannot be written (%s); not repeated until writes succeed", description, reason)
 
     def note_success(self) -> None:
         """Report that writes succeed again, if a failure was reported."""

@@ -110,9 +110,9 @@ class IncomingFile:
             raise ValueError("The file is already closed.")
         if self._limit is not None and self.size + len(data) > self._limit:
             raise SizeLimitError(self._limit)
-        rest = memoryview(data)
-        while rest:
-            rest = rest[system.write(self._fd, rest) :]
+        remaining = memoryview(data)
+        while remaining:
+            remaining = remaining[system.write(self._fd, remaining) :]
         self._hash.update(data)
         self.size += len(data)
 
@@ -163,9 +163,9 @@ class AppendOnlyFile:
         if self._reach != self.size:  # a torn append may be there, from before a crash or a full disk
             self.cut(self.size)
         self._reach = None
-        rest = memoryview(data)
-        while rest:
-            rest = rest[system.write(fd, rest) :]
+        remaining = memoryview(data)
+        while remaining:
+            remaining = remaining[system.write(fd, remaining) :]
         self.size += len(data)
         self._reach = self.size
 

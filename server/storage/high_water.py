@@ -51,8 +51,8 @@ class DamagedMarkError(Exception):
 def read_mark(path: Path) -> HighWater | None:
     """The mark, None before the first; raises DamagedMarkError, OSError."""
     try:
-        found: Any = read_json(path.read_bytes())
-        mark = HighWater(found["seq"], found["hash"])
+        data: Any = read_json(path.read_bytes())
+        mark = HighWater(data["seq"], data["hash"])
     except FileNotFoundError:
         return None
     except (ValueError, TypeError, KeyError) as error:
@@ -87,8 +87,8 @@ def explain_lost_rows(c: Connection, path: Path) -> str | None:
             f"The audit log ends at row {last.seq if last else 0}, but had reached row {mark.seq}: the "
             "database is an older one, or its end was cut."
         )
-    found = c.execute(select(audit.c.hash).where(audit.c.seq == mark.seq)).scalar()
-    if found != mark.hash:
+    digest = c.execute(select(audit.c.hash).where(audit.c.seq == mark.seq)).scalar()
+    if digest != mark.hash:
         return f"Audit row {mark.seq} is not the one that was here before: this is another database."
     return None
 

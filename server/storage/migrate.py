@@ -135,11 +135,11 @@ def upgrade(
         fs.make_folder(database.parent)
         _keep_private(database)
         backups = backups or database.parent / "backups"
-    at = _known(config, database)
-    wanted = ScriptDirectory.from_config(config).as_revision_number(target)
+    revision = _known(config, database)
+    target_revision = ScriptDirectory.from_config(config).as_revision_number(target)
     if isinstance(database, Path):
-        return None if at == wanted else _change(config, database, target, backups, scripts)
-    if at == wanted and _has_delivery(database):
+        return None if revision == target_revision else _change(config, database, target, backups, scripts)
+    if revision == target_revision and _has_delivery(database):
         return None
     server = PostgresServer(database)
     with contextlib.ExitStack() as held:
@@ -147,7 +147,7 @@ def upgrade(
             held.enter_context(server.take_turn_to_migrate())
         except OperationalError as error:
             raise MigrationError(_OTHER_MIGRATES) from error
-        if _known(config, database) == wanted and _has_delivery(database):
+        if _known(config, database) == target_revision and _has_delivery(database):
             return None  # whoever had the turn before has done it
         if not held.enter_context(server.serve("")):
             raise MigrationError(_OTHERS_SERVE)
@@ -160,9 +160,9 @@ def upgrade(
 
 def _await_being_alone(server: PostgresServer) -> None:
     until = time.monotonic() + OTHERS_LEAVE_S
-    while others := server.list_others():
+    while hosts := server.list_others():
         if time.monotonic() > until:
-            raise MigrationError(_OTHERS_WORK.format(", ".join(others)))
+            raise MigrationError(_OTHERS_WORK.format(", ".join(hosts)))
         time.sleep(0.1)
 
 
@@ -170,11 +170,11 @@ def _change(
     config: Config, database: Source, target: str, backups: Path | None, scripts: Path | None
 ) -> Path | None:
     """Migrate after a backup of existing data; return its path."""
-    backup, at = None, _known(config, database)
-    if at is not None and at != ScriptDirectory.from_config(config).as_revision_number(target):
+    backup, revision = None, _known(config, database)
+    if revision is not None and revision != ScriptDirectory.from_config(config).as_revision_number(target):
         if backups is None:
             raise MigrationError("The database is older. Start the server, or run `sagittal migrate`.")
-        backup = _backup(database, at, backups, scripts)
+        backup = _backup(database, revision, backups, scripts)
     command.upgrade(config, target)
     return backup
 
@@ -192,14 +192,14 @@ def copy_database(source: Source, target: Source, scripts: Path | None = None) -
         return
     revision = read_revision(source)
     upgrade(target, target=revision or "base", scripts=scripts)
-    there, here = engine_of(source).reader(), engine_of(target).writer()
+    origin, destination = engine_of(source).reader(), engine_of(target).writer()
     try:
-        with there.begin() as read, here.begin() as write:
+        with origin.begin() as read, destination.begin() as write:
             if not copy_rows(read, write):
                 raise MigrationError("The target holds rows already, so nothing was copied. Empty it.")
     finally:
-        there.dispose()
-        here.dispose()
+        origin.dispose()
+        destination.dispose()
 
 
 def require_current(database: Source, scripts: Path | None = None) -> None:
@@ -210,10 +210,10 @@ def require_current(database: Source, scripts: Path | None = None) -> None:
     require_database(database)
     config = configuration(database, scripts)
     head = ScriptDirectory.from_config(config).get_current_head()
-    at = _known(config, database)
-    if at != head:
+    revision = _known(config, database)
+    if revision != head:
         raise NotMigratedError(
-            f"The database is at revision {at}, this version needs {head}. "
+            f"The database is at revision {revision}, this version needs {head}. "
             "Start the server or run `sagittal migrate`."
         )
     if isinstance(database, str) and not _has_delivery(database):
@@ -266,14 +266,14 @@ def _has_delivery(database: str) -> bool:
 
 
 def _known(config: Config, database: Source) -> str | None:
-    at = read_revision(database)
-    known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
-    if at is not None and at not in known:
+    revision = read_revision(database)
+    revisions = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
+    if revision is not None and revision not in revisions:
         raise MigrationError(
-            f"The database is at revision {at}, which this version of Sagittal does not know: a newer one "
-            "wrote it. Install that version again, or restore the backup made before the upgrade."
+            f"The database is at revision {revision}, which this version of Sagittal does not know: a newer "
+            "one wrote it. Install that version again, or restore the backup made before the upgrade."
         )
-    return at
+    return revision
 
 
 def _keep_private(database: Path) -> None:

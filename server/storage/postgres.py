@@ -81,8 +81,8 @@ class PostgresServer:
         """Whether the tables of the installed procrastinate exist; raises ModuleNotFoundError."""
         from procrastinate import __version__ as version
 
-        said = "SELECT obj_description(to_regnamespace(%s), 'pg_namespace')"
-        return bool(c.exec_driver_sql(said, (DELIVERY_SCHEMA,)).scalar_one() == version)
+        query = "SELECT obj_description(to_regnamespace(%s), 'pg_namespace')"
+        return bool(c.exec_driver_sql(query, (DELIVERY_SCHEMA,)).scalar_one() == version)
 
     def prepare_delivery(self) -> None:
         """Create these tables, replacing those of another version; polling covers deliveries lost thereby."""
@@ -119,15 +119,15 @@ class PostgresServer:
 
     def check(self, c: Connection) -> list[str]:
         """Read every row; PostgreSQL reports pages with wrong checksums (initdb --data-checksums)."""
-        found = []
+        problems = []
         for name in inspect(c).get_table_names():
             try:
                 with c.begin_nested():
                     quoted = c.dialect.identifier_preparer.quote(name)
                     c.exec_driver_sql(f"SELECT max(length(t::text)) FROM {quoted} AS t")  # noqa: S608
             except DBAPIError as error:
-                found.append(f"{name} cannot be read ({error.orig})")
-        return found
+                problems.append(f"{name} cannot be read ({error.orig})")
+        return problems
 
     def dangling(self, c: Connection) -> list[str]:
         """Return nothing: PostgreSQL enforces references at every statement, also in migrations."""
@@ -140,13 +140,13 @@ class PostgresServer:
     def highest_number(self, c: Connection, table: str) -> int:
         """See storage/db.py; from the sequence for generated numbers, otherwise from the newest row."""
         quoted = c.dialect.identifier_preparer.quote(table)
-        given = c.exec_driver_sql(
+        generated = c.exec_driver_sql(
             "SELECT last_value FROM pg_sequences WHERE schemaname || '.' || sequencename "
             "= pg_get_serial_sequence(%s, 'seq')",
             (quoted,),
         ).scalar()
         newest = c.exec_driver_sql(f"SELECT max(seq) FROM {quoted}").scalar()  # noqa: S608
-        return max(int(given or 0), int(newest or 0))
+        return max(int(generated or 0), int(newest or 0))
 
     def raise_number(self, c: Connection, table: str, number: int) -> None:
         """See storage/db.py."""
@@ -198,14 +198,14 @@ class PostgresServer:
         engine = self.reader()
         try:
             with engine.connect() as c:
-                found = c.exec_driver_sql(
+                rows = c.exec_driver_sql(
                     "SELECT DISTINCT coalesce(host(client_addr), 'this computer') FROM pg_stat_activity AS a "
                     "WHERE datname = current_database() AND application_name = %s "
                     "AND pid <> pg_backend_pid() AND NOT EXISTS (SELECT FROM pg_locks WHERE pid = a.pid "
                     "AND locktype = 'advisory' AND objsubid = 1 AND objid::bigint IN (%s, %s)) ORDER BY 1",
                     (APPLICATION, SERVING, MIGRATING),
                 )
-                return list(found.scalars())
+                return list(rows.scalars())
         finally:
             engine.dispose()
 
@@ -219,32 +219,32 @@ class PostgresServer:
 
     def explain(self, error: DBAPIError) -> str:
         """Reason why the server cannot be used, and the remedy."""
-        said = " ".join(str(error.orig).split())
+        text = " ".join(str(error.orig).split())
         attempt = getattr(error.orig, "pgconn", None)
-        if any(words in said for words in FULL):
+        if any(words in text for words in FULL):
             return (
-                f"PostgreSQL has no connection left for {self.name} ({said}). Raise its max_connections, "
+                f"PostgreSQL has no connection left for {self.name} ({text}). Raise its max_connections, "
                 "or run fewer workers: each keeps two, a web server up to 56."
             )
-        asked = attempt is not None and (attempt.needs_password or attempt.used_password)
-        if asked or "FATAL" in said:
+        is_refused = attempt is not None and (attempt.needs_password or attempt.used_password)
+        if is_refused or "FATAL" in text:
             return (
-                f"PostgreSQL refused {self.name} ({said}). Check user, password and the database's name in "
+                f"PostgreSQL refused {self.name} ({text}). Check user, password and the database's name in "
                 "SAGITTAL_DATABASE_URL."
             )
         return (
-            f"PostgreSQL is not reached at {self.name} ({said}). Check that it runs, and address and port in "
+            f"PostgreSQL is not reached at {self.name} ({text}). Check that it runs, and address and port in "
             "SAGITTAL_DATABASE_URL."
         )
 
-    def _locking(self, wait_ms: int, **told: str) -> Engine:
-        engine = self._engine(wait_ms, **told)
+    def _locking(self, wait_ms: int, **parameters: str) -> Engine:
+        engine = self._engine(wait_ms, **parameters)
         begin_with(engine, f"BEGIN; SELECT pg_advisory_xact_lock({WRITING})")
         return engine
 
     def _engine(self, wait_ms: int, **more: str) -> Engine:
         """Engine in autocommit mode unless configured to begin transactions."""
-        told = {
+        parameters = {
             "timezone": "UTC",
             "synchronous_commit": "on",
             "lock_timeout": wait_ms,
@@ -265,7 +265,7 @@ class PostgresServer:
                 "autocommit": True,
                 "connect_timeout": 10,
                 "application_name": APPLICATION,
-                "options": " ".join(f"-c {name}={value}" for name, value in told.items()),
+                "options": " ".join(f"-c {name}={value}" for name, value in parameters.items()),
             },
         )
         event.listen(engine, "handle_error", _hide_details)
@@ -310,9 +310,9 @@ def _hide_details(context: ExceptionContext) -> None:
     short = getattr(getattr(raw, "diag", None), "message_primary", None)
     if short is None:
         return
-    said, raw.args = str(raw), (short,)
+    text, raw.args = str(raw), (short,)
     if wrapped is not None:
-        wrapped.args = tuple(str(part).replace(said, short) for part in wrapped.args)
+        wrapped.args = tuple(str(part).replace(text, short) for part in wrapped.args)
 
 
 def _outlive_readers(c: Connection) -> bool:

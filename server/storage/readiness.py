@@ -57,10 +57,10 @@ class Readiness:
         if not self._lock.acquire(blocking=self._checked_at is None):
             return self._found
         try:
-            at = self._clock()
-            if self._checked_at is None or at - self._checked_at >= self.EVERY_S:
+            time = self._clock()
+            if self._checked_at is None or time - self._checked_at >= self.EVERY_S:
                 self._found = self._check()
-                self._checked_at = at
+                self._checked_at = time
             return self._found
         finally:
             self._lock.release()

@@ -49,8 +49,10 @@ def list_referenced(c: Connection, session_id: str | None = None) -> set[tuple[s
 
 def discard(db: Database, blobs: BlobStore, space: str, names: Iterable[str]) -> None:
     """Permanently remove files stored for a resource that has been erased meanwhile."""
-    wanted = sorted(set(names))
-    for group in (wanted[i : i + blobs.moved_at_once] for i in range(0, len(wanted), blobs.moved_at_once)):
+    selected = sorted(set(names))
+    for group in (
+        selected[i : i + blobs.moved_at_once] for i in range(0, len(selected), blobs.moved_at_once)
+    ):
         with db.write() as c:
             used = list_referenced(c)
             blobs.remove(space, *(name for name in group if (space, name) not in used))

@@ -164,12 +164,12 @@ def find_damage(path: Path, size: int) -> Damage | None:
         if is_whole_length(data[size : size + RECORD_HEAD], length - size) and data[length - 1]:
             return Damage(size, length - size)
         for mark in RECORD_STARTS:
-            at = data.find(mark, size)
-            while at >= 0:
-                begin = at - RECORD_HEAD
+            position = data.find(mark, size)
+            while position >= 0:
+                begin = position - RECORD_HEAD
                 if begin > size and scan_records(data[begin : begin + _LONGEST])[0]:
                     return Damage(size, length - size)
-                at = data.find(mark, at + 1)
+                position = data.find(mark, position + 1)
     return None
 
 
@@ -216,12 +216,12 @@ def read_open_records(file: BinaryIO, start: int = 0) -> Iterator[tuple[int, Log
         if file.read(start) != FILE_MARK:
             return
     file.seek(start)
-    rest = b""
+    unread = b""
     while chunk := file.read(CHUNK):
-        rest += chunk
-        found, used = scan_records(rest)
-        for one in found:
+        unread += chunk
+        records, used = scan_records(unread)
+        for one in records:
             yield start + one.end, one
-        start, rest = start + used, rest[used:]
-        if len(rest) >= _LONGEST:
+        start, unread = start + used, unread[used:]
+        if len(unread) >= _LONGEST:
             return  # a whole record would have fitted: it is damaged

@@ -90,10 +90,10 @@ class receive:  # noqa: N801 - a verb: with receive(...) as upload
 def check_set(c: Connection, settings: Settings, session_id: str, name: str, size: int) -> None:
     """Raise TooLarge set_too_large, too_many_files if a file of this size does not fit into the set."""
     this = current(c, session_id)
-    others = [f for f in this.files if f.name != name] if this else []
-    if len(others) + 1 > settings.max_files:
+    siblings = [f for f in this.files if f.name != name] if this else []
+    if len(siblings) + 1 > settings.max_files:
         raise TooLarge("too_many_files", f"A recording has at most {settings.max_files} files.")
-    total = sum(f.size for f in others) + size
+    total = sum(f.size for f in siblings) + size
     if total > settings.max_set_bytes:
         raise TooLarge(
             "set_too_large",

@@ -148,18 +148,22 @@ def inspect(c: Connection, queue: JobQueue, actor: audit.Actor | None, session_i
     return view
 
 
-def publish_inspection(c: Connection, recording_id: str, input_sha256: str, found: Mapping[str, Any]) -> None:
+def publish_inspection(
+    c: Connection, recording_id: str, input_sha256: str, result: Mapping[str, Any]
+) -> None:
     """Store inspection results; raises Conflict files_changed if the set has changed meanwhile."""
     if get(c, recording_id).input_sha256 != input_sha256:
-        raise Conflict("files_changed", "Files were added or removed meanwhile; the new set is looked at.")
-    c.execute(update(recording).where(recording.c.id == recording_id).values(inspection=dict(found)))
+        raise Conflict(
+            "files_changed", "Files were added or removed in the meantime; the new set is being checked."
+        )
+    c.execute(update(recording).where(recording.c.id == recording_id).values(inspection=dict(result)))
 
 
 def require_current(c: Connection, session_id: str) -> StoredRecording:
     """The current recording with at least one file; raises Conflict no_files."""
     this = current(c, session_id)
     if this is None or not this.files:
-        raise Conflict("no_files", "This session has no files yet; upload the recording first.")
+        raise Conflict("no_files", "This visit has no files yet; upload the recording first.")
     return this
 
 
@@ -226,14 +230,14 @@ def _recording(c: Connection, row: Any) -> StoredRecording:
 
 def patient_of(c: Connection, session_id: str) -> str:
     """Id of the patient of a session; raises NotFound for the session."""
-    found = c.execute(
+    owner_id = c.execute(
         select(patient.c.id)
         .join(session, session.c.patient_id == patient.c.id)
         .where(session.c.id == session_id)
     ).scalar()
-    if found is None:
+    if owner_id is None:
         raise NotFound("session", session_id)
-    return str(found)
+    return str(owner_id)
 
 
 def _editable(c: Connection, session_id: str) -> str:
@@ -258,9 +262,9 @@ def _editable(c: Connection, session_id: str) -> str:
     manifest = this.manifest if this else None
     c.execute(insert(recording).values(id=fresh, session_id=session_id, manifest=manifest, created_at=now()))
     if this is not None:
-        kept = [recording_file.c[name] for name in ("name", "size", "sha256", "added_at")]
-        files = select(literal(fresh), *kept).where(recording_file.c.recording_id == this.id)
-        c.execute(insert(recording_file).from_select(["recording_id", *kept], files))
+        columns = [recording_file.c[name] for name in ("name", "size", "sha256", "added_at")]
+        files = select(literal(fresh), *columns).where(recording_file.c.recording_id == this.id)
+        c.execute(insert(recording_file).from_select(["recording_id", *columns], files))
     return fresh
 
 

@@ -30,16 +30,16 @@ def list_files(c: Connection, session_id: str) -> list[RecordedFile]:
 
 def get(c: Connection, session_id: str, name: str) -> RecordedFile:
     """One reference; raises NotFound."""
-    found = next((f for f in list_files(c, session_id) if f.name == name), None)
-    if found is None:
+    file = next((f for f in list_files(c, session_id) if f.name == name), None)
+    if file is None:
         raise NotFound("reference", name)
-    return found
+    return file
 
 
 def file_bytes(c: Connection, blobs: BlobStore, session_id: str, name: str) -> bytes:
     """Read and verify a reference as uploaded; raises NotFound, IntegrityError."""
-    found = get(c, session_id, name)
-    return blobs.read(sessions.get(c, session_id).patient_id, found.sha256)
+    file = get(c, session_id, name)
+    return blobs.read(sessions.get(c, session_id).patient_id, file.sha256)
 
 
 def remove(c: Connection, actor: audit.Actor | None, session_id: str, name: str) -> None:
@@ -60,7 +60,7 @@ class receive_reference(receive):  # noqa: N801 - as `receive`
         c.execute(delete(reference_file).filter_by(**key))
         mine = reference_file.c.session_id == self._session_id
         if c.execute(select(func.count()).select_from(reference_file).where(mine)).scalar_one() >= MOST_FILES:
-            raise TooLarge("too_many_files", f"A session has at most {MOST_FILES} references; remove one.")
+            raise TooLarge("too_many_files", f"A visit has at most {MOST_FILES} references; remove one.")
         c.execute(insert(reference_file).values(**key, size=blob.size, sha256=blob.sha256, added_at=now()))
         detail = {"session_id": self._session_id, "sha256": blob.sha256, "size": blob.size}
         audit.record(c, self._actor, "reference.added", "session", self._session_id, detail)

@@ -75,15 +75,15 @@ def list_tables(c: Connection, blobs: BlobStore, session_id: str) -> tuple[Table
     this = recordings.require_current(c, session_id)
     shapes: list[TableShape] = []
     for name, look, entry in _tables(this, blobs):
-        said = None if entry is None else _as_template(entry, look)
+        mapping = None if entry is None else _as_template(entry, look)
         for i, shape in enumerate(shapes):
-            if shape.names == look.names and (shape.basis == "said") == (said is not None):
+            if shape.names == look.names and (shape.basis == "said") == (mapping is not None):
                 shapes[i] = replace(shape, files=(*shape.files, name))
                 break
         else:
-            known = None if said else _recall(c, blobs, this, look)
-            source = said or known or dict(look.source)
-            basis = "said" if said else "known" if known else "guessed"
+            template = None if mapping else _recall(c, blobs, this, look)
+            source = mapping or template or dict(look.source)
+            basis = "said" if mapping else "known" if template else "guessed"
             shapes.append(TableShape((name,), look.names, look.rows, source, basis))
     return tuple(shapes)
 
@@ -114,8 +114,8 @@ def map_tables(
     if missing:
         raise NotFound("file", min(missing))
     manifest = dict(this.manifest or {})
-    others = [s for s in manifest.get("sources") or () if s["file"] not in names]
-    manifest["sources"] = [*(make_entry(source, name) for name in names), *others]
+    remaining = [s for s in manifest.get("sources") or () if s["file"] not in names]
+    manifest["sources"] = [*(make_entry(source, name) for name in names), *remaining]
     return recordings.set_manifest(c, actor, session_id, manifest)
 
 
@@ -137,7 +137,7 @@ def _fits(c: Connection, blobs: BlobStore, session_id: str, name: str, source: M
 
 
 def _check(file: SourceFile, source: Mapping[str, Any]) -> tuple[TableReading, ...]:
-    from sagittal.core.formats.draft import finish  # slow imports
+    from sagittal.core.formats.common_time import finish  # slow imports
     from sagittal.core.formats.manifest import manifest_of
     from sagittal.core.formats.table_guess import make_entry, read_sample
     from sagittal.core.quality.signals import measure_signal
@@ -175,17 +175,17 @@ def _tables(
     from sagittal.core.formats.manifest import manifest_of
     from sagittal.core.formats.table_guess import look_into_table
 
-    said = [s for m in (this.manifest or {}, *_uploaded(this, blobs)) for s in m.get("sources") or ()]
-    said = [s for s in said if s.get("columns")]
-    specs = manifest_of({"sources": said}).sources
-    there = {f.name for f in this.files}
+    entries = [s for m in (this.manifest or {}, *_uploaded(this, blobs)) for s in m.get("sources") or ()]
+    entries = [s for s in entries if s.get("columns")]
+    specs = manifest_of({"sources": entries}).sources
+    names = {f.name for f in this.files}
     for file in _files(this, blobs):
-        if bids.is_table(file.name) and bids.find_parts(file.name)[0] in there:
+        if bids.is_table(file.name) and bids.find_parts(file.name)[0] in names:
             continue
         look = look_into_table(file)
         if look is None or not look.source["columns"]:
             continue
-        entry = next((e for e, s in zip(said, specs, strict=True) if s.covers(file.name)), None)
+        entry = next((e for e, s in zip(entries, specs, strict=True) if s.covers(file.name)), None)
         yield file.name, look, entry
 
 
@@ -197,10 +197,10 @@ def _uploaded(this: StoredRecording, blobs: BlobStore) -> Iterator[dict[str, Any
     for file in _files(this, blobs):
         if file.name.lower().endswith(".json") and file.size < MAX_BYTES:
             with suppress(InputError, ValueError):
-                found = read_json(file.read())
-                if is_manifest(found):
-                    manifest_of(found)
-                    yield cast("dict[str, Any]", found)
+                tree = read_json(file.read())
+                if is_manifest(tree):
+                    manifest_of(tree)
+                    yield cast("dict[str, Any]", tree)
 
 
 def _recall(c: Connection, blobs: BlobStore, this: StoredRecording, look: TableLook) -> dict[str, Any] | None:
@@ -219,12 +219,12 @@ def _recall(c: Connection, blobs: BlobStore, this: StoredRecording, look: TableL
                 continue
             earlier = recordings.get(c, row.id)
             if not any(
-                name == entry["file"] and found.names == look.names
-                for name, found, _ in _tables(earlier, blobs)
+                name == entry["file"] and earlier_look.names == look.names
+                for name, earlier_look, _ in _tables(earlier, blobs)
             ):
                 continue
-            said = _as_template(entry, look)
-            return said | ({"rate_hz": look.source["rate_hz"]} if "rate_hz" in look.source else {})
+            mapping = _as_template(entry, look)
+            return mapping | ({"rate_hz": look.source["rate_hz"]} if "rate_hz" in look.source else {})
     return None
 
 
@@ -234,7 +234,7 @@ def _as_template(entry: Mapping[str, Any], look: TableLook) -> dict[str, Any]:
     """
     from sagittal.core.formats.table_guess import THE_FILE  # slow import
 
-    said = {k: v for k, v in entry.items() if k != "file"}
+    template = {k: v for k, v in entry.items() if k != "file"}
     if set(look.source["columns"]) == {THE_FILE} and len(entry["columns"]) == 1:
-        said["columns"] = {THE_FILE: next(iter(entry["columns"].values()))}
-    return said
+        template["columns"] = {THE_FILE: next(iter(entry["columns"].values()))}
+    return template

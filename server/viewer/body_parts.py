@@ -75,8 +75,8 @@ def make_foot(body: BodyModel, side: int) -> Mesh:
     r = _stature(body) / 1000
     # the shank turns in a dome about the ankle centre
     u = np.linspace(-np.pi / 2, np.pi / 2, 8)[1:-1]
-    across = np.cos(u)[:, None] * (np.array([17.6, 17.6, 18.2]) * r)
-    dome = loft_sections(np.column_stack((17.6 * r * np.sin(u), 0 * u, across)), 12, (2.0 * r, 2.0 * r))
+    widths = np.cos(u)[:, None] * (np.array([17.6, 17.6, 18.2]) * r)
+    dome = loft_sections(np.column_stack((17.6 * r * np.sin(u), 0 * u, widths)), 12, (2.0 * r, 2.0 * r))
     return join_meshes(_loft_foot(body, side, (-250.0, 1000 * _BALL), 14), dome)
 
 
@@ -130,12 +130,12 @@ def make_arms(body: BodyModel) -> Mesh:
     table[:, 0] *= -1.0
     v, f = loft_sections(interpolate_rows(table[::-1], 17), 12, (9 * r, 20 * r))
     hanging = _bend_forward(v, lambda y: _ELBOWS * _rise((-y / r - 150.0) / 70.0) - np.deg2rad(4.0))
-    both = []
+    meshes = []
     for side in (-1, 1):
         c, s = np.cos(_ARMS_OUT), side * np.sin(_ARMS_OUT)
         turn = np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
-        both.append((hanging @ turn.T + np.array(profiles.SHOULDER) * [r, r, side * r], f))
-    return join_meshes(*both)
+        meshes.append((hanging @ turn.T + np.array(profiles.SHOULDER) * [r, r, side * r], f))
+    return join_meshes(*meshes)
 
 
 def _stature(body: BodyModel) -> float:
@@ -148,13 +148,13 @@ def _hang(rows: Floats, length: float, body: BodyModel) -> Floats:
     return np.column_stack((-length * rows[:, 0], rows[:, 1:] * _stature(body) / 1000))[::-1]
 
 
-def _loft_foot(body: BodyModel, side: int, between: tuple[float, float], rings: int) -> Mesh:
+def _loft_foot(body: BodyModel, side: int, bounds: tuple[float, float], rings: int) -> Mesh:
     scale = np.array([body.foot, body.ankle_height, body.ankle_height, body.foot, body.foot]) / 1000
-    x, top, bottom, out, inn = (interpolate_rows(profiles.FOOT, rings, between, dense_ends=True) * scale).T
+    x, top, bottom, out, inn = (interpolate_rows(profiles.FOOT, rings, bounds, dense_ends=True) * scale).T
     half = (top - bottom) / 2
     sides = (out, inn) if side > 0 else (inn, out)
     knuckle = _KNUCKLE * body.ankle_height
-    caps = (0.0, knuckle) if between[0] < 0 else (knuckle, 0.0)
+    caps = (0.0, knuckle) if bounds[0] < 0 else (knuckle, 0.0)
     # sections stand across x: what is forward in a loft is up here; squarer below, so that the sole is flat
     sections = np.stack((x, (top + bottom) / 2, half, half, *sides), axis=1)
     v, f = loft_sections(sections, 18, caps, power=(2.0, 4.5))

@@ -91,8 +91,8 @@ def silence(page: str) -> str:
 
 
 def _add_to_head(page: str, first: str, last: str) -> str:
-    start, opened, rest = page.partition("<head>")
-    head, closed, body = rest.partition("</head>")
+    start, opened, tail = page.partition("<head>")
+    head, closed, body = tail.partition("</head>")
     return f"{start}{opened}{first}{head}{last}{closed}{body}"
 
 
@@ -155,11 +155,11 @@ def _read_digits(text: str, digits: str) -> bytes:
     """Decode base-N text: each five digits, most significant first, are four bytes."""
     value = np.zeros(128, np.int64)
     value[[ord(c) for c in digits]] = np.arange(len(digits))
-    found = value[np.frombuffer(text.encode("ascii"), np.uint8)]
-    whole = len(found) // 5
+    values = value[np.frombuffer(text.encode("ascii"), np.uint8)]
+    whole = len(values) // 5
     powers = len(digits) ** np.arange(4, -1, -1, dtype=np.int64)
-    start = (found[: 5 * whole].reshape(-1, 5) @ powers).astype(">u4").tobytes()
-    rest = 0
-    for digit in found[5 * whole :]:
-        rest = rest * len(digits) + int(digit)
-    return start + rest.to_bytes(8, "big")[8 - max(len(found) % 5 - 1, 0) :]
+    start = (values[: 5 * whole].reshape(-1, 5) @ powers).astype(">u4").tobytes()
+    remainder = 0
+    for digit in values[5 * whole :]:
+        remainder = remainder * len(digits) + int(digit)
+    return start + remainder.to_bytes(8, "big")[8 - max(len(values) % 5 - 1, 0) :]

@@ -110,9 +110,9 @@ class _Camera:
 
     def see(self, points: Floats) -> tuple[Floats, Floats]:
         """Project points to positions (n, 2), right and up from the centre, and depth (n,), m."""
-        across, up, ahead = ((points - self.eye) @ self._axes).T
+        x, up, ahead = ((points - self.eye) @ self._axes).T
         half = np.tan(FOV_RAD / 2) * ahead
-        return HEIGHT / 2 * np.column_stack((across, up)) / half[:, None], ahead
+        return HEIGHT / 2 * np.column_stack((x, up)) / half[:, None], ahead
 
 
 def _see_surfaces(motion: ReplayMotion, frame: int, place: Floats, camera: _Camera) -> Iterator[_SeenSurface]:
@@ -123,15 +123,15 @@ def _see_surfaces(motion: ReplayMotion, frame: int, place: Floats, camera: _Came
             opacity = ARMS if name == "arms" else 1.0 if measured else FAINT
             for mesh in meshes:
                 points = mesh[0] @ turns[k].T + batch.position[frame, k] - place
-                seen, depth = camera.see(points)
+                projected, depth = camera.see(points)
                 shadow = None
                 if name not in ("arms", "rings"):
                     fallen = points[:, :2] + points[:, 2:] * SHADOW
                     shadow, _ = camera.see(np.column_stack((fallen, np.zeros(len(fallen)))))
-                shown = find_front(seen, mesh)
+                visible = find_front(projected, mesh)
                 if name == "rings":  # their flat ends are inside the leg
-                    shown &= np.ptp(mesh[0][mesh[1], 1], axis=1) > 0
-                yield _SeenSurface(name, _CSS[tint], opacity, mesh, seen, depth, shown, shadow)
+                    visible &= np.ptp(mesh[0][mesh[1], 1], axis=1) > 0
+                yield _SeenSurface(name, _CSS[tint], opacity, mesh, projected, depth, visible, shadow)
 
 
 def _order(surfaces: list[_SeenSurface]) -> list[_SeenSurface]:
@@ -144,9 +144,9 @@ def _order(surfaces: list[_SeenSurface]) -> list[_SeenSurface]:
 def _draw_floor(camera: _Camera, middle: Floats) -> str:
     """Lines of the floor every metre, in front of the camera."""
     path = ""
-    at = np.arange(-LINES_M, LINES_M + 1)
+    positions = np.arange(-LINES_M, LINES_M + 1)
     for axis in (0, 1):
-        for k in at + middle[axis] % 1.0:
+        for k in positions + middle[axis] % 1.0:
             ends = np.zeros((2, 3))
             ends[:, axis], ends[:, 1 - axis] = k, (-LINES_M, LINES_M)
             ahead = camera.see(ends)[1]
@@ -166,8 +166,8 @@ def _draw_trails(motion: ReplayMotion, frame: int, place: Floats, camera: _Camer
         pieces = trail.pieces[max(0, count // CHUNK - 1) * CHUNK : count]
         if len(pieces):
             points = np.concatenate((pieces[:-1:_EVERY, 0], pieces[-1:, 1])) - place
-            seen, ahead = camera.see(points)
-            yield f'<path class="fp-way {_CSS[side]}" d="{_write_line(seen[ahead > _NEAREST_M])}"/>'
+            projected, ahead = camera.see(points)
+            yield f'<path class="fp-way {_CSS[side]}" d="{_write_line(projected[ahead > _NEAREST_M])}"/>'
 
 
 def _draw_prints(motion: ReplayMotion, frame: int, place: Floats, camera: _Camera) -> Iterator[str]:
@@ -177,15 +177,15 @@ def _draw_prints(motion: ReplayMotion, frame: int, place: Floats, camera: _Camer
         path = ""
         for k in range(max(0, count - RECENT_PRINTS), count):
             turn = find_matrices(prints.wxyz[k].astype(np.float64))
-            seen, ahead = camera.see(mesh[0] @ turn.T + prints.position[k] - place)
+            projected, ahead = camera.see(mesh[0] @ turn.T + prints.position[k] - place)
             if ahead.min() > _NEAREST_M:
-                path += _draw(mesh, seen, find_front(seen, mesh))
+                path += _draw(mesh, projected, find_front(projected, mesh))
         if path:
             yield f'<path class="fp-print {_CSS[side]}" d="{path}"/>'
 
 
-def _draw(mesh: Mesh, seen: Floats, shown: Bools) -> str:
-    return "".join(f"{_write_line(seen[line])}z" for line in trace_edges(mesh, shown))
+def _draw(mesh: Mesh, projected: Floats, visible: Bools) -> str:
+    return "".join(f"{_write_line(projected[line])}z" for line in trace_edges(mesh, visible))
 
 
 def _write_line(points: Floats) -> str:
@@ -204,21 +204,21 @@ def _find_corners(points: Floats) -> list[int]:
     """Indices of the vertices of a simplified line (Douglas and Peucker 1973,
     doi:10.3138/FM57-6770-U75U-7727).
     """
-    kept, spans = {0, len(points) - 1}, [(0, len(points) - 1)]
+    indices, spans = {0, len(points) - 1}, [(0, len(points) - 1)]
     while spans:
         first, last = spans.pop()
         if last - first < 2:
             continue
         along = points[last] - points[first]
-        away = points[first + 1 : last] - points[first]
+        offsets = points[first + 1 : last] - points[first]
         length = np.hypot(*along)
-        off = abs(_turn(along, away)) / length if length else np.hypot(*away.T)
+        off = abs(_turn(along, offsets)) / length if length else np.hypot(*offsets.T)
         k = int(np.argmax(off))
         if off[k] > _OFF:
             middle = first + 1 + k
-            kept.add(middle)
+            indices.add(middle)
             spans += [(first, middle), (middle, last)]
-    return sorted(kept)
+    return sorted(indices)
 
 
 def _turn(a: Floats, b: Floats) -> Floats:

@@ -34,7 +34,7 @@ STANDS_M: Final = 0.15
 
 
 def match_ghost(
-    figure: ReplayMotion, strides: Strides, other: ReplayMotion, other_strides: Strides
+    figure: ReplayMotion, strides: Strides, walk: ReplayMotion, other_strides: Strides
 ) -> GhostMotion | None:
     """Match another visit to an avatar; None if no side has included strides in both.
 
@@ -46,13 +46,13 @@ def match_ghost(
         mine = [s for s in strides.strides if s.side == side and s.excluded_reason is None]
         theirs = [s for s in other_strides.strides if s.side == side and s.excluded_reason is None]
         if mine and theirs:
-            frames = np.where(frames < 0, _frames(figure.t_s, mine, other.t_s, theirs), frames)
-    there = np.maximum(frames, 0)
-    frames[~other.valid[there]] = -1
+            frames = np.where(frames < 0, _frames(figure.t_s, mine, walk.t_s, theirs), frames)
+    indices = np.maximum(frames, 0)
+    frames[~walk.valid[indices]] = -1
     if not (frames >= 0).any():
         return None
-    turn = find_heading(figure) - find_heading(other)[there]
-    return _lay_over(figure, other.batches, other.root, frames, turn)
+    turn = find_heading(figure) - find_heading(walk)[indices]
+    return _lay_over(figure, walk.batches, walk.root, frames, turn)
 
 
 def match_reference(figure: ReplayMotion, strides: Strides, walk: ReferenceWalk) -> GhostMotion | None:
@@ -86,25 +86,25 @@ def _lay_over(
     turn: Floats,
 ) -> GhostMotion:
     """Rotate a walk of n frames by `turn` (m,) rad about its root (n, 2) and move it to the avatar's root."""
-    there = np.maximum(frames, 0)
+    indices = np.maximum(frames, 0)
     about = rotation.about(2, turn)
-    moved = rotation.rotate(about, _lift(root[there]))
+    moved = rotation.rotate(about, _lift(root[indices]))
     way = (_lift(figure.root) - moved)[:, None]
     about = about[:, None]
 
     def turned(points: Single) -> Floats:
         return rotation.rotate(about, points.astype(np.float64))
 
-    laid = {
+    ghost_batches = {
         name: replace(
             batch,
-            wxyz=rotation.multiply(about, batch.wxyz[there].astype(np.float64)).astype(np.float32),
-            position=(turned(batch.position[there]) + way).astype(np.float32),
+            wxyz=rotation.multiply(about, batch.wxyz[indices].astype(np.float64)).astype(np.float32),
+            position=(turned(batch.position[indices]) + way).astype(np.float32),
         )
         for name, batch in batches.items()
         if batch.ghostly
     }
-    return GhostMotion(laid, frames)
+    return GhostMotion(ghost_batches, frames)
 
 
 def find_heading(motion: ReplayMotion) -> Floats:
@@ -125,22 +125,22 @@ def _frames(
         like = theirs[k % len(theirs)]
         inside = np.flatnonzero((t_s >= stride.start_s) & (t_s < stride.end_s))
         phase = (t_s[inside] - stride.start_s) / (stride.end_s - stride.start_s)
-        wanted = like.start_s + phase * (like.end_s - like.start_s)
-        after = np.clip(np.searchsorted(other_t_s, wanted), 1, len(other_t_s) - 1)
-        nearer = wanted - other_t_s[after - 1] < other_t_s[after] - wanted
-        frames[inside] = after - nearer
+        times = like.start_s + phase * (like.end_s - like.start_s)
+        upper = np.clip(np.searchsorted(other_t_s, times), 1, len(other_t_s) - 1)
+        nearer = times - other_t_s[upper - 1] < other_t_s[upper] - times
+        frames[inside] = upper - nearer
     return frames
 
 
 def _count_steps(t_s: Floats, strides: Strides, side: Side) -> NDArray[np.int64]:
     """Phase of a side in steps of 1 / `PHASES` at each time, −1 outside its included strides."""
-    found = np.full(len(t_s), -1, np.int64)
+    steps = np.full(len(t_s), -1, np.int64)
     for stride in strides.strides:
         if stride.side == side and stride.excluded_reason is None:
             inside = (t_s >= stride.start_s) & (t_s < stride.end_s)
             phase = (t_s[inside] - stride.start_s) / (stride.end_s - stride.start_s)
-            found[inside] = np.rint(PHASES * phase)
-    return found
+            steps[inside] = np.rint(PHASES * phase)
+    return steps
 
 
 def _lift(place: Single) -> Floats:

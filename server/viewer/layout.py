@@ -105,12 +105,12 @@ class FigureLayout:
         self._body = body
         self._feet = tuple(side for side in SIDES if FOOT[side] in segments)
         self._points = np.array([locate_ball(body), (_SOLE * body.foot, -body.ankle_height, 0.0)])
-        meshes, worn = make_parts(body), _WORN.get(method, self.segments)
+        meshes, instrumented = make_parts(body), _WORN.get(method, self.segments)
         self._parts = {
             name: (
                 meshes[name],
                 copies,
-                tuple(_HANGS.get(carrier, carrier) in worn for carrier, _ in copies),
+                tuple(_HANGS.get(carrier, carrier) in instrumented for carrier, _ in copies),
             )
             for name, all_copies in _PARTS.items()
             if (copies := tuple(x for x in all_copies if _HANGS.get(x[0], x[0]) in segments))

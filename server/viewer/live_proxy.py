@@ -44,13 +44,13 @@ async def figure(
     db: Db,
     trail: OpenTrail,
     sid: Id,
-    who: Annotated[Identity, require(Action.RUN_LIVE)],
+    user: Annotated[Identity, require(Action.RUN_LIVE)],
     dark: bool = False,
 ) -> JSONResponse:
     """Open the live avatar of a session."""
     hub = state_of(request).hub
     body, norm = await asyncio.to_thread(_person, db, sid, hub.owner)
-    await asyncio.to_thread(trail.record_watched, who, "live.watched", "session", sid)
+    await asyncio.to_thread(trail.record_watched, user, "live.watched", "session", sid)
     views: FigureViews = request.app.state.views
 
     def draw(server: viser.ViserServer) -> LiveFigure:

@@ -107,27 +107,27 @@ class LiveWatch:
                 self._figure.wait()
             return
         # the body lacks its closing brace (messages.Picture)
-        shown = _shown(picture.body + b"}")
-        moment = read_moment(picture, picture.pose, shown)
+        feed_frame = _shown(picture.body + b"}")
+        moment = read_moment(picture, picture.pose, feed_frame)
         self._figure.set_reference(
             self._reference.find(
-                self._ghost(), self._strides(), lambda: find_standing_angles(moment, shown.angles_deg)
+                self._ghost(), self._strides(), lambda: find_standing_angles(moment, feed_frame.angles_deg)
             )
         )
         late = picture.delay_s is None or picture.delay_s > STALE_S
         self._figure.show(moment, late=late)
 
 
-def read_moment(picture: Picture, pose: FigurePose, shown: FeedFrame) -> FigureMoment:
-    """Return poses and phases of a picture; phases in `shown` are in %, the result is 0 to 1."""
-    phase = {side: shown.phase.get(SUFFIX[side]) for side in SIDES}
+def read_moment(picture: Picture, pose: FigurePose, feed_frame: FeedFrame) -> FigureMoment:
+    """Return poses and phases of a picture; phases in `feed_frame` are in %, the result is 0 to 1."""
+    phase = {side: feed_frame.phase.get(SUFFIX[side]) for side in SIDES}
     return FigureMoment(
         t_s=picture.t_s,
         segments=cast("tuple[Segment, ...]", tuple(pose.segments)),
         q=np.frombuffer(pose.q, np.float32).reshape(-1, 4).astype(np.float64),
         p=np.frombuffer(pose.p, np.float32).reshape(-1, 3).astype(np.float64),
         valid=pose.valid,
-        method=shown.method,
+        method=feed_frame.method,
         contact={cast("Side", side): on for side, on in pose.contact.items()},
         phase={side: None if x is None else x / 100.0 for side, x in phase.items()},
     )

@@ -140,7 +140,7 @@ def prepare_motion(poses: Poses) -> ReplayMotion:
     root = p["pelvis"] if "pelvis" in p else np.mean(list(p.values()), axis=0)
     rate = poses.rate_hz / (keep.step or 1)
     layout = FigureLayout(tuple(q), poses.body, poses.method)
-    placed = layout.place(*(np.stack([of[s] for s in q], axis=1) for of in (q, p)))
+    placed = layout.place(*(np.stack([pose_arrays[s] for s in q], axis=1) for pose_arrays in (q, p)))
     in_room = poses.method not in FOR_THE_EYE
     return ReplayMotion(
         t_s=t_s,

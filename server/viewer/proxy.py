@@ -104,9 +104,9 @@ router = APIRouter(include_in_schema=False)
 
 
 @router.get("/views/{view_id}/")
-def page(view_id: str, who: Reader, request: Request) -> RedirectResponse:
+def page(view_id: str, user: Reader, request: Request) -> RedirectResponse:
     """Redirect to the document of the 3D view, which reads the view's id from its fragment."""
-    if _find(request, view_id, who) is None:
+    if _find(request, view_id, user) is None:
         raise Problem(404, "view_not_found", "This 3D view has ended. Reload the session page.")
     return RedirectResponse(
         f"/views/client/{client_version()}#{view_id}", headers={"Cache-Control": "no-store"}
@@ -116,8 +116,12 @@ def page(view_id: str, who: Reader, request: Request) -> RedirectResponse:
 @router.get("/views/client/{version}", dependencies=[require(Action.LOAD_ASSET)])
 def client(version: str, request: Request) -> Response:
     """The document of all 3D views; URLs of earlier versions return the current one."""
-    kept = KEPT if version == client_version() else "no-cache"
-    headers = {"Content-Security-Policy": CONTENT_POLICY, "Cache-Control": kept, "Vary": "Accept-Encoding"}
+    cache_control = KEPT if version == client_version() else "no-cache"
+    headers = {
+        "Content-Security-Policy": CONTENT_POLICY,
+        "Cache-Control": cache_control,
+        "Vary": "Accept-Encoding",
+    }
     packed = find_packed_page() if accepts("br", request.headers.get("accept-encoding", "")) else None
     if packed is None:
         return HTMLResponse(client_page(), headers=headers)
@@ -125,11 +129,11 @@ def client(version: str, request: Request) -> Response:
 
 
 @router.websocket("/views/{view_id}")
-async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
+async def pipe(ws: WebSocket, view_id: str, user: Reader) -> None:
     """Relay viser's messages."""
-    view = await _views(ws).find_soon(view_id, who.login_id, who.role)
+    view = await _views(ws).find_soon(view_id, user.login_id, user.role)
     if view is not None:
-        view = await asyncio.to_thread(_find, ws, view_id, who)
+        view = await asyncio.to_thread(_find, ws, view_id, user)
     if view is None:
         await _say_gone(ws)
         return
@@ -145,10 +149,10 @@ async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
             await carry_messages(ws, up, admits=is_allowed, until=end)
 
 
-def _find(connection: Request | WebSocket, view_id: str, who: Identity) -> FigureView[Any] | None:
+def _find(connection: Request | WebSocket, view_id: str, user: Identity) -> FigureView[Any] | None:
     """A view that this user may see and whose session is accessible."""
-    view = _views(connection).find(view_id, who.login_id, who.role)
-    return view if view is not None and opens(connection, who, {"sid": view.session_id}) else None
+    view = _views(connection).find(view_id, user.login_id, user.role)
+    return view if view is not None and opens(connection, user, {"sid": view.session_id}) else None
 
 
 async def _say_gone(ws: WebSocket) -> None:
@@ -161,7 +165,7 @@ async def _say_gone(ws: WebSocket) -> None:
 async def replay(
     ws: WebSocket,
     sid: str,
-    who: Reader,
+    user: Reader,
     tab: Annotated[str, Query(max_length=64)] = "",
     dark: bool = False,
     ghost: Annotated[str | None, Query(max_length=64)] = None,
@@ -171,14 +175,14 @@ async def replay(
     """Open the view of this browser tab and control its time cursor; `ghost` = another visit as overlay."""
     await ws.accept()
     try:
-        opened = await _open(ws, sid, who, ghost, tab=tab, dark=dark, t_s=t, name=view)
+        opened = await _open(ws, sid, user, ghost, tab=tab, dark=dark, t_s=t, name=view)
     except (Problem, SagittalError) as error:
         problem = as_problem(error)
         await ws.send_json({"error": {"code": problem.code, "detail": problem.detail}})
         await ws.close(_GONE, problem.code)
         return
     logins = state_of(ws).logins
-    name = view if view and _views(ws).find(view, who.login_id, who.role) is opened else opened.id
+    name = view if view and _views(ws).find(view, user.login_id, user.role) is opened else opened.id
     with opened.keep_open():
         motion = opened.figure.motion
         answer = {
@@ -190,7 +194,7 @@ async def replay(
             "measured": motion.measured,
             "hidden": motion.hidden,
         }
-        activity = ViewActivity(lambda: logins.touch(who.login_id))
+        activity = ViewActivity(lambda: logins.touch(user.login_id))
         cursor = asyncio.create_task(_follow(ws, opened, activity, answer))
         over = asyncio.create_task(wait_for_end(functools.partial(find_end, ws)))
         await asyncio.wait((cursor, over), return_when=asyncio.FIRST_COMPLETED)
@@ -204,7 +208,7 @@ async def replay(
 
 
 async def _open(
-    ws: WebSocket, sid: str, who: Identity, other: str | None, *, tab: str, **shown_first: Any
+    ws: WebSocket, sid: str, user: Identity, overlay_id: str | None, *, tab: str, **shown_first: Any
 ) -> FigureView[ReplayFigure]:
     state = state_of(ws)
     db, reviewed = state.db, state.reviewed
@@ -213,24 +217,24 @@ async def _open(
         with db.read() as c:
             patient = patients.get(c, sessions.get(c, sid).patient_id)
             this = _replayable(c, sid)
-            if this is None or other is None:
+            if this is None or overlay_id is None:
                 return this, None, patient
-            comparisons.pair(c, sid, other)  # refuses a visit of somebody else
-            return this, _replayable(c, other), patient
+            comparisons.pair(c, sid, overlay_id)  # refuses a visit of somebody else
+            return this, _replayable(c, overlay_id), patient
 
     def why_nothing() -> str:
         with db.read() as c:
-            found = analyses.latest(c, sid)
-            edits = None if found is None else edit_log.edits_of(c, found.id)
-        if found is None or edits is None:
+            record = analyses.latest(c, sid)
+            edits = None if record is None else edit_log.edits_of(c, record.id)
+        if record is None or edits is None:
             return "There is nothing to replay: nothing is analysed yet."
-        return explain_no_figure(reviewed.read_bundle(found, edits))
+        return explain_no_figure(reviewed.read_bundle(record, edits))
 
-    this, before, patient = await asyncio.to_thread(latest)
-    for seen in (this, before):
-        if seen is not None:
+    this, overlay, patient = await asyncio.to_thread(latest)
+    for analysed in (this, overlay):
+        if analysed is not None:
             await asyncio.to_thread(
-                state.trail.record_watched, who, "replay.opened", "session", seen.session.id
+                state.trail.record_watched, user, "replay.opened", "session", analysed.session.id
             )
     if this is None:
         raise Problem(404, "no_poses", await asyncio.to_thread(why_nothing))
@@ -238,21 +242,21 @@ async def _open(
     def load() -> ReplayMotion:
         motion = _motion(reviewed.blobs, this)
         ghosts = find_references(reviewed, this, patient, motion)
-        if before is not None:
-            mine, theirs = (reviewed.read_bundle(a.found, a.edits).strides for a in (this, before))
-            visit = match_ghost(motion, mine, _motion(reviewed.blobs, before), theirs)
+        if overlay is not None:
+            mine, theirs = (reviewed.read_bundle(a.found, a.edits).strides for a in (this, overlay))
+            visit = match_ghost(motion, mine, _motion(reviewed.blobs, overlay), theirs)
             ghosts["visit"] = lambda: visit
         return replace(motion, ghosts=ghosts)
 
-    shown = _state(this) if before is None else f"{_state(this)} over {_state(before)}"
-    return await _views(ws).open(who.login_id, tab, sid, shown, load, **shown_first)
+    version = _state(this) if overlay is None else f"{_state(this)} over {_state(overlay)}"
+    return await _views(ws).open(user.login_id, tab, sid, version, load, **shown_first)
 
 
 def _replayable(c: Connection, sid: str) -> AnalysedSession | None:
-    found = analyses.latest(c, sid)
-    if found is None or "poses.parquet" not in found.files:
+    record = analyses.latest(c, sid)
+    if record is None or "poses.parquet" not in record.files:
         return None
-    return AnalysedSession(sessions.get(c, sid), found, edit_log.edits_of(c, found.id))
+    return AnalysedSession(sessions.get(c, sid), record, edit_log.edits_of(c, record.id))
 
 
 def _state(a: AnalysedSession) -> str:
@@ -293,8 +297,8 @@ def _act(view: FigureView[ReplayFigure], text: str) -> dict[str, Any]:
     if isinstance(message, dict) and len(message) == 1:
         ((name, value),) = message.items()
         if name == "t" and type(value) in (int, float) and math.isfinite(value):
-            shown = view.figure.pose(float(value))
-            return {"t": shown, "valid": view.figure.is_valid(shown)}
+            time_s = view.figure.pose(float(value))
+            return {"t": time_s, "valid": view.figure.is_valid(time_s)}
         if name == "look" and isinstance(value, str) and value in VIEWS:
             view.figure.look_from(cast("ViewName", value))
             return {"look": value}

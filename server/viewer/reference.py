@@ -52,7 +52,7 @@ class ReferenceWalk:
             points.append(np.stack(np.broadcast_arrays(hip, knee, ankle, *sole), axis=1))
         self._pelvis = [(float(w), float(x), float(y), float(z)) for w, x, y, z in pelvis]
         # side → row → orientations (3, 4) of a leg, and its points (n, 3)
-        self._turns, self._points = ([list(of) for of in both] for both in (turn, points))
+        self._turns, self._points = ([list(arrays) for arrays in pair] for pair in (turn, points))
 
     def at(self, phases: Phases, place: tuple[float, float], heading: float) -> tuple[Floats, Floats] | None:
         """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS`, lower sole on the floor.
@@ -74,11 +74,11 @@ class ReferenceWalk:
         pelvis = turn_about_z(heading, self._pelvis[left if self.lead == "left" else right])
         q, p = np.empty((len(SEGMENTS), 4)), np.zeros((len(SEGMENTS), 3))
         q[0] = pelvis
-        before, matrix, lowest = _before(*pelvis), find_matrices(q[0]).T, inf
+        transform, matrix, lowest = _before(*pelvis), find_matrices(q[0]).T, inf
         for k, row in enumerate((left, right)):
             # pelvis ⊗ turn and R(pelvis) point, of a leg at once
             leg = slice(1 + 3 * k, 4 + 3 * k)
-            np.matmul(self._turns[k][row], before, out=q[leg])
+            np.matmul(self._turns[k][row], transform, out=q[leg])
             points = self._points[k][row] @ matrix
             p[leg] = points[:3]
             lowest = min(lowest, *points[:, 2].tolist())
@@ -99,10 +99,10 @@ def stand_upright(body: BodyModel) -> tuple[Floats, Floats]:
 def _row(phases: Phases, side: Side, last: int) -> int | None:
     own = phases.get(side)
     if own is None:
-        other = phases.get("right" if side == "left" else "left")
-        if other is None:
+        opposite = phases.get("right" if side == "left" else "left")
+        if opposite is None:
             return None
-        own = (other + 0.5) % 1.0
+        own = (opposite + 0.5) % 1.0
     return round(last * min(max(own, 0.0), 1.0))
 
 
@@ -117,15 +117,15 @@ def add_standing_angles(
         `JointAngles.zero_offset`.
     """
     own = 1.0 if side == "right" else -1.0
-    found = {name: x for name, x in curves.items() if name == "pelvis_rotation"}
+    shifted = {name: x for name, x in curves.items() if name == "pelvis_rotation"}
     if "pelvis_tilt" in curves:
-        found["pelvis_tilt"] = curves["pelvis_tilt"] + zero.get("pelvis_tilt", 0.0)
+        shifted["pelvis_tilt"] = curves["pelvis_tilt"] + zero.get("pelvis_tilt", 0.0)
     if "pelvis_obliquity" in curves:
-        found["pelvis_obliquity"] = curves["pelvis_obliquity"] + own * zero.get("pelvis_obliquity", 0.0)
+        shifted["pelvis_obliquity"] = curves["pelvis_obliquity"] + own * zero.get("pelvis_obliquity", 0.0)
     for name in (name for rows in SIGNS.values() for name, _, _ in rows):
         if name in curves:
-            found[name] = curves[name] + zero.get(f"{name}_{SUFFIX[side]}", 0.0)
-    return found
+            shifted[name] = curves[name] + zero.get(f"{name}_{SUFFIX[side]}", 0.0)
+    return shifted
 
 
 def find_better_side(curves: Mapping[Side, Mapping[str, Floats]], norm: Mapping[str, Floats]) -> Side | None:
@@ -134,17 +134,17 @@ def find_better_side(curves: Mapping[Side, Mapping[str, Floats]], norm: Mapping[
     Uses the mean of root mean squares as in `gps_sagittal`, without offsets since our angles are relative to
     standing. None without both sides and the norm, as there is no basis for a choice.
     """
-    found: dict[Side, float] = {
+    distances: dict[Side, float] = {
         side: sum(_unlike(own[name], norm[name]) for name in SAGITTAL)
         for side, own in curves.items()
         if all(name in own and name in norm for name in SAGITTAL)
     }
-    if len(found) < len(SIDES):
+    if len(distances) < len(SIDES):
         return None
-    return "left" if found["left"] <= found["right"] else "right"
+    return "left" if distances["left"] <= distances["right"] else "right"
 
 
 def _unlike(a: Floats, b: Floats) -> float:
     x = np.linspace(0.0, 1.0, len(a))
-    other = np.interp(x, np.linspace(0.0, 1.0, len(b)), b)
-    return float(np.std(a - other))
+    resampled = np.interp(x, np.linspace(0.0, 1.0, len(b)), b)
+    return float(np.std(a - resampled))

@@ -58,9 +58,9 @@ def stop_scene_server(server: viser.ViserServer) -> None:
         shutil.rmtree(socket_of(server).parent)
 
 
-def _no_place(why: str) -> EstimationError:
+def _no_place(reason: str) -> EstimationError:
     return EstimationError(
         "no_place_for_views",
-        f"The server cannot keep 3D views in its folder for temporary files ({why}); "
+        f"The server cannot keep 3D views in its folder for temporary files ({reason}); "
         "an administrator can set TMPDIR to another.",
     )

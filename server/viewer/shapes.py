@@ -41,8 +41,8 @@ def loft_sections(
     e = 2.0 / np.where(np.cos(a) >= 0, *power)
     c, s = (np.sign(g) * np.abs(g) ** e for g in (np.cos(a), np.sin(a)))
     y, x, front, back, right, left = (col[:, None] for col in rows.T)
-    across = x + np.where(c >= 0, front, back) * c, np.where(s >= 0, right, left) * s
-    v = np.stack((across[0], np.broadcast_to(y, across[1].shape), across[1]), axis=-1).reshape(-1, 3)
+    xs = x + np.where(c >= 0, front, back) * c, np.where(s >= 0, right, left) * s
+    v = np.stack((xs[0], np.broadcast_to(y, xs[1].shape), xs[1]), axis=-1).reshape(-1, 3)
     v = np.concatenate((v, np.column_stack((tips[:, ::-1], np.zeros(2)))))
     j, i = np.arange(sides), np.arange(len(rows) - 1)[:, None] * sides
     p, q, top = (i + j).ravel(), (i + (j + 1) % sides).ravel(), (len(rows) - 1) * sides
@@ -56,7 +56,7 @@ def loft_sections(
 
 
 def interpolate_rows(
-    table: Floats, count: int, between: tuple[float, float] | None = None, *, dense_ends: bool = False
+    table: Floats, count: int, bounds: tuple[float, float] | None = None, *, dense_ends: bool = False
 ) -> Floats:
     """Interpolate a table (n, k) at `count` positions of its first column by monotone cubics.
 
@@ -64,7 +64,7 @@ def interpolate_rows(
 
     Parameters
     ----------
-    between : first and last position, None = the whole table. dense_ends : denser positions towards both
+    bounds : first and last position, None = the whole table. dense_ends : denser positions towards both
         ends.
     """
     x, y = table[:, 0], table[:, 1:]
@@ -76,13 +76,13 @@ def interpolate_rows(
     with np.errstate(divide="ignore", invalid="ignore"):
         m[1:-1][rising] = ((w1 + w2) / (w1 / d[:-1] + w2 / d[1:]))[rising]
     u = np.linspace(0.0, 1.0, count)
-    low, high = between or (x[0], x[-1])
-    at = low + (high - low) * ((1 - np.cos(np.pi * u)) / 2 if dense_ends else u)
-    i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(h) - 1)
-    s, span = ((at - x[i]) / h[i, 0])[:, None], h[i]
+    low, high = bounds or (x[0], x[-1])
+    positions = low + (high - low) * ((1 - np.cos(np.pi * u)) / 2 if dense_ends else u)
+    i = np.clip(np.searchsorted(x, positions, side="right") - 1, 0, len(h) - 1)
+    s, span = ((positions - x[i]) / h[i, 0])[:, None], h[i]
     value = (1 + 2 * s) * (1 - s) ** 2 * y[i] + s * (1 - s) ** 2 * span * m[i]
     value += s * s * (3 - 2 * s) * y[i + 1] - s * s * (1 - s) * span * m[i + 1]
-    return np.column_stack((at, value))
+    return np.column_stack((positions, value))
 
 
 def join_meshes(*meshes: tuple[NDArray[np.floating], NDArray[np.integer]]) -> Mesh:

@@ -63,12 +63,12 @@ def lay_trail(t_s: Floats, valid: Bools, path: Floats | Single) -> FootTrail:
     gone = np.concatenate(([0.0], np.cumsum(np.where(valid[1:] & valid[:-1], stride, 0.0))))
     # the first and last sample of every valid run are kept, so that a piece never reaches over a gap
     edge = valid & ~(np.append(valid[1:], False) & np.append(False, valid[:-1]))
-    kept = np.flatnonzero(valid & (edge | (np.diff(gone // PIECE_M, prepend=-1.0) > 0)))
+    indices = np.flatnonzero(valid & (edge | (np.diff(gone // PIECE_M, prepend=-1.0) > 0)))
     lost = np.cumsum(~valid)
-    whole = lost[kept[1:]] == lost[kept[:-1]]
-    points = path[kept].astype(np.float32)
+    whole = lost[indices[1:]] == lost[indices[:-1]]
+    points = path[indices].astype(np.float32)
     points[:, 2] = np.maximum(points[:, 2], CLEAR_M)
-    return FootTrail(t_s[kept[1:]][whole], np.stack((points[:-1], points[1:]), axis=1)[whole])
+    return FootTrail(t_s[indices[1:]][whole], np.stack((points[:-1], points[1:]), axis=1)[whole])
 
 
 def find_prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats | Single, q: Floats) -> FootPrints:
@@ -83,21 +83,21 @@ def find_prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats | Single
     """
     n = len(t_s)
     half = max(1, round(_REST_WINDOW_S / 2 * n / max(t_s[-1] - t_s[0], _REST_WINDOW_S)))
-    before, after = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half, n - 1)
-    way = np.linalg.norm(path[after] - path[before], axis=1)
-    speed = way / np.maximum(t_s[after] - t_s[before], _REST_WINDOW_S / 2)
+    lower, upper = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half, n - 1)
+    way = np.linalg.norm(path[upper] - path[lower], axis=1)
+    speed = way / np.maximum(t_s[upper] - t_s[lower], _REST_WINDOW_S / 2)
     down = contact & valid
     slow = down & (speed < REST_MPS)
     slow[_slowest(down, speed)] = True
-    rest: list[int] = []
-    for at in _slowest(slow, speed):
-        if not rest or np.hypot(*(path[at] - path[rest[-1]])[:2]) > SAME_M:
-            rest.append(at)
-    position = path[rest].astype(np.float32)
+    rests: list[int] = []
+    for index in _slowest(slow, speed):
+        if not rests or np.hypot(*(path[index] - path[rests[-1]])[:2]) > SAME_M:
+            rests.append(index)
+    position = path[rests].astype(np.float32)
     position[:, 2] = CLEAR_M
-    return FootPrints(t_s[rest], position, rotation.about(2, rotation.yaw(q[rest])).astype(np.float32))
+    return FootPrints(t_s[rests], position, rotation.about(2, rotation.yaw(q[rests])).astype(np.float32))
 
 
-def _slowest(where: Bools, speed: Floats) -> list[int]:
+def _slowest(mask: Bools, speed: Floats) -> list[int]:
     """Index of the lowest speed in every run of a mask."""
-    return [int(start + np.argmin(speed[start:end])) for start, end in find_runs(where)]
+    return [int(start + np.argmin(speed[start:end])) for start, end in find_runs(mask)]

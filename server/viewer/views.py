@@ -247,7 +247,9 @@ class FigureViews:
         """Register a view under a name, unless it is in use."""
         if name is None or self._views.setdefault(name, view) is not view:
             return
-        names = [known for known, other in self._views.items() if other is view and known != view.id]
+        names = [
+            alias for alias, registered in self._views.items() if registered is view and alias != view.id
+        ]
         for old in names[:-MOST_NAMES]:
             del self._views[old]
         if name in self._awaited:
@@ -265,7 +267,7 @@ class FigureViews:
         await self._stop(min(unwatched, key=lambda v: v.left_at))
 
     async def _stop(self, view: FigureView[Any]) -> None:
-        self._views = {name: other for name, other in self._views.items() if other is not view}
+        self._views = {name: registered for name, registered in self._views.items() if registered is not view}
         if view.let_go is not None:
             view.let_go()
         await asyncio.to_thread(stop_scene_server, view.server)

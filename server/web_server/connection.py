@@ -137,9 +137,9 @@ class TimedConnection(H11Protocol):
             self.limits.unread_s, self._end_unread, self.transport.get_write_buffer_size()
         )
 
-    def _end_unread(self, before: int) -> None:
+    def _end_unread(self, unread: int) -> None:
         # one answer may be long: on a slow line it leaves in many windows
-        if self.transport.get_write_buffer_size() < before:
+        if self.transport.get_write_buffer_size() < unread:
             self._watch_unread()
         else:
             self.transport.abort()

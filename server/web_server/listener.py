@@ -128,9 +128,9 @@ def make_room(connections: int) -> int:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft == resource.RLIM_INFINITY:
         return connections
-    wanted = RESERVED + PER_CONNECTION * connections
-    if soft < wanted:
-        soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+    descriptors = RESERVED + PER_CONNECTION * connections
+    if soft < descriptors:
+        soft = descriptors if hard == resource.RLIM_INFINITY else min(descriptors, hard)
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
     # a limit below the reserve is met by the spare descriptor of the listener
     room = max((soft - RESERVED) // PER_CONNECTION, soft // (2 * PER_CONNECTION))

@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from sagittal.web.user_text import encode_user_text
+from sagittal.core.user_text import encode_user_text
 
 
 class Input(msgspec.Struct, frozen=True, tag=True):

@@ -35,8 +35,8 @@ def _inspect(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: At
 def _publish_inspection(
     c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
 ) -> None:
-    found = json.loads(files[FOUND])
-    recordings.publish_inspection(c, str(claim.recording_id), claim.params["input_sha256"], found)
+    inspection = json.loads(files[FOUND])
+    recordings.publish_inspection(c, str(claim.recording_id), claim.params["input_sha256"], inspection)
 
 
 def _analyse(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
@@ -46,9 +46,9 @@ def _analyse(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: At
 def _publish_analysis(
     c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
 ) -> None:
-    found = json.loads(files["analysis.json"])
-    analyses.publish(c, claim, blobs, found["provenance"]["parameters_sha256"])
-    devices.keep_checks(c, str(claim.recording_id), found["devices"])
+    summary = json.loads(files["analysis.json"])
+    analyses.publish(c, claim, blobs, summary["provenance"]["parameters_sha256"])
+    devices.keep_checks(c, str(claim.recording_id), summary["devices"])
 
 
 def _warm() -> None:

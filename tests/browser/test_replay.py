@@ -48,7 +48,7 @@ def figure(figure_page: Page) -> Iterator[Page]:
     switched = figure_page.locator("[data-switch][aria-pressed=false]")
     while switched.count():
         switched.first.click()
-    figure_page.get_by_label("Look from").select_option("near")
+    figure_page.get_by_label("View from").select_option("near")
     if figure_page.locator("html[data-theme=dark]").count():
         figure_page.locator(".rail [data-theme-toggle]").click()
     _seek(figure_page, 0)
@@ -121,8 +121,8 @@ def test_the_first_picture_gives_way_to_the_figure_without_a_jump(
     expect(view.get_by_role("img")).to_have_count(0)
     visible_rows = shot(view)
     for side in SIDES:
-        first, later = (pixels_of(picture, TINTS[False][side]) for picture in (drawn, visible_rows))
-        assert (first & later).sum() > 0.7 * max(first.sum(), later.sum()), side
+        first, then = (pixels_of(picture, TINTS[False][side]) for picture in (drawn, visible_rows))
+        assert (first & then).sum() > 0.7 * max(first.sum(), then.sum()), side
 
 
 def test_a_lost_line_comes_back_by_itself_and_keeps_what_was_switched(figure: Page) -> None:
@@ -155,11 +155,11 @@ def test_the_view_follows_the_walker(figure: Page) -> None:
 
 def test_from_where_the_view_stands_still_the_walk_goes_on(figure: Page) -> None:
     _switch(figure, "follow")
-    lateral = []
+    across = []
     for t_s in (15, 30, 45):
         _seek(figure, t_s)
-        lateral.append(wait_until_still(figure)["x"])
-    assert lateral[0] + 0.05 < lateral[1] < lateral[2] - 0.03
+        across.append(wait_until_still(figure)["x"])
+    assert across[0] + 0.05 < across[1] < across[2] - 0.03
 
 
 def test_steps_and_trails_are_left_behind_and_can_be_hidden(figure: Page) -> None:
@@ -193,7 +193,7 @@ def test_the_figure_is_looked_at_from_every_side(figure: Page) -> None:
     _seek(figure, 12)
     observations = [wait_until_still(figure)]
     for view in ("right", "front", "top"):
-        figure.get_by_label("Look from").select_option(view)
+        figure.get_by_label("View from").select_option(view)
         wait_for_picture(figure, lambda now: now != observations[-1])
         observations.append(wait_until_still(figure))
     assert [x for x in observations if not 0.3 < x["x"] < 0.7] == []

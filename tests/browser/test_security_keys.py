@@ -11,11 +11,11 @@ WHO = "keyed"
 
 
 def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: RunningServer) -> None:
-    place = running.url.replace("127.0.0.1", "localhost")
+    here = running.url.replace("127.0.0.1", "localhost")
     with running.client() as client:
         response = client.post("/api/v1/users", json={"name": WHO, "role": "viewer", "password": PASSWORD})
         response.raise_for_status()
-    context = flat.new_context(base_url=place, locale="en-US")
+    context = flat.new_context(base_url=here, locale="en-US")
     try:
         page = context.new_page()
         session = context.new_cdp_session(page)
@@ -31,8 +31,8 @@ def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: Running
             page.get_by_role("button", name="Sign in", exact=True).click()
 
         sign_in()
-        page.wait_for_url(f"{place}/account")  # loaded, with its scripts
-        page.get_by_label("Present password").nth(1).fill(PASSWORD)
+        page.wait_for_url(f"{here}/account")  # loaded, with its scripts
+        page.get_by_label("Current password").nth(1).fill(PASSWORD)
         page.get_by_role("button", name="Set up a second factor").click()
         dialog = page.locator("dialog[open]")
         secret = dialog.locator("[data-answer=secret]").inner_text()
@@ -44,7 +44,7 @@ def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: Running
 
         page.get_by_role("button", name="New key").click()
         dialog.get_by_label("Name").fill("Blue key")
-        dialog.get_by_label("Present password").fill(PASSWORD)
+        dialog.get_by_label("Current password").fill(PASSWORD)
         dialog.get_by_label("One-time code").fill(codes[0])
         dialog.get_by_role("button", name="Set up").click()
         keys = page.locator("section", has=page.locator("#h-keys"))
@@ -56,7 +56,7 @@ def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: Running
         context.clear_cookies()
         sign_in()
         page.get_by_role("button", name="Use a security key").click()
-        page.wait_for_url(f"{place}/account")
+        page.wait_for_url(f"{here}/account")
         expect(keys).not_to_contain_text("never")
 
         # the key is at home
@@ -65,7 +65,7 @@ def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: Running
         session.send("WebAuthn.addVirtualAuthenticator", {"options": options})
         sign_in()
         page.get_by_role("button", name="Use a security key").click()
-        expect(page.locator(".form-error")).to_contain_text("The key gave no answer")
+        expect(page.locator(".form-error")).to_contain_text("The key did not respond")
         assert "/sign-in" in page.url
     finally:
         context.close()

@@ -17,7 +17,7 @@ def test_the_reader_chooses_the_figures_and_the_address_keeps_them(opened: Opene
     page = opened(f"/patients/{filled.patient}", stays=True)
     page.get_by_role("link", name="All trends").click()
     expect(page.get_by_role("heading", name="Cadence")).to_be_visible()
-    page.get_by_text("Choose figures").click()
+    page.get_by_text("Choose values").click()
     page.get_by_label("Cadence").uncheck()
     page.get_by_label("Swing time").check()
     page.get_by_role("button", name="Show").click()
@@ -97,7 +97,7 @@ def test_a_programme_is_started_linked_to_its_visits_and_ended(
     page.locator("dialog[open]").get_by_role("button", name="Start").click()
     expect(page.get_by_role("heading", name="0 of 22 visits done, 1 missing, next T1")).to_be_visible()
     page.get_by_role("button", name="Change T1", exact=True).click()
-    page.locator("dialog[open]").get_by_label("Session").select_option(session)
+    page.locator("dialog[open]").get_by_label("Visit").select_option(session)
     page.locator("dialog[open]").get_by_role("button", name="Save").click()
     expect(page.get_by_role("heading", name="1 of 22 visits done, 1 missing, next T2")).to_be_visible()
     page.goto(f"/patients/{patient}/sessions/new")
@@ -135,7 +135,7 @@ def test_the_visit_before_walks_as_a_ghost_with_the_figure(
     assert any(
         f"/sessions/{filled.done}/replay" in a and f"ghost={filled.earlier}" in a for a in requested_names
     )
-    menu = page.get_by_label("Ghost")
+    menu = page.get_by_label("Overlay")
     expect(menu.locator("option:checked")).to_have_text("21 Oct 2026")
     expect(page.locator("gait-view")).to_have_attribute("data-ghost-shown", "visit")
     for chosen, view in (("norm", "norm"), ("left", "left"), ("", "")):

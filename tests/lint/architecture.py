@@ -12,14 +12,15 @@ from pathlib import Path
 from tests.data import ROOT
 
 ALLOWED_IN_CORE = {"numpy", "scipy", "numba", "sagittal"}
-ALLOWED_IN_FORMATS = ALLOWED_IN_CORE | {"pyarrow", "defusedxml", "h5py"}
+ALLOWED_IN_FORMATS = ALLOWED_IN_CORE | {"pyarrow", "defusedxml", "h5py", "openpyxl"}
 DATED = (
     "core/signals/sample_blocks.py",
     "core/activity/result.py",
     "core/activity/totals.py",
     "core/formats/vendors/cwa.py",
+    "core/message.py",
 )
-"""They handle dates read from a device's file; none reads the clock."""
+"""They handle dates read from a device's file or given to a message; none reads the clock."""
 COMPILER = "core/body/erkf/vector_lanes.py"
 """It extends Numba's compiler, llvmlite, by a vector type."""
 EFFECTS = {

@@ -24,6 +24,7 @@ from sagittal.core.body.chain.kernel import (
 from sagittal.core.body.chain.model import RevoluteChain
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import Bools, Floats
+from sagittal.core.message import Message
 
 START_STEPS: Final = 15
 """Steps of Gauss and Newton to the start; six are enough from 40°."""
@@ -52,7 +53,8 @@ class ChainFilterParams:
         for name, value in vars(self).items():
             if not (isfinite(value) and value > 0.0):
                 raise ParameterError(
-                    "parameter_out_of_range", f"{name} = {value:g}; expected a number above 0."
+                    "parameter_out_of_range",
+                    Message("{name} = {value:g}; expected a number above 0.", name=name, value=value),
                 )
 
 
@@ -92,11 +94,21 @@ class ChainFilter:
     ) -> None:
         params = params or ChainFilterParams()
         if not 10.0 <= rate_hz <= 5000.0:
-            raise ParameterError("rate_out_of_range", f"The rate must be 10 to 5000 Hz, not {rate_hz:g}.")
+            raise ParameterError(
+                "rate_out_of_range",
+                Message("The rate must be 10 to 5000 Hz, not {rate_hz:g}.", rate_hz=rate_hz),
+            )
         sensors = len(chain.places)
         force = np.asarray(rest_force, np.float64)
         if force.shape != (sensors, 3) or not np.isfinite(force).all():
-            raise ParameterError("bad_shape", f"Expected a rest force of ({sensors}, 3), got {force.shape}.")
+            raise ParameterError(
+                "bad_shape",
+                Message(
+                    "Expected a rest force of ({sensors}, 3), got {shape}.",
+                    sensors=sensors,
+                    shape=force.shape,
+                ),
+            )
         self._arrays = ChainArrays(
             axes=np.ascontiguousarray(chain.axes, np.float64),
             offsets=np.ascontiguousarray(chain.offsets, np.float64),
@@ -133,16 +145,22 @@ class ChainFilter:
         if gyr.shape != shape or acc.shape != shape or known.shape != shape[:2]:
             raise EstimationError(
                 "bad_shape",
-                f"Expected gyr and acc of {shape}, got {gyr.shape} and {acc.shape}, valid {known.shape}.",
+                Message(
+                    "Expected gyr and acc of {shape}, got {shape2} and {shape3}, valid {shape4}.",
+                    shape=shape,
+                    shape2=gyr.shape,
+                    shape3=acc.shape,
+                    shape4=known.shape,
+                ),
             )
         if not (np.isfinite(gyr[known]).all() and np.isfinite(acc[known]).all()):
-            raise EstimationError("filter_diverged", "A sample is no number; mark it as not valid.")
+            raise EstimationError("filter_diverged", "A sample is not a number; mark it as invalid.")
         out = np.empty((shape[0], len(self._x), 3))
         broken = filter_chain(self._arrays, self._noise, self._x, self._P, gyr, acc, known, out)
         if broken >= 0:
             raise EstimationError(
                 "filter_diverged",
-                "The chain's filter lost its way; check which segment each sensor is on.",
+                "The chain filter diverged; check which segment each sensor is on.",
                 t_s=broken * self._noise.step,
             )
         return ChainMotion(out[..., 0].copy(), out[..., 1].copy(), out[..., 2].copy())

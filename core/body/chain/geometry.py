@@ -12,6 +12,7 @@ from sagittal.core.body.model import LEG_FRACTION, NOMINAL_HEIGHT_M, SHANK_FRACT
 from sagittal.core.calibration.fixed_offset import SHIN_FACE
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Floats, Side
+from sagittal.core.message import Message
 
 PELVIS_WIDTH_FRACTION: Final = 0.137
 """Between the anterior superior iliac spines as a fraction of body height: own estimate, 24 cm at 1.75 m.
@@ -83,7 +84,13 @@ class LegGeometry:
             if not (isfinite(length) and least < length < LONGEST_M):
                 raise ParameterError(
                     "length_implausible",
-                    f"{field.name} is {length:g} m; expected {least:g} to {LONGEST_M:g} m, in metres.",
+                    Message(
+                        "{name} is {length:g} m; expected {least:g} to {LONGEST_M:g} m, in metres.",
+                        name=field.name,
+                        length=length,
+                        least=least,
+                        LONGEST_M=LONGEST_M,
+                    ),
                 )
 
     @classmethod

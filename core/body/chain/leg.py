@@ -17,6 +17,7 @@ from sagittal.core.errors import EstimationError
 from sagittal.core.estimators import SQUAT_CHAIN
 from sagittal.core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.rotation import from_matrix
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.rest import index_window
@@ -83,9 +84,13 @@ def read_leg_signals(calibrated: CalibratedRecording, side: Side) -> LegSignals:
     if not known.any(axis=0).all():
         silent = segments[int(np.argmin(known.any(axis=0)))]
         raise EstimationError(
-            "no_standing", f"{silent} has no signal while standing; stand still before squatting.",
-            sensor=silent, t_s=calibration.zero[0],
-        )  # fmt: skip
+            "no_standing",
+            Message(
+                "{silent} has no signal during quiet standing; stand still before squatting.", silent=silent
+            ),
+            sensor=silent,
+            t_s=calibration.zero[0],
+        )
     first = standing.start
     return LegSignals(
         mounts=mounts,

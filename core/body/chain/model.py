@@ -15,6 +15,7 @@ import numpy as np
 from sagittal.core.body.chain.geometry import LegGeometry
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import R_NEUTRAL, SHANK, THIGH, Floats, Segment, Side
+from sagittal.core.message import Message
 
 FORWARD: Final = (1.0, 0.0, 0.0)
 UP: Final = (0.0, 1.0, 0.0)
@@ -74,7 +75,13 @@ class RevoluteChain:
         ):
             if array.shape != shape or not np.isfinite(array).all():
                 raise ParameterError(
-                    "bad_shape", f"RevoluteChain: {name} has shape {array.shape}, expected {shape}, finite."
+                    "bad_shape",
+                    Message(
+                        "RevoluteChain: {name} has shape {shape}, expected {shape2}, finite.",
+                        name=name,
+                        shape=array.shape,
+                        shape2=shape,
+                    ),
                 )
         groups = np.diff(self.first)
         if (
@@ -85,7 +92,12 @@ class RevoluteChain:
             or len(self.bounded) != joints
         ):
             raise ParameterError(
-                "bad_joint", f"RevoluteChain: {joints} joints are not split by {self.first}."
+                "bad_joint",
+                Message(
+                    "RevoluteChain: {joints} joints are not split by {first}.",
+                    joints=joints,
+                    first=self.first,
+                ),
             )
         if not np.allclose(np.linalg.norm(self.axes, axis=1), 1.0):
             raise ParameterError("bad_joint", "RevoluteChain: an axis is not of length 1.")
@@ -119,7 +131,11 @@ def require_leg(side: Side, there: Collection[Segment]) -> tuple[Segment, Segmen
     if missing:
         raise EstimationError(
             "segments_missing",
-            f"The squat needs sensors on {', '.join(worn)}; missing: {', '.join(missing)}.",
+            Message(
+                "A squat requires sensors on {worn}; missing: {missing}.",
+                worn=", ".join(worn),
+                missing=", ".join(missing),
+            ),
             sensor=missing[0],
         )
     return worn

@@ -43,6 +43,7 @@ from sagittal.core.body.still import AT_REST, contact_samples, still_samples
 from sagittal.core.body.tree import ImuTree
 from sagittal.core.errors import EstimationError, ParameterError, SignalError
 from sagittal.core.frames import Bools, Floats
+from sagittal.core.message import Message
 from sagittal.core.signals.held_samples import SampleSeries
 from sagittal.core.signals.memory import make_pages
 
@@ -172,7 +173,11 @@ def erkf_inputs(
     valid = np.asarray(valid & np.isfinite(acc).all(axis=2) & np.isfinite(gyr).all(axis=2))
     for i, name in enumerate(tree.imus):
         if not valid[:, i].any():
-            raise SignalError("bad_signal", f"{name}: no valid sample; leave this sensor out.", sensor=name)
+            raise SignalError(
+                "bad_signal",
+                Message("{name}: no valid sample; exclude this sensor.", name=name),
+                sensor=name,
+            )
     acc, gyr = bridge_gaps(tree, acc, gyr, valid, rate_hz)
     known = find_rests(tree, lambda i: (acc[:, i], gyr[:, i]), valid, rate_hz)
     return replace(known, acc=acc, gyr=gyr, heading=heading)
@@ -246,8 +251,11 @@ class ErkfPass:
             at_s = before_s + step[: at + 1].sum()
             raise EstimationError(
                 "filter_diverged",
-                f"The covariance is no longer positive definite {at_s:.2f} s into "
-                "this block; check units, sensor positions and which sensor is on which segment.",
+                Message(
+                    "The covariance is no longer positive definite {at_s:.2f} s into this block; check "
+                    "units, sensor positions and which sensor is on which segment.",
+                    at_s=at_s,
+                ),
             )
         N = len(self.memory.P)
         return ErkfState(*self.memory._replace(P=self.memory.P[:, :N].copy()))
@@ -403,7 +411,15 @@ def _check(state: ErkfState, inputs: ErkfInputs, tree: ImuTree, params: ErkfPara
         ("P", state.P, (N, N)),
     ):
         if a.shape != shape:
-            raise ParameterError("bad_shape", f"ErKF: {name} has shape {a.shape}, expected {shape}.")
+            raise ParameterError(
+                "bad_shape",
+                Message(
+                    "ErKF: {name} has shape {shape}, expected {shape2}.",
+                    name=name,
+                    shape=a.shape,
+                    shape2=shape,
+                ),
+            )
     if not (np.isfinite(inputs.acc).all() and np.isfinite(inputs.gyr).all()):
         raise SignalError(
             "bad_signal", "ErKF: non-finite samples; hold the last one and mark it not valid (erkf_inputs)."

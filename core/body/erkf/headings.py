@@ -27,6 +27,7 @@ from sagittal.core.body.tree import person_tree
 from sagittal.core.errors import Notice, Severity
 from sagittal.core.frames import Segment
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.rotation import about, from_matrix, multiply, to_matrix, wrap_angle, yaw
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.rest import index_window
@@ -96,10 +97,13 @@ def report_turned_axes(total: Mapping[Segment, float]) -> tuple[Notice, ...]:
     if not off:
         return ()
     worst = max(off, key=lambda s: abs(total[s]))
-    message = (
-        f"The joints show that calibration took the wrong way for forward at {', '.join(off)}, by up to "
-        f"{degrees(abs(total[worst])):.0f}° ({worst}); it was turned. Frontal and transverse angles there "
-        "are less certain."
+    message = Message(
+        "Joint motion shows that calibration misjudged the forward direction at {off}, by up to "
+        "{degrees:.0f}° ({worst}); it was corrected. Frontal and transverse angles there are less "
+        "certain.",
+        off=", ".join(off),
+        degrees=degrees(abs(total[worst])),
+        worst=worst,
     )
     severity: Severity = "warning" if abs(total[worst]) > WARN else "info"
     return (Notice("heading_corrected", message, sensor=worst, severity=severity),)

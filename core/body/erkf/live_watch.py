@@ -11,6 +11,7 @@ from sagittal.core.body.erkf.health import RESIDUAL_MM, TOLD
 from sagittal.core.body.tree import ImuTree
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Bools, Floats
+from sagittal.core.message import Message
 
 WINDOW_S: Final = 5.0
 """Of movement, over which the distance is averaged. Right set-ups then have 3 to 17 mm live (five simulated
@@ -68,6 +69,6 @@ class JointWatch:
         found = []
         for j in np.flatnonzero(far):
             name, apart = self._joints[j].name, 1e3 * float(np.sqrt(self._worst[j]))
-            message = words.format(of=name, value=apart, warn=RESIDUAL_MM[0])
+            message = Message(words, of=name, value=apart, warn=RESIDUAL_MM[0])
             found.append(Notice(code, message, sensor=name.split("-")[-1], severity=severity))
         return found

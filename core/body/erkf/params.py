@@ -15,6 +15,7 @@ from typing import Final, Literal
 import numpy as np
 
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 
 Integration = Literal["trapezoid", "euler"]
 """euler: Potter 2021 eq 8, the sample at the start of the step; it costs 0.6 to 0.9° at 100 Hz
@@ -87,17 +88,28 @@ class ErkfParams:
 
     def __post_init__(self) -> None:
         if self.states not in (9, 15):
-            raise ParameterError("states_unknown", f"{self.states} states per IMU, expected 9 or 15.")
+            raise ParameterError(
+                "states_unknown", Message("{states} states per IMU, expected 9 or 15.", states=self.states)
+            )
         if self.integration not in ("trapezoid", "euler"):
             raise ParameterError(
-                "integration_unknown", f"integration is '{self.integration}', expected trapezoid or euler."
+                "integration_unknown",
+                Message(
+                    "integration is '{integration}', expected trapezoid or euler.",
+                    integration=self.integration,
+                ),
             )
         for name, value in (*vars(self).items(), *self.gyr_sd_of.items()):
             if isinstance(value, float) and not (np.isfinite(value) and value >= 0.0):
-                raise ParameterError("deviation_range", f"{name} = {value:g} is not 0 or above.")
+                raise ParameterError(
+                    "deviation_range",
+                    Message("{name} = {value:g} is not 0 or above.", name=name, value=value),
+                )
         for name in ("zero_velocity_sd", "tilt_sd", "joint_centre_sd", "joint_axis_sd"):
             if getattr(self, name) == 0.0:
-                raise ParameterError("deviation_range", f"{name} is 0; the filter needs it above 0.")
+                raise ParameterError(
+                    "deviation_range", Message("{name} is 0; the filter needs it above 0.", name=name)
+                )
 
     @classmethod
     def offline(cls) -> ErkfParams:

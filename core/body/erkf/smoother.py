@@ -27,6 +27,7 @@ from sagittal.core.body.erkf.kernel import filter_segments, row_length
 from sagittal.core.body.erkf.params import ErkfParams
 from sagittal.core.body.tree import ImuTree
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 from sagittal.core.signals.memory import make_pages
 
 SEGMENT = 128
@@ -73,7 +74,9 @@ def smooth(
     if segment is None:
         segment = max(SEGMENT, math.isqrt(T // 4))
     if segment < 2:
-        raise ParameterError("segment_range", f"Segments of {segment} samples; at least 2.")
+        raise ParameterError(
+            "segment_range", Message("Segments of {segment} samples; at least 2.", segment=segment)
+        )
     whole, N = -(-T // segment), n * params.states
     at_once = max(1, AT_ONCE // segment)
     blocks = [(first, min(first + at_once, whole)) for first in range(0, whole, at_once)]

@@ -27,6 +27,7 @@ import numpy as np
 from sagittal.core.body.l7s.legs import HIP_SIDE, LEGS, LegModel
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import FOOT, Bools, Floats
+from sagittal.core.message import Message
 from sagittal.core.rotation import about, to_matrix, wrap_angle
 
 Worn = Literal["3I", "2I"]
@@ -74,13 +75,19 @@ class L7sParams:
     def __post_init__(self) -> None:
         if self.adjoint not in ("printed", "exact"):
             raise ParameterError(
-                "adjoint_unknown", f"adjoint is '{self.adjoint}', expected printed or exact."
+                "adjoint_unknown",
+                Message("adjoint is '{adjoint}', expected printed or exact.", adjoint=self.adjoint),
             )
         if not 0 <= self.projections <= 10:
-            raise ParameterError("projections_range", f"{self.projections} projections are outside 0 to 10.")
+            raise ParameterError(
+                "projections_range",
+                Message("{projections} projections are outside 0 to 10.", projections=self.projections),
+            )
         for name, value in vars(self).items():
             if isinstance(value, float) and not (np.isfinite(value) and value > 0.0):
-                raise ParameterError("variance_range", f"{name} = {value:g} is not above 0.")
+                raise ParameterError(
+                    "variance_range", Message("{name} = {value:g} is not above 0.", name=name, value=value)
+                )
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,14 +164,22 @@ def filter_block(
     if R.shape != (n, 3, 3, 3) or acc.shape != (n, 3, 3) or step.shape != (n, 2):
         raise ParameterError(
             "bad_shape",
-            f"L7S inputs have shapes {R.shape}, {acc.shape}, {step.shape}; expected "
-            "(n, 3, 3, 3), (n, 3, 3), (n, 2).",
+            Message(
+                "L7S inputs have shapes {shape}, {shape2}, {shape3}; expected (n, 3, 3, 3), (n, 3, "
+                "3), (n, 2).",
+                shape=R.shape,
+                shape2=acc.shape,
+                shape3=step.shape,
+            ),
         )
     bad = ~(np.isfinite(R).all(axis=(1, 2, 3)) & np.isfinite(acc).all(axis=(1, 2)))
     if bad.any():
         raise EstimationError(
             "bad_signal",
-            f"Sample {int(np.argmax(bad))} of the block is not a number; mark it invalid or interpolate it.",
+            Message(
+                "Sample {int} of the block is not a number; mark it invalid or interpolate it.",
+                int=int(np.argmax(bad)),
+            ),
         )
     now = L7sState(*(np.array(x, np.float64, order="C") for x in vars(state).values()))
     track = L7sTrack(np.empty((n, 3, 3, 3)), np.empty((n, 3, 3)), np.empty((n, 3, 3)), np.empty((n, SIZE)))
@@ -186,8 +201,11 @@ def filter_block(
     if failed >= 0 or not all(np.isfinite(x).all() for x in vars(now).values()):
         raise EstimationError(
             "l7s_diverged",
-            f"The leg constraints cannot be met at sample {max(int(failed), 0)} of the block; check which "
-            "foot each sensor is on and the body height.",
+            Message(
+                "The leg constraints cannot be met at sample {max} of the block; check which foot "
+                "each sensor is on and the body height.",
+                max=max(int(failed), 0),
+            ),
         )
     return track, now
 
@@ -217,8 +235,14 @@ def start_l7s_state(inputs: L7sInputs, model: LegModel, params: L7sParams | None
             other = "body" if inputs.worn == "3I" else "left foot"
             raise EstimationError(
                 "headings_apart",
-                f"The {side} foot faces {np.degrees(apart):.0f}° away from the {other} at the start: more "
-                "than a person can. Check that no sensor is worn backwards and calibrate again.",
+                Message(
+                    "The {side} foot points {apart:.0f}° away from the {other} at the start, which is "
+                    "anatomically impossible. Check that no sensor is attached backwards and calibrate "
+                    "again.",
+                    side=side,
+                    apart=np.degrees(apart),
+                    other=other,
+                ),
                 sensor=FOOT[side],
             )
     p = np.zeros((3, 3))

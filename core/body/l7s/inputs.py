@@ -16,6 +16,7 @@ from sagittal.core.body.l7s.legs import BODIES, LEGS, LegModel
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import FOOT, GRAVITY, Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.rotation.compiled import multiply3, to_matrix, transform
 from sagittal.core.signals.calibrated import CalibratedRecording, SegmentCalibration
 from sagittal.core.signals.held_samples import SampleSeries
@@ -228,14 +229,20 @@ def take_of(
         if segment not in orientations.q or segment not in acceleration:
             raise EstimationError(
                 "sensor_missing",
-                f"L7S-{worn} needs {', '.join(needed)}; nothing of {segment}. Wear or map a sensor there.",
+                Message(
+                    "L7S-{worn} requires {needed}; there is no data for {segment}. Attach or assign a sensor "
+                    "there.",
+                    worn=worn,
+                    needed=", ".join(needed),
+                    segment=segment,
+                ),
                 sensor=segment,
             )
     for side in LEGS:
         if side not in steps:
             raise EstimationError(
                 "sensor_missing",
-                f"L7S needs to know when the {side} foot is still; give its step flags.",
+                Message("L7S needs to know when the {side} foot is still; give its step flags.", side=side),
                 sensor=FOOT[side],
             )
     step = np.stack([steps[side] for side in LEGS], axis=1)

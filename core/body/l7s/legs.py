@@ -17,6 +17,7 @@ from sagittal.core.body.kinematics import sole_points
 from sagittal.core.body.model import BodyModel
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.rotation import about, to_matrix
 
 BODIES: Final[tuple[Segment, ...]] = ("pelvis", "foot_l", "foot_r")
@@ -74,8 +75,12 @@ class LegModel:
             if not (np.isfinite(length) and length > 0.0):
                 raise EstimationError(
                     "segment_length",
-                    f"The body model's {name} is {length:g} m, expected above 0; enter the body height or "
-                    "measure the segment.",
+                    Message(
+                        "The body model's {name} is {length:g} m, expected above 0; enter the body height "
+                        "or measure the segment.",
+                        name=name,
+                        length=length,
+                    ),
                 )
         forward, drop, _ = sole_points(body)[1]
         return cls(

@@ -25,6 +25,7 @@ from sagittal.core.errors import Notice
 from sagittal.core.estimators import L7S_2I, L7S_3I
 from sagittal.core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.rotation import angle_between, from_matrix
 from sagittal.core.signals.held_samples import SampleSeries, cut_blocks, give_pages_back, make_room
 
@@ -185,8 +186,11 @@ def _never_still(steps: Mapping[Side, Bools]) -> tuple[Notice, ...]:
     return tuple(
         Notice(
             "foot_never_still",
-            f"The {side} foot is never still in this take, so nothing bounds its speed; positions and step "
-            "lengths mean nothing. A treadmill or a sensor on another segment looks like this.",
+            Message(
+                "The {side} foot is never stationary in this trial, so its speed drifts; positions and step "
+                "lengths are meaningless. Possible causes: a treadmill or a sensor on another segment.",
+                side=side,
+            ),
             sensor=FOOT[side],
         )
         for side in LEGS

@@ -24,6 +24,7 @@ from sagittal.core.body.l7s.legs import LegModel
 from sagittal.core.body.l7s.node_kernel import KEPT, move_nodes
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import Bools, Floats
+from sagittal.core.message import Message
 
 NODE_S: Final = 0.02
 """Time between nodes: a brisk walker's foot rests for some 40 ms. Half of it changes flexion by 0.1°."""
@@ -143,8 +144,11 @@ def smooth_track(
         failed += first
         raise EstimationError(
             "l7s_diverged",
-            f"The leg constraints cannot be met at sample {failed}; check which foot each sensor is on and "
-            "the body height.",
+            Message(
+                "The leg constraints cannot be met at sample {failed}; check which foot each sensor "
+                "is on and the body height.",
+                failed=failed,
+            ),
         )
     return WholeTrack(R, p, passes, moved, offsets)
 
@@ -155,7 +159,8 @@ def find_hop(rate_hz: float) -> int:
 
 
 NOT_FOUND: Final = (
-    "The places of pelvis and feet cannot be found; check which foot each sensor is on and the body height."
+    "The positions of pelvis and feet cannot be determined; check which foot each sensor is on and the "
+    "body height."
 )
 
 

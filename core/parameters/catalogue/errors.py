@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Final
 
+from sagittal.core.message import Message
+
 
 @dataclass(frozen=True)
 class ContactWeights:
@@ -68,19 +70,21 @@ _PATH: Final = "path of the feet"
 STRIDE_LENGTH: Final = MeasurementErrors(_PATH, common=0.008, own=0.006, random=0.017)
 """gaitmap_foot −1.5 ± 17 mm and +1.4 ± 12 mm, neura_walk +6 ± 8 mm; the mean of a walk rounded up."""
 STEP_LENGTH: Final = MeasurementErrors(
-    f"{_PATH}, linked through the pelvis", common=0.011, own=0.010, random=0.016
+    Message("{PATH}, linked through the pelvis", PATH=_PATH), common=0.011, own=0.010, random=0.016
 )
 """neura_walk +4 ± 16 mm; virtual people within 25 mm."""
 STEP_WIDTH: Final = MeasurementErrors(
-    f"{_PATH}, linked; width of standing", common=0.015, own=0.012, random=0.010
+    Message("{PATH}, linked; standing width", PATH=_PATH), common=0.015, own=0.012, random=0.010
 )
 """neura_walk +15 ± 7 mm, and what a ruler between the ankles is read to."""
 CIRCUMDUCTION: Final = MeasurementErrors(_PATH, common=0.010, own=0.006, random=0.004)
 """neura_walk +11 ± 4 mm."""
 HEEL_CLEARANCE: Final = MeasurementErrors(
-    f"{_PATH}, shape of the shoe", common=0.008, own=0.006, random=0.009
+    Message("{PATH}, shape of the shoe", PATH=_PATH), common=0.008, own=0.006, random=0.009
 )
-TOE_CLEARANCE: Final = MeasurementErrors(f"{_PATH}, shape of the shoe", common=0.008, own=0.006, random=0.006)
+TOE_CLEARANCE: Final = MeasurementErrors(
+    Message("{PATH}, shape of the shoe", PATH=_PATH), common=0.008, own=0.006, random=0.006
+)
 """gaitmap_foot +4 ± 9 and +3 ± 6 mm at most, with a shoe's shape found there; a shape by eye adds to it."""
 SPEED: Final = MeasurementErrors(_PATH, common=0.010, own=0.006, random=0.024)
 """gaitmap_foot −8 ± 24 and −1 ± 24 mm/s."""
@@ -113,7 +117,7 @@ FOOT_TURN: Final = _angle("heading of the foot", 0.0, 1.0)
 """Own estimates, from headings (validation/report.md, "Headings on neura_walk")."""
 
 
-TEST_TOTAL: Final = MeasurementErrors("first and last movement, on simulated people", own=0.04)
-TEST_EDGE: Final = MeasurementErrors("where a segment ends, on simulated people", own=0.06)
+TEST_TOTAL: Final = MeasurementErrors("first and last movement, from simulated people", own=0.04)
+TEST_EDGE: Final = MeasurementErrors("segment boundaries, from simulated people", own=0.06)
 """Simulated timed up and go of the twelve virtual people (validation/accuracy/test_functional_tests.py),
 rounded up; real people were not measured against a reference."""

@@ -53,11 +53,11 @@ class Proof:
         user_id = self.who.user_id
         if not second_factor.is_on(c, user_id):
             return  # nor has the account a key
-        before = second_factor.count_recovery(c, user_id)
+        remaining = second_factor.count_recovery(c, user_id)
         if not second_factor.use(c, self.settings.second_factor_key, user_id, code):
             raise second_factor.CodeWrong(403)
         left = second_factor.count_recovery(c, user_id)
-        if left < before:
+        if left < remaining:
             audit.record(c, self.who, "user.recovery_code_used", "user", user_id, {"left": left})
 
 
@@ -67,9 +67,9 @@ async def _proof(
     settings: Config,
     trail: OpenTrail,
     failures: Failures,
-    who: Annotated[Identity, require(Action.USE_ACCOUNT)],
+    user: Annotated[Identity, require(Action.USE_ACCOUNT)],
 ) -> Proof:
-    return Proof(who, address_of(request), db, settings, trail, failures)
+    return Proof(user, address_of(request), db, settings, trail, failures)
 
 
 Proving = Annotated[Proof, Depends(_proof)]

@@ -74,7 +74,7 @@ class DeviceAnswer:
 
 
 @router.get("/devices", response_model=list[DeviceAnswer])
-def list_devices(db: Db, who: Reader) -> list[DeviceAnswer]:
+def list_devices(db: Db, user: Reader) -> list[DeviceAnswer]:
     """List sensors of the clinic with their latest checks, most recently used first."""
     with db.read() as c:
         return [_answer(d) for d in devices.list_devices(c)]
@@ -85,15 +85,15 @@ def list_devices(db: Db, who: Reader) -> list[DeviceAnswer]:
     response_class=Response,
     responses={200: {"description": "The table", "content": {"text/csv": {"schema": BINARY}}}},
 )
-def read_checks_table(db: Db, who: Reader) -> Response:
+def read_checks_table(db: Db, user: Reader) -> Response:
     """Device checks as a table: one row per sensor and trial."""
     with db.read() as c:
-        known = devices.list_devices(c)
-    return attachment(write_csv(COLUMNS, _rows(known)), "sensors.csv")
+        sensors = devices.list_devices(c)
+    return attachment(write_csv(COLUMNS, _rows(sensors)), "sensors.csv")
 
 
 @router.get("/devices/{device_id}", response_model=DeviceAnswer)
-def read_device(device_id: DeviceId, db: Db, who: Reader) -> DeviceAnswer:
+def read_device(device_id: DeviceId, db: Db, user: Reader) -> DeviceAnswer:
     """One sensor."""
     with db.read() as c:
         return _answer(devices.get(c, device_id))
@@ -131,8 +131,8 @@ def _check(x: DatedCheck) -> DeviceCheckAnswer:
     )
 
 
-def _rows(known: Sequence[KnownDevice]) -> Iterator[Sequence[object]]:
-    for d in known:
+def _rows(sensors: Sequence[KnownDevice]) -> Iterator[Sequence[object]]:
+    for d in sensors:
         for k in map(_check, d.checks):
             yield (
                 d.device_id, k.day.isoformat(), k.segment, k.rate_hz, *(k.rest_s or (None, None)),

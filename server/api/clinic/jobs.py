@@ -35,24 +35,24 @@ _JOB = TypeAdapter(JobView)
 def list_jobs(
     db: Db,
     trail: OpenTrail,
-    who: Reader,
+    user: Reader,
     active: Annotated[bool, Query(description="only queued and running ones")] = False,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> list[jobs.ListedJob]:
     """List jobs, newest first."""
     with db.read() as c:
-        rows = jobs.list_jobs(c, who, active_only=active, limit=limit)
-    trail.record_watched(who, "job.listed", "job", None)
+        rows = jobs.list_jobs(c, user, active_only=active, limit=limit)
+    trail.record_watched(user, "job.listed", "job", None)
     return rows
 
 
 @router.get("/{job_id}", response_model=jobs.ListedJob)
-def read_job(job_id: Id, db: Db, trail: OpenTrail, who: Reader) -> jobs.ListedJob:
+def read_job(job_id: Id, db: Db, trail: OpenTrail, user: Reader) -> jobs.ListedJob:
     """Progress of a job, or the reason of its failure."""
     with db.read() as c:
-        found = jobs.get(c, job_id)
-    trail.record_watched(who, "job.opened", "job", job_id)
-    return found
+        row = jobs.get(c, job_id)
+    trail.record_watched(user, "job.opened", "job", job_id)
+    return row
 
 
 @router.get(
@@ -63,7 +63,7 @@ def read_job(job_id: Id, db: Db, trail: OpenTrail, who: Reader) -> jobs.ListedJo
     },
 )
 async def watch_job(
-    job_id: Id, request: Request, db: Db, feed: context.Feed, who: Reader
+    job_id: Id, request: Request, db: Db, feed: context.Feed, user: Reader
 ) -> StreamingResponse:
     """Stream a job as server-sent events, each a Job as JSON; the stream ends with the job."""
 
@@ -81,11 +81,11 @@ def cancel_job(
     job_id: Id,
     db: Db,
     queue: context.Queue,
-    who: Annotated[Identity, require(Action.CANCEL_JOB)],
+    user: Annotated[Identity, require(Action.CANCEL_JOB)],
 ) -> JobView:
     """Request cancellation of a job, which takes effect within two seconds; no effect if finished."""
     with db.write() as c:
-        return jobs.cancel(c, queue, who, job_id)
+        return jobs.cancel(c, queue, user, job_id)
 
 
 async def _events(feed: JobFeed, job_id: str, find_end: Callable[[], str | None]) -> AsyncIterator[str]:

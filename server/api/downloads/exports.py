@@ -33,18 +33,18 @@ class ExportNew(schemas.Request):
 @router.post(
     "/sessions/{session_id}/exports", status_code=202, response_model=JobView, responses=refusals(404, 409)
 )
-def start(session_id: Id, body: ExportNew, db: Db, queue: Queue, who: Reader) -> JobView:
+def start(session_id: Id, body: ExportNew, db: Db, queue: Queue, user: Reader) -> JobView:
     """Export the displayed analysis with its current edits; repeated requests return the same export."""
     with db.write() as c:
-        return exports.submit(c, queue, who, session_id, kind=body.kind)
+        return exports.submit(c, queue, user, session_id, kind=body.kind)
 
 
 @router.get("/sessions/{session_id}/exports", response_model=list[exports.ExportOffer])
-def list_exports(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[exports.ExportOffer]:
+def list_exports(session_id: Id, db: Db, trail: OpenTrail, user: Reader) -> list[exports.ExportOffer]:
     """List export formats of the displayed analysis; one with a `file` can be downloaded with its files."""
     with db.read() as c:
-        found = analyses.get_shown(c, session_id)
-        session, patient = sessions.get(c, session_id), patients.get(c, found.patient_id)
-        offers = exports.list_offers(c, patient, session, found)
-    trail.record_watched(who, "exports.opened", "session", session_id)
+        record = analyses.get_shown(c, session_id)
+        session, patient = sessions.get(c, session_id), patients.get(c, record.patient_id)
+        offers = exports.list_offers(c, patient, session, record)
+    trail.record_watched(user, "exports.opened", "session", session_id)
     return offers

@@ -27,10 +27,10 @@ def make_study(
     settings: Config,
     trail: OpenTrail,
     choice: StudyVisits,
-    who: Annotated[Identity, require(Action.EXPORT_STUDY)],
+    user: Annotated[Identity, require(Action.EXPORT_STUDY)],
 ) -> Response:
     """Tables of all strides and trials of the selected visits, as CSV and Parquet, pseudonymized."""
-    content, visits = study_maker.fetch_study(db, settings, who, choice)
+    content, visits = study_maker.fetch_study(db, settings, user, choice)
     for visit in visits:
-        trail.record_opened(who, "study.exported", "session", visit, {"visits": len(visits)})
+        trail.record_opened(user, "study.exported", "session", visit, {"visits": len(visits)})
     return attachment(content, "study.zip")

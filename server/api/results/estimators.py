@@ -35,7 +35,7 @@ class EstimatorAnswer:
 
 
 @router.get("", response_model=list[EstimatorAnswer])
-def list_estimators(who: Annotated[Identity, require(Action.READ_API)]) -> list[EstimatorAnswer]:
+def list_estimators(user: Annotated[Identity, require(Action.READ_API)]) -> list[EstimatorAnswer]:
     """List estimators of this version, the best for all seven sensors first."""
     return [_shown(estimator) for estimator in ESTIMATORS]
 

@@ -56,11 +56,11 @@ async def put_file(
     settings: Config,
     db: Db,
     blobs: Blobs,
-    who: Annotated[Identity, require(Action.UPLOAD)],
+    user: Annotated[Identity, require(Action.UPLOAD)],
 ) -> recordings.RecordedFile:
     """Add a file with the raw body as its content to the current recording; the same name replaces it."""
     size = read_size(request, settings.max_file_bytes)
-    upload = await run_in_threadpool(receiving.receive, db, blobs, settings, who, session_id, name, size)
+    upload = await run_in_threadpool(receiving.receive, db, blobs, settings, user, session_id, name, size)
     return await receive_body(request, upload)
 
 
@@ -77,12 +77,12 @@ async def post_files(
     settings: Config,
     db: Db,
     blobs: Blobs,
-    who: Annotated[Identity, require(Action.UPLOAD)],
+    user: Annotated[Identity, require(Action.UPLOAD)],
 ) -> list[recordings.RecordedFile]:
     """Add files from a form with the field `files`; a rejected file ends the request."""
     if "content-length" not in request.headers:
         raise Problem(
-            411, "length_required", "A form upload must say its length. Send a Content-Length header."
+            411, "length_required", "A form upload must state its length. Send a Content-Length header."
         )
     # boundaries and part headers take some hundred bytes a file
     size = read_size(request, settings.max_set_bytes + 1000 * settings.max_files)
@@ -106,7 +106,7 @@ async def post_files(
         stored = []
         for part in parts:
             upload = await run_in_threadpool(
-                receiving.receive, db, blobs, settings, who, session_id, part.filename or ""
+                receiving.receive, db, blobs, settings, user, session_id, part.filename or ""
             )
             with upload:
                 while chunk := await part.read(CHUNK_BYTES):
@@ -128,23 +128,23 @@ def read_file(
     db: Db,
     blobs: Blobs,
     trail: OpenTrail,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """Download an original file, byte for byte."""
     with db.read() as c:
         recording = recordings.require_current(c, session_id)
         content = recordings.file_bytes(c, blobs, recording.id, name)
-    trail.record_opened(who, "recording.file_opened", "recording", recording.id)
+    trail.record_opened(user, "recording.file_opened", "recording", recording.id)
     return attachment(content, name.rpartition("/")[2], "application/octet-stream")
 
 
 @router.delete("/{name:path}", response_model=schemas.RecordingAnswer)
 def delete_file(
-    session_id: Id, name: FileName, db: Db, who: Annotated[Identity, require(Action.UPLOAD)]
+    session_id: Id, name: FileName, db: Db, user: Annotated[Identity, require(Action.UPLOAD)]
 ) -> schemas.RecordingAnswer:
     """Remove a file from the current recording; existing analyses keep theirs."""
     with db.write() as c:
-        return schemas.make_answer(schemas.RecordingAnswer, recordings.remove_file(c, who, session_id, name))
+        return schemas.make_answer(schemas.RecordingAnswer, recordings.remove_file(c, user, session_id, name))
 
 
 async def receive_body(request: Request, upload: receiving.receive) -> recordings.RecordedFile:
@@ -184,4 +184,6 @@ async def read_megabytes(request: Request) -> AsyncIterator[bytes]:
 
 
 def _cut() -> Problem:
-    return Problem(400, "upload_cut", "The connection broke before the file was complete. Upload it again.")
+    return Problem(
+        400, "upload_cut", "The connection was lost before the file was complete. Upload it again."
+    )

@@ -44,17 +44,17 @@ class TableMapping(schemas.Request):
 
 
 @router.get("", response_model=list[TableShape])
-def list_tables(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Uploader) -> list[TableShape]:
+def list_tables(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, user: Uploader) -> list[TableShape]:
     """List the tables of the current recording by columns, with their likely content."""
     with db.read() as c:
-        found = tables.list_tables(c, blobs, session_id)
-    trail.record_watched(who, "recording.opened", "session", session_id)
-    return list(found)
+        shapes = tables.list_tables(c, blobs, session_id)
+    trail.record_watched(user, "recording.opened", "session", session_id)
+    return list(shapes)
 
 
 @router.post("/checks", response_model=list[TableReading])
 def check_table(
-    session_id: Id, body: TableCheckNew, db: Db, blobs: Blobs, who: Uploader
+    session_id: Id, body: TableCheckNew, db: Db, blobs: Blobs, user: Uploader
 ) -> list[TableReading]:
     """Apply a mapping to the beginning of a table and return the sensor values; changes nothing."""
     with db.read() as c:
@@ -62,8 +62,8 @@ def check_table(
 
 
 @router.put("", response_model=schemas.RecordingAnswer)
-def map_tables(session_id: Id, body: TableMapping, db: Db, who: Uploader) -> schemas.RecordingAnswer:
+def map_tables(session_id: Id, body: TableMapping, db: Db, user: Uploader) -> schemas.RecordingAnswer:
     """Set the mapping of tables: one manifest entry per file."""
     with db.write() as c:
-        found = tables.map_tables(c, who, session_id, body.files, body.source)
-        return schemas.make_answer(schemas.RecordingAnswer, found)
+        shapes = tables.map_tables(c, user, session_id, body.files, body.source)
+        return schemas.make_answer(schemas.RecordingAnswer, shapes)

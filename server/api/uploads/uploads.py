@@ -51,10 +51,10 @@ def begin_upload(
     settings: Config,
     db: Db,
     blobs: Blobs,
-    who: Annotated[Identity, require(Action.UPLOAD)],
+    user: Annotated[Identity, require(Action.UPLOAD)],
 ) -> uploads.FileUpload:
     """Announce a file, or find its unfinished upload by name and size: see its `offset`."""
-    return uploads.begin(db, blobs, settings, who, session_id, body.name, body.size)
+    return uploads.begin(db, blobs, settings, user, session_id, body.name, body.size)
 
 
 @router.get("", response_model=list[uploads.FileUpload])
@@ -63,13 +63,13 @@ def list_uploads(
     db: Db,
     blobs: Blobs,
     trail: OpenTrail,
-    who: Annotated[Identity, require(Action.UPLOAD)],
+    user: Annotated[Identity, require(Action.UPLOAD)],
 ) -> list[uploads.FileUpload]:
     """List the session's unfinished uploads."""
     with db.read() as c:
         recordings.patient_of(c, session_id)
         coming = uploads.list_coming(c, blobs, session_id)
-    trail.record_opened(who, "uploads.opened", "session", session_id)
+    trail.record_opened(user, "uploads.opened", "session", session_id)
     return coming
 
 
@@ -105,8 +105,8 @@ async def add_part(
     """Append the raw body; of an interrupted body, complete megabytes are retained."""
     read_size(request, settings.max_file_bytes)
 
-    def keep(at: int, piece: bytes) -> uploads.FileUpload:
-        return uploads.add_part(db, blobs, settings, session_id, upload_id, at, piece)
+    def keep(offset: int, piece: bytes) -> uploads.FileUpload:
+        return uploads.add_part(db, blobs, settings, session_id, upload_id, offset, piece)
 
     # refused before the first byte is waited for
     this = await run_in_threadpool(keep, offset, b"")
@@ -115,7 +115,9 @@ async def add_part(
             this = await run_in_threadpool(keep, this.offset, piece)
     except ClientDisconnect:
         raise Problem(
-            400, "upload_cut", "The connection broke within the part. Ask how far it is and go on there."
+            400,
+            "upload_cut",
+            "The connection was lost during this part. Query the offset and resume from there.",
         ) from None
     return this
 
@@ -128,15 +130,15 @@ def finish_upload(
     settings: Config,
     db: Db,
     blobs: Blobs,
-    who: Annotated[Identity, require(Action.UPLOAD)],
+    user: Annotated[Identity, require(Action.UPLOAD)],
 ) -> recordings.RecordedFile:
     """Verify the complete file and add it to the current recording; the same name replaces one."""
-    return uploads.finish(db, blobs, settings, who, session_id, upload_id, body.sha256)
+    return uploads.finish(db, blobs, settings, user, session_id, upload_id, body.sha256)
 
 
 @router.delete("/{upload_id}", status_code=204)
 def cancel_upload(
-    session_id: Id, upload_id: Id, db: Db, blobs: Blobs, who: Annotated[Identity, require(Action.UPLOAD)]
+    session_id: Id, upload_id: Id, db: Db, blobs: Blobs, user: Annotated[Identity, require(Action.UPLOAD)]
 ) -> None:
     """Abandon an upload and delete its data."""
-    uploads.cancel(db, blobs, who, session_id, upload_id)
+    uploads.cancel(db, blobs, user, session_id, upload_id)

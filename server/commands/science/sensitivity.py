@@ -77,11 +77,11 @@ def sensitivity(
     except SagittalError as error:
         sys.stderr.write(f"No sensitivity ({error.code}): {error.message}\n")
         return 1
-    found = summarise_sensitivity(tables, against, from_standing=from_standing)
+    summary = summarise_sensitivity(tables, against, from_standing=from_standing)
     if out is not None:
         fs.make_folder(out.parent)
-        fs.write_file(out, sensitivity_csv(found))
-    sys.stdout.write("\n".join(tell_sensitivity(found)) + "\n")
+        fs.write_file(out, sensitivity_csv(summary))
+    sys.stdout.write("\n".join(tell_sensitivity(summary)) + "\n")
     sys.stdout.flush()
     return 0
 
@@ -104,15 +104,15 @@ def simulate_case(seed: int, side: Side) -> SquatCase:
     from sagittal.core.timeline import synchronise
 
     leg, mounts = draw_leg(HEIGHT_M, side, seed)
-    made = simulate_squats(
+    simulation = simulate_squats(
         Squats(side=side, hinged=True, repetitions=6),
         HEIGHT_M,
         seed,
         RecordingSetup(tissue=SoftTissue()),
         place_sensors(leg, HEIGHT_M, mounts),
     )
-    calibrated = calibrate_with_mounts(synchronise(made.recording), mounts, "known", 1.0)
-    truth = ReferenceAngles(made.truth.t_s, made.truth.angles)
+    calibrated = calibrate_with_mounts(synchronise(simulation.recording), mounts, "known", 1.0)
+    truth = ReferenceAngles(simulation.truth.t_s, simulation.truth.angles)
     return make_case(calibrated, leg, truth, from_standing=False)
 
 
@@ -172,12 +172,12 @@ def _measure(nominal: LegGeometry, path: Path | None) -> LegGeometry:
     if path is None:
         return nominal
     try:
-        given = read_json(read_named_file(path))
+        lengths = read_json(read_named_file(path))
     except ValueError as error:
         raise InputError("measures_unreadable", f"{path} cannot be read as JSON: {error}.") from error
     names = {f.name for f in fields(nominal)} - {"side", "estimated"}
-    if not isinstance(given, dict) or not set(given) <= names:
+    if not isinstance(lengths, dict) or not set(lengths) <= names:
         raise InputError("measures_unreadable", f"{path} may hold {', '.join(sorted(names))}, in m.")
-    if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in given.values()):
+    if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in lengths.values()):
         raise InputError("measures_unreadable", f"{path} holds a length that is no number.")
-    return replace(nominal, **given, estimated=not given)
+    return replace(nominal, **lengths, estimated=not lengths)

@@ -120,8 +120,10 @@ def _analyse_all(
 
 
 def _died(error: BaseException) -> dict[str, Any]:
-    why = f"The analysis ended unexpectedly ({type(error).__name__}: {error}); run again, or tell the makers."
-    return {"sha256": {}, "config": {}, "code_version": CODE_VERSION, "code": "died", "message": why}
+    message = (
+        f"The analysis ended unexpectedly ({type(error).__name__}: {error}); run again, or tell the makers."
+    )
+    return {"sha256": {}, "config": {}, "code_version": CODE_VERSION, "code": "died", "message": message}
 
 
 def analyse_take(
@@ -136,10 +138,10 @@ def analyse_take(
     fs.make_folder(folder)
     try:
         files = [SourceFile.of_path(path) for path in paths]
-        found = analysing.run(files, None, config, lambda stage, share: None)
+        result_files = analysing.run(files, None, config, lambda stage, share: None)
         for name in KEPT:
-            if name in found:
-                fs.write_file(folder / name, found[name])
+            if name in result_files:
+                fs.write_file(folder / name, result_files[name])
     except SagittalError as error:
         state |= {"code": error.code, "message": error.message}
     fs.write_file(folder / _STATE, json.dumps(state, ensure_ascii=False).encode())

@@ -98,5 +98,5 @@ def _say_progress(share: float, message: str) -> None:
 
 
 def _explain_stop(checkpoint: Path) -> None:
-    again = f"The same command with --resume {checkpoint} goes on." if checkpoint.exists() else ""
-    sys.stderr.write(f"\nStopped. {again}\n")
+    hint = f"The same command with --resume {checkpoint} goes on." if checkpoint.exists() else ""
+    sys.stderr.write(f"\nStopped. {hint}\n")

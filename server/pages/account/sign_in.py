@@ -21,7 +21,7 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 @router.get("/")
-def go_home(who: Annotated[Identity, require(Action.READ_PATIENT)]) -> Response:
+def go_home(user: Annotated[Identity, require(Action.READ_PATIENT)]) -> Response:
     """Redirect to the patient list."""
     return RedirectResponse("/patients", status_code=303)
 

@@ -46,28 +46,30 @@ LIMITS: Final = {
 
 
 @router.get("/sensors")
-def show_devices(request: Request, db: Db, who: Annotated[Identity, require(Action.READ_DEVICE)]) -> Response:
+def show_devices(
+    request: Request, db: Db, user: Annotated[Identity, require(Action.READ_DEVICE)]
+) -> Response:
     """All sensors of the clinic with last placement and assessment."""
     with db.read() as c:
         rows = [_row(d) for d in devices.list_devices(c)]
     rows.sort(key=lambda row: row["verdict"].kind != "warn")
-    return render_page(request, db, who, "devices.html", "devices", devices=rows, limits=LIMITS)
+    return render_page(request, db, user, "devices.html", "devices", devices=rows, limits=LIMITS)
 
 
 @router.get("/sensors/{device_id}")
 def show_device(
-    request: Request, db: Db, device_id: DeviceId, who: Annotated[Identity, require(Action.READ_DEVICE)]
+    request: Request, db: Db, device_id: DeviceId, user: Annotated[Identity, require(Action.READ_DEVICE)]
 ) -> Response:
     """History of one sensor."""
     with db.read() as c:
-        known = devices.get(c, device_id)
+        device = devices.get(c, device_id)
     view: dict[str, Any] = {
-        "d": _row(known),
-        "charts": _charts(known),
-        "takes": _takes(known),
+        "d": _row(device),
+        "charts": _charts(device),
+        "takes": _takes(device),
         "limits": LIMITS,
     }
-    return render_page(request, db, who, "device.html", "devices", **view)
+    return render_page(request, db, user, "device.html", "devices", **view)
 
 
 def _row(d: KnownDevice) -> dict[str, Any]:

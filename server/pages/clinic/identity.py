@@ -26,16 +26,16 @@ def show_identity(
     db: Db,
     settings: Config,
     pid: Id,
-    who: Annotated[Identity, require(Action.READ_IDENTITY)],
+    user: Annotated[Identity, require(Action.READ_IDENTITY)],
 ) -> Response:
     """View and edit name, date of birth, numbers and contact."""
     with db.read() as c:
         patient = patients.get(c, pid)
-        known = identities.get(c, settings.identity_key_file, pid)
-    state_of(request).trail.record_opened(who, "identity.opened", "patient", pid)
+        identity = identities.get(c, settings.identity_key_file, pid)
+    state_of(request).trail.record_opened(user, "identity.opened", "patient", pid)
     return render_page(
-        request, db, who, "identity.html", "patients",
-        patient=patient, known=known, most=identities.MOST, oldest=identities.OLDEST,
+        request, db, user, "identity.html", "patients",
+        patient=patient, known=identity, most=identities.MOST, oldest=identities.OLDEST,
     )  # fmt: skip
 
 
@@ -48,15 +48,15 @@ def offers_identity(settings: Settings) -> bool:
 
 
 def name_on_paper(
-    request: Request, db: Database, settings: Settings, who: Identity, patient_id: str, *, named: bool
+    request: Request, db: Database, settings: Settings, user: Identity, patient_id: str, *, named: bool
 ) -> dict[str, Any]:
     """Template context for printing the patient's name on a report, if requested and permitted; audited.
 
     Not used for signed reports, which may be shared by links.
     """
-    may, known = who.may(Action.READ_IDENTITY) and offers_identity(settings), None
+    may, identity = user.may(Action.READ_IDENTITY) and offers_identity(settings), None
     if may and named:
         with db.read() as c:
-            known = identities.get(c, settings.identity_key_file, patient_id)
-        state_of(request).trail.record_opened(who, "identity.printed", "patient", patient_id)
-    return {"may_name": may, "person": known}
+            identity = identities.get(c, settings.identity_key_file, patient_id)
+        state_of(request).trail.record_opened(user, "identity.printed", "patient", patient_id)
+    return {"may_name": may, "person": identity}

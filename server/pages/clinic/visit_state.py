@@ -43,14 +43,14 @@ def describe_state(state: str) -> dict[str, str]:
 def judge_visit(
     reviewed: ReviewedAnalyses,
     s: sessions.Session,
-    shown: analyses.AnalysisRecord | None,
+    record: analyses.AnalysisRecord | None,
     edits: Mapping[str, edit_log.EditHistory],
 ) -> dict[str, str]:
     """Status of a session in lists: data quality if analysed, as on its own page."""
-    if s.state != "done" or shown is None or "analysis.json" not in shown.files:
+    if s.state != "done" or record is None or "analysis.json" not in record.files:
         return describe_state(s.state)
     try:
-        kind, text = reviewed.read_verdict(shown, edits[shown.id])
+        kind, text = reviewed.read_verdict(record, edits[record.id])
     except UNREADABLE:
         kind, text = "bad", "Cannot be read"
     return {"kind": kind, "text": text}

@@ -46,41 +46,41 @@ Therapist = Annotated[Identity, require(Action.RUN_LIVE)]
 
 
 @router.get("/sessions/{sid}/live")
-def show_live(request: Request, db: Db, sid: Id, who: Therapist) -> Response:
+def show_live(request: Request, db: Db, sid: Id, user: Therapist) -> Response:
     """Pair the tablet, calibrate, monitor the walk and control the feedback."""
     with db.read() as c:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
         view = view_live(c, session, patient, capture=str(request.base_url) + "capture")
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "live.html", "patients", session=session, patient=patient, **view)
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "live.html", "patients", session=session, patient=patient, **view)
 
 
 @router.get("/sessions/{sid}/live/patient")
-def show_patient_screen(request: Request, db: Db, sid: Id, who: Therapist) -> Response:
+def show_patient_screen(request: Request, db: Db, sid: Id, user: Therapist) -> Response:
     """Screen for the walking patient: one target and one picture."""
     with db.read() as c:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
         view = view_patient_screen(c, session)
-    record_opening(request, who, "session", sid)
+    record_opening(request, user, "session", sid)
     return render_page(
-        request, db, who, "live-patient.html", "patients", session=session, patient=patient, **view
+        request, db, user, "live-patient.html", "patients", session=session, patient=patient, **view
     )
 
 
 def view_live(c: Connection, session: Session, patient: Patient, *, capture: str) -> dict[str, Any]:
     """Template context of the therapist's page; `capture` = URL of the tablet's page."""
-    shown = [v for v in VARIABLES if v.name in JOINTS]
+    variables = [v for v in VARIABLES if v.name in JOINTS]
     return {
         "capture": capture,
         "only_here": urlsplit(capture).hostname in LOOPBACK,
         "protocol": PROTOCOL_NAMES.get(session.protocol, session.protocol),
-        "joints": [(v.name, JOINTS[v.name]) for v in shown],
+        "joints": [(v.name, JOINTS[v.name]) for v in variables],
         "live": {
             "session": session.id,
             "patient": patient.id,
-            "variables": [_variable(v) for v in shown],
+            "variables": [_variable(v) for v in variables],
             "segments": SEGMENT_NAMES,
             "terms": list_terms(),
             "choices": UNPRESCRIBED,

@@ -27,16 +27,16 @@ from sagittal.server.uploads import reference_files
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 STAGES: Final = (
-    ("analysis", "Analyse the take as before"),
+    ("analysis", "Analyse the trial as before"),
     ("filters", "Run the filters"),
     ("comparing", "Compare them"),
 )
 """Stages of a comparison, in words."""
 
 FILE_WORDS: Final = {
-    "filters.json": "Everything on this page",
+    "filters.json": "All content of this page",
     "filters.csv": "Cost and agreement of each filter",
-    "spread.csv": "Spread over the take, in stance and in swing",
+    "spread.csv": "Spread over the trial, in stance and swing",
     "spread_cycle.csv": "Spread over the gait cycle",
     "spread_time.csv": "Spread over time",
     "orientations.parquet": "Orientation of every segment by each filter",
@@ -52,7 +52,7 @@ def show_algorithms(
     db: Db,
     blobs: Blobs,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
     run: Word = None,
     over: Literal["cycle", "time"] = "cycle",
     of: Word = None,
@@ -70,20 +70,20 @@ def show_algorithms(
         if elsewhere := lead_to_days(context):
             return elsewhere
         context |= list_choices(c, sid)
-        found = filter_runs.of_session(c, sid)
-    shown = next((r for r in found if r.id == run), found[0] if found else None)
-    if shown is not None:
-        content = filter_runs.file_bytes(blobs, shown, NAME)
+        runs = filter_runs.of_session(c, sid)
+    selected = next((r for r in runs if r.id == run), runs[0] if runs else None)
+    if selected is not None:
+        content = filter_runs.file_bytes(blobs, selected, NAME)
         context["view"] = view_comparison(content, over, of, against)
-        context["run"] = shown
-        context["chosen"] = shown.settings["filters"]
+        context["run"] = selected
+        context["chosen"] = selected.settings["filters"]
         context["files"] = [
-            {"name": name, "what": FILE_WORDS.get(name, ""), "href": _href(shown.id, name)}
-            for name in shown.files
+            {"name": name, "what": FILE_WORDS.get(name, ""), "href": _href(selected.id, name)}
+            for name in selected.files
         ]
-    context["runs"] = found
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "algorithms.html", "patients", **context)
+    context["runs"] = runs
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "algorithms.html", "patients", **context)
 
 
 def list_choices(c: Connection, session_id: str) -> dict[str, Any]:

@@ -34,50 +34,50 @@ FILE_WORDS: Final[Mapping[str, str]] = {
     "analysis.json": "Quality, calibration, parameters, warnings, provenance",
     "angles.parquet": "Joint angles in degrees over time",
     "poses.parquet": "Orientation and position of every segment over time",
-    "tracks.parquet": "Paths of the feet and what else strides are measured on",
-    "repaired.json": "The set-up that is proposed instead of this one",
-    "signals.parquet": "What the sensors measured, on one time axis",
-    "events.csv": "Contacts and foot-offs as detected",
-    "steps.csv": "Steps of the trunk sensor, where no foot carries one",
-    "repetitions.csv": "Every squat with its measures, and why it was left out",
-    "activity.json": "Daily life: days, hours, transitions, walking bouts, how the sensor was worn",
-    "activity_spans.parquet": "What the person did from when to when",
+    "tracks.parquet": "Foot trajectories and other stride-level data",
+    "repaired.json": "The proposed replacement set-up",
+    "signals.parquet": "Sensor signals on a common time axis",
+    "events.csv": "Detected contacts and foot-offs",
+    "steps.csv": "Steps from the trunk sensor, if there is no foot sensor",
+    "repetitions.csv": "All squats with their measures and any reason for exclusion",
+    "activity.json": "Daily life: days, hours, transitions, walking bouts and wear time",
+    "activity_spans.parquet": "Activities with start and end times",
     "activity_spans.csv": "The same as text",
     "activity_inclination.parquet": "Inclination of the trunk in degrees, once a second",
     "activity_steps.parquet": "Time of every step of daily life",
     "activity_hours.csv": "Steps and minutes of each posture in every hour",
-    "transitions.csv": "Postural transitions, and leans that do not count with the reason",
-    "walking_bouts.csv": "Every walk of daily life with its steps and cadence",
-    "strides.csv": "Every stride with its parameters, and why it was left out",
+    "transitions.csv": "Postural transitions, and rejected trunk leans with the reason",
+    "walking_bouts.csv": "All walking bouts of daily life with steps and cadence",
+    "strides.csv": "All strides with their parameters and any reason for exclusion",
 }
 
 
 @router.get("/sessions/{sid}/data")
 def show_data(
-    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+    request: Request, db: Db, blobs: Blobs, sid: Id, user: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> Response:
     """Downloads, state of the estimator, provenance, and repeated analysis."""
     with db.read() as c:
         context = read_context(c, sid)
-        context |= list_downloads(c, blobs, sid, results=who.may(Action.READ_RESULT))
+        context |= list_downloads(c, blobs, sid, results=user.may(Action.READ_RESULT))
         context["exports"] = _list_exports(c, context)
-        seen = who.may(Action.READ_RESULT) and context["session"].has_video
-        context["video"] = videos.find(c, sid) if seen else None
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "data.html", "patients", **context)
+        with_video = user.may(Action.READ_RESULT) and context["session"].has_video
+        context["video"] = videos.find(c, sid) if with_video else None
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "data.html", "patients", **context)
 
 
 def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results: bool) -> dict[str, Any]:
     """Template context: files, estimator, sensor checks, provenance and mapping of the displayed analysis."""
     this = recordings.current(c, session_id)
-    found = analyses.of_session(c, session_id) if results else []
-    shown = found[0] if found else None
-    stored = {} if shown is None else json.loads(analyses.file_bytes(blobs, shown, "analysis.json"))
-    files = [] if shown is None else [(shown.id, name, blob.size) for name, blob in shown.files.items()]
+    records = analyses.of_session(c, session_id) if results else []
+    record = records[0] if records else None
+    stored = {} if record is None else json.loads(analyses.file_bytes(blobs, record, "analysis.json"))
+    files = [] if record is None else [(record.id, name, blob.size) for name, blob in record.files.items()]
     return {
-        "analysis": shown,
-        "files_changed": shown is not None and this is not None and shown.recording_id != this.id,
-        "archive": None if shown is None else f"/api/v1/sessions/{session_id}/archive.zip",
+        "analysis": record,
+        "files_changed": record is not None and this is not None and record.recording_id != this.id,
+        "archive": None if record is None else f"/api/v1/sessions/{session_id}/archive.zip",
         "estimator": estimator_view(stored.get("estimator")),
         "sensors": sensor_checks(stored.get("agreement")),
         "earlier": [
@@ -85,9 +85,9 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
                 "id": a.id,
                 "created_at": a.created_at,
                 "estimator": _asked_for(a.config),
-                "again": _ask_again(this, shown, a),
+                "again": _ask_again(this, record, a),
             }
-            for a in found[1:]
+            for a in records[1:]
         ],
         "results": [
             {
@@ -103,18 +103,18 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
             {**vars(f), "href": f"/api/v1/sessions/{session_id}/files/{quote(f.name)}" if results else None}
             for f in (this.files if this else ())
         ],
-        "provenance": _provenance(shown) if shown else [],
-        "mapping": _mapping(shown.manifest if shown else None),
+        "provenance": _provenance(record) if record else [],
+        "mapping": _mapping(record.manifest if record else None),
     }
 
 
 def _list_exports(c: Connection, context: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Export formats: available, in progress, or to be requested; none without an analysis."""
-    shown = context["analysis"]
-    if shown is None:
+    record = context["analysis"]
+    if record is None:
         return []
-    offers = exports.list_offers(c, context["patient"], context["session"], shown)
-    found = [
+    offers = exports.list_offers(c, context["patient"], context["session"], record)
+    views = [
         {
             **vars(offer),
             "job": None if offer.job is None else view_job(offer.job),
@@ -122,27 +122,27 @@ def _list_exports(c: Connection, context: Mapping[str, Any]) -> list[dict[str, A
         }
         for offer in offers
     ]
-    follow_few([offer["job"] for offer in found])
-    return found
+    follow_few([offer["job"] for offer in views])
+    return views
 
 
 def _describe_file(name: str) -> str:
     if name.startswith("sensitivity-"):
-        return "How far the angles of squats move with each measure"
+        return "Sensitivity of squat angles to each input"
     return FILE_WORDS.get(name, "")
 
 
 def _ask_again(
     this: recordings.StoredRecording | None,
-    shown: analyses.AnalysisRecord | None,
+    record: analyses.AnalysisRecord | None,
     earlier: analyses.AnalysisRecord,
 ) -> dict[str, Any] | None:
     """Request for restoring an earlier setup of the same files; None if it is that of the displayed
     analysis.
     """
-    if this is None or shown is None or earlier.recording_id != this.id:
+    if this is None or record is None or earlier.recording_id != this.id:
         return None
-    if repairs.take_setup(None, earlier.manifest) == repairs.take_setup(None, shown.manifest):
+    if repairs.take_setup(None, earlier.manifest) == repairs.take_setup(None, record.manifest):
         return None
     return {
         "manifest": repairs.take_setup(this.manifest, earlier.manifest),
@@ -152,16 +152,16 @@ def _ask_again(
 
 def _asked_for(config: Mapping[str, Any]) -> str | None:
     """Label of the estimator chosen by the user, None if automatic."""
-    asked = (config.get("poses") or {}).get("estimator")
-    return None if asked is None else choice_label(asked)
+    name = (config.get("poses") or {}).get("estimator")
+    return None if name is None else choice_label(name)
 
 
-def _provenance(shown: analyses.AnalysisRecord) -> list[tuple[str, str]]:
+def _provenance(record: analyses.AnalysisRecord) -> list[tuple[str, str]]:
     return [
-        ("Input sha256", shown.input_sha256),
-        ("Settings sha256", shown.config_sha256),
-        ("Version", shown.code_version),
-        ("Analysis", shown.id),
+        ("Input sha256", record.input_sha256),
+        ("Settings sha256", record.config_sha256),
+        ("Version", record.code_version),
+        ("Analysis", record.id),
     ]
 
 

@@ -31,8 +31,8 @@ def draw_contact(
     """The avatar at a contact in the middle of the walk, with its caption; None without poses."""
     if "poses.parquet" not in this.found.files:
         return None
-    counted = [s for s in strides.strides if s.excluded_reason is None]
-    mine = [s for s in counted if s.side == patient.affected_side] or counted
+    included = [s for s in strides.strides if s.excluded_reason is None]
+    mine = [s for s in included if s.side == patient.affected_side] or included
     middle = mine[len(mine) // 2]
     caption = f"Contact, {middle.side} foot"
     poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))

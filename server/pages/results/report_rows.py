@@ -63,14 +63,14 @@ def select_first(model: ReportModel) -> tuple[ParameterRow, ...]:
     if model.functional is not None and not model.strides:
         return tuple(row for row in rows.values() if row.group in FUNCTIONAL and row.reason is None)
     from_zero = {level.from_standing(name): row for name, row in rows.items()}
-    found = (from_zero.get(name) or rows.get(name) for name in MATTERING)
-    return tuple(row for row in found if row is not None and row.reason is None)[:FIRST_ROWS]
+    selected = (from_zero.get(name) or rows.get(name) for name in MATTERING)
+    return tuple(row for row in selected if row is not None and row.reason is None)[:FIRST_ROWS]
 
 
 def fold_groups(model: ReportModel, first: Sequence[ParameterRow]) -> list[dict[str, Any]]:
     """Remaining rows by group, with the number outside the norm in each heading."""
-    shown = {row.name for row in first}
-    groups = ((name, [row for row in rows if row.name not in shown]) for name, rows in model.page_groups)
+    names = {row.name for row in first}
+    groups = ((name, [row for row in rows if row.name not in names]) for name, rows in model.page_groups)
     return [{"name": name, "rows": rows, "words": _count_beyond(rows)} for name, rows in groups if rows]
 
 
@@ -104,9 +104,9 @@ def select_others(
     model: ReportModel, first: Sequence[ParameterRow]
 ) -> list[tuple[str, tuple[ParameterRow, ...]]]:
     """Printed rows that are not among the first ones."""
-    shown = {row.name for row in first}
+    names = {row.name for row in first}
     short = (
-        (name, tuple(r for r in rows if r.name not in shown))
+        (name, tuple(r for r in rows if r.name not in names))
         for name, rows in select_groups(model, paper=True)
     )
     return [(name, rows) for name, rows in short if rows]

@@ -26,8 +26,8 @@ from sagittal.server.uploads import reference_files
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 STAGES: Final = (
-    ("analysis", "Analyse the take as before"),
-    ("parameters", "Put 24 measures off, one at a time"),
+    ("analysis", "Analyse the trial as before"),
+    ("parameters", "Perturb 24 inputs, one at a time"),
 )
 """Stages of a sensitivity analysis, in words."""
 
@@ -38,7 +38,7 @@ def show_sensitivity(
     db: Db,
     blobs: Blobs,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
     run: Annotated[str | None, Query(max_length=100)] = None,
     show: Annotated[str, Query(max_length=20)] = "step",
 ) -> Response:
@@ -52,17 +52,17 @@ def show_sensitivity(
     with db.read() as c:
         context = read_context(c, sid)
         context |= list_choices(c, sid)
-        found = sensitivities.of_session(c, sid)
-        shown = next((r for r in found if r.id == run), found[0] if found else None)
-        kept = None if shown is None else sensitivities.find_file(c, shown)
-    context |= {"runs": found, "run": shown}
-    if shown is not None and kept is not None:
-        analysis, name = kept
+        rows = sensitivities.of_session(c, sid)
+        selected = next((r for r in rows if r.id == run), rows[0] if rows else None)
+        stored = None if selected is None else sensitivities.find_file(c, selected)
+    context |= {"runs": rows, "run": selected}
+    if selected is not None and stored is not None:
+        analysis, name = stored
         context["view"] = view_sensitivity(analyses.file_bytes(blobs, analysis, name), show)
         context["earlier"] = context["analysed"] != analysis.id
-        context["csv"] = f"/api/v1/analyses/{analysis.id}/files/{quote(shown.files[1])}"
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "sensitivity.html", "patients", **context)
+        context["csv"] = f"/api/v1/analyses/{analysis.id}/files/{quote(selected.files[1])}"
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "sensitivity.html", "patients", **context)
 
 
 def list_choices(c: Connection, session_id: str) -> dict[str, Any]:

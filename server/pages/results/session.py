@@ -101,10 +101,10 @@ def show_overview(
     db: Db,
     reviewed: Reviewed,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_SESSION)],
+    user: Annotated[Identity, require(Action.READ_SESSION)],
 ) -> Response:
     """Data quality and summary of the gait."""
-    return _show_report(request, db, reviewed, sid, who, OVERVIEW)
+    return _show_report(request, db, reviewed, sid, user, OVERVIEW)
 
 
 @router.get("/sessions/{sid}/kinematics")
@@ -113,10 +113,10 @@ def show_kinematics(
     db: Db,
     reviewed: Reviewed,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """All cycle curves with the replay."""
-    return _show_report(request, db, reviewed, sid, who, CURVES)
+    return _show_report(request, db, reviewed, sid, user, CURVES)
 
 
 @router.get("/sessions/{sid}/values")
@@ -125,13 +125,13 @@ def show_values(
     db: Db,
     reviewed: Reviewed,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """All other values by group: a page, and the part of the overview loaded with its first expanded
     group.
     """
     template = VALUES if FRAGMENT in request.headers else "values.html"
-    return _show_report(request, db, reviewed, sid, who, template)
+    return _show_report(request, db, reviewed, sid, user, template)
 
 
 @router.get("/sessions/{sid}/print")
@@ -141,16 +141,16 @@ def show_print(
     reviewed: Reviewed,
     settings: Config,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
     named: bool = False,
 ) -> Response:
     """A4 pages for the browser's print function: summary, all values, curves; with the name if requested."""
-    context = gather_report(db, reviewed, sid, who, PAPER)
+    context = gather_report(db, reviewed, sid, user, PAPER)
     if context["report"] is None:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
-    record_opening(request, who, "session", sid)
-    context |= name_on_paper(request, db, settings, who, context["patient"].id, named=named)
-    return render_sheets(request, who, choose_template(PAPER, context), **context)
+    record_opening(request, user, "session", sid)
+    context |= name_on_paper(request, db, settings, user, context["patient"].id, named=named)
+    return render_sheets(request, user, choose_template(PAPER, context), **context)
 
 
 def _show_report(
@@ -158,18 +158,18 @@ def _show_report(
     db: Database,
     reviewed: ReviewedAnalyses,
     sid: str,
-    who: Identity,
+    user: Identity,
     template: str,
 ) -> Response:
-    context = gather_report(db, reviewed, sid, who, template)
+    context = gather_report(db, reviewed, sid, user, template)
     if template == CURVES and (elsewhere := lead_to_days(context)):
         return elsewhere
     if template == VALUES:
-        state_of(request).trail.record_watched(who, "numbers.opened", "session", sid)
+        state_of(request).trail.record_watched(user, "numbers.opened", "session", sid)
     else:
-        record_opening(request, who, "session", sid)
-    shown = choose_template(template, context)
-    return render_page(request, db, who, shown, "patients", **context)
+        record_opening(request, user, "session", sid)
+    chosen_template = choose_template(template, context)
+    return render_page(request, db, user, chosen_template, "patients", **context)
 
 
 def choose_template(template: str, context: Mapping[str, Any]) -> str:
@@ -182,7 +182,7 @@ def gather_report(
     db: Database,
     reviewed: ReviewedAnalyses,
     sid: str,
-    who: Identity,
+    user: Identity,
     template: str,
 ) -> dict[str, Any]:
     """Template context of a session's report; `report` is None if nothing is analysed."""
@@ -190,7 +190,7 @@ def gather_report(
     with db.read() as c:
         context = read_measured_context(c, sid)
         patient = context["patient"]
-        done = histories.list_analysed(c, patient.id) if who.may(Action.READ_RESULT) else []
+        done = histories.list_analysed(c, patient.id) if user.may(Action.READ_RESULT) else []
         this = next((a for a in done if a.session.id == sid), None)
         if this is not None:
             alike = comparisons.list_comparable(c, this.session, done)
@@ -198,7 +198,7 @@ def gather_report(
             trained = feedback.gather(c, patient, sid, done)
             if template == OVERVIEW and context["session"].has_video:
                 context["video"] = videos.find(c, sid)
-            if not paper and who.may(Action.ANALYSE):
+            if not paper and user.may(Action.ANALYSE):
                 repair = repairs.read_proposal(c, reviewed.blobs, this.found)
                 context["repair"] = repair
                 if this.session.protocol in TEST_NAMES:
@@ -225,13 +225,13 @@ def view_report(
     reviewed: ReviewedAnalyses, this: AnalysedSession, context: Mapping[str, Any], *, page: str
 ) -> Mapping[str, Any]:
     """Report of an analysis with rendered charts, cached for the same records."""
-    before: AnalysedSession | None = context.get("before")
+    previous: AnalysedSession | None = context.get("before")
     controls: Sequence[ControlVisit] = context["controls"]
     key = (
         page,
         context["patient"],
         _name(this),
-        before and _name(before),
+        previous and _name(previous),
         *((_name(a), kind) for a, kind in context.get("alike", ())),
         *((v.person, v.sex, v.birth_year, v.performed_on, v.found.id, v.edits.key) for v in controls),
     )
@@ -246,9 +246,9 @@ def _draw_report(
     reviewed: ReviewedAnalyses, this: AnalysedSession, context: Mapping[str, Any], page: str
 ) -> dict[str, Any]:
     paper, overview = page == PAPER, page == OVERVIEW
-    patient, session, found = context["patient"], context["session"], this.found
+    patient, session, record = context["patient"], context["session"], this.found
     bundle, model = reports.read(
-        reviewed, found, this.edits, patient, session, context.get("before"), context["controls"]
+        reviewed, record, this.edits, patient, session, context.get("before"), context["controls"]
     )
     used, total = sum(model.used.values()), len(model.strides)
     height = PAPER_BAR_HEIGHT if paper else BAR_HEIGHT
@@ -291,14 +291,14 @@ def _draw_report(
         "identity": _identity(patient, session, model.condition),
         "provenance_line": " · ".join(
             (
-                f"Sagittal {found.code_version}",
+                f"Sagittal {record.code_version}",
                 *(() if model.estimator is None else (model.estimator.name,)),
-                f"settings {found.config_sha256[:8]}",
-                f"input {found.input_sha256[:8]}",
-                day(found.created_at),
+                f"settings {record.config_sha256[:8]}",
+                f"input {record.input_sha256[:8]}",
+                day(record.created_at),
             )
         ),
-        "has_poses": "poses.parquet" in found.files,
+        "has_poses": "poses.parquet" in record.files,
         "trend": _follow(reviewed, model, context),
     }
 
@@ -348,7 +348,7 @@ def view_strides(model: ReportModel) -> dict[str, Any]:
         "used": model.used,
         "norm_source": model.norm_source,
         "at_speed": model.at_speed,
-        "stride_words": f"{sum(model.used.values())} of {len(model.strides)} used",
+        "stride_words": f"{sum(model.used.values())} of {len(model.strides)} included",
         "empty_reason": explain_emptiness(model),
     }
 
@@ -356,12 +356,12 @@ def view_strides(model: ReportModel) -> dict[str, Any]:
 def explain_emptiness(model: ReportModel) -> str:
     """Reason why an analysis has no strides or squats to show."""
     causes = [w.message for code in NO_STRIDE_CODES for w in model.warnings if w.code == code]
-    what = "squat" if any(name == SQUAT for name, _ in model.groups) else "stride"
-    read = f"{seconds(model.duration_s)} of data were read, but no complete {what} was seen in them."
-    if what == "squat":
-        return model.problem or f"{read} A squat bends the knee by 20° or more, and comes back."
-    asked = "Is a sensor on each foot, and is it the one the mapping says?"
-    return model.problem or " ".join([read, *(causes or [asked])])
+    cycle = "squat" if any(name == SQUAT for name, _ in model.groups) else "stride"
+    read = f"{seconds(model.duration_s)} of data were read, but no complete {cycle} was seen in them."
+    if cycle == "squat":
+        return model.problem or f"{read} A squat flexes the knee by at least 20° and returns."
+    question = "Check that there is a sensor on each foot and that it is assigned correctly."
+    return model.problem or " ".join([read, *(causes or [question])])
 
 
 def _notices(model: ReportModel) -> list[dict[str, Any]]:

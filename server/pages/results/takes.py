@@ -32,8 +32,8 @@ def view_takes(
     for row in first:
         name = level.from_standing(row.name) or row.name  # levels are read from standing in every take
         for side in (None, *SIDES):
-            found = measured.get((name, side))
-            if found is None or found.mean.mean is None:
+            figure = measured.get((name, side))
+            if figure is None or figure.mean.mean is None:
                 continue
             digits = find_term(name).digits
             rows.append(
@@ -41,8 +41,8 @@ def view_takes(
                     "title": find_term(name).label,
                     "unit": find_term(name).unit,
                     "side": side,
-                    "cells": [_print_take(found.by_take.get(sid), digits) for sid in ids],
-                    "mean": format_number(found.mean.mean, digits),
+                    "cells": [_print_take(figure.by_take.get(sid), digits) for sid in ids],
+                    "mean": format_number(figure.mean.mean, digits),
                 }
             )
     columns = [

@@ -32,7 +32,7 @@ def show_timeline(
     db: Db,
     reviewed: Reviewed,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """Strides, events and signals over time, for review and correction."""
     with db.read() as c:
@@ -47,9 +47,9 @@ def show_timeline(
         context["replay"] = {**model.replay, "curves": {}}
         context["lanes"] = [vars(lane) for lane in signals.list_lanes(reviewed, latest)]
         context["fixed_because"] = reviewed.open(latest).fixed_because
-        context["editable"] = context["fixed_because"] is None and who.may(Action.REVIEW)
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "timeline.html", "patients", **context)
+        context["editable"] = context["fixed_because"] is None and user.may(Action.REVIEW)
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "timeline.html", "patients", **context)
 
 
 @router.get("/sessions/{sid}/timeline/numbers")
@@ -59,7 +59,7 @@ def show_numbers(
     reviewed: Reviewed,
     trail: OpenTrail,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """Part of the timeline page updated after an edit; redirects to the page if requested directly."""
     if FRAGMENT not in request.headers:
@@ -68,20 +68,20 @@ def show_numbers(
         context = read_measured_context(c, sid)
         latest = analyses.get_shown(c, sid)
         edits = edit_log.edits_of(c, latest.id)
-    trail.record_watched(who, "numbers.opened", "session", sid)
+    trail.record_watched(user, "numbers.opened", "session", sid)
     numbers = view_numbers(read_model(reviewed, latest, edits, context))
     return render(request, "_numbers.html", {"numbers": numbers})
 
 
 def read_model(
     reviewed: ReviewedAnalyses,
-    found: analyses.AnalysisRecord,
+    record: analyses.AnalysisRecord,
     edits: edit_log.EditHistory,
     context: Mapping[str, Any],
 ) -> ReportModel:
     """Report of an analysis without comparison to other visits."""
     patient, session = context["patient"], context["session"]
-    return reports.read(reviewed, found, edits, patient, session, None, context["controls"])[1]
+    return reports.read(reviewed, record, edits, patient, session, None, context["controls"])[1]
 
 
 def view_numbers(model: ReportModel) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def show_trends(
     db: Db,
     reviewed: Reviewed,
     pid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
     show: Shown,
     protocol: Protocol | None = None,
     like: Annotated[str | None, Query(pattern=HEX_ID)] = None,
@@ -76,15 +76,15 @@ def show_trends(
         patient = patients.get(c, pid)
         done, plans = histories.read(c, patient)
     history = histories.read_history(reviewed, patient, done, plans, protocol, like)
-    record_opening(request, who, "patient", pid)
+    record_opening(request, user, "patient", pid)
     view = view_trends(history, show)
     performance = histories.read_performance(reviewed, done)
     if performance:
         walks = [a for a in done if a.session.protocol != "activity"]
         walked = histories.read_history(reviewed, patient, walks, plans) if walks else None
-        shown = history if history.condition and history.condition.protocol != "activity" else walked
-        view["daily"] = view_daily_trend(shown, performance)
-    return render_page(request, db, who, "trends.html", "patients", patient=patient, trends=view)
+        displayed = history if history.condition and history.condition.protocol != "activity" else walked
+        view["daily"] = view_daily_trend(displayed, performance)
+    return render_page(request, db, user, "trends.html", "patients", patient=patient, trends=view)
 
 
 def list_ahead(history: PatientHistory) -> list[PlannedAssessment]:
@@ -121,7 +121,7 @@ def view_daily_trend(walked: PatientHistory | None, performance: Sequence[Perfor
         {
             "day": d.day,
             "href": f"/sessions/{d.session_id}",
-            "where": "home" if d.counted else "home, worn too short",
+            "where": "home" if d.counted else "home, wear time too short",
             "speed": None,
             "steps": str(d.steps),
             "cadence": None if d.cadence_spm is None else format_number(d.cadence_spm, 0),
@@ -145,29 +145,29 @@ def draw_figures(history: PatientHistory, trained: str | None) -> dict[str, Any]
     ----------
     trained : parameter of the prescription in force, None = none.
     """
-    there = set(names_in(history.visits))
-    names = [n for n in dict.fromkeys((trained, *FIGURES)) if n in there][:FIGURES_SHOWN]
+    available = set(names_in(history.visits))
+    names = [n for n in dict.fromkeys((trained, *FIGURES)) if n in available][:FIGURES_SHOWN]
     affected = history.patient.affected_side
-    found = follow_figures(history.visits, names, history.norms, history.usual, affected)
-    if not found:
+    trends = follow_figures(history.visits, names, history.norms, history.usual, affected)
+    if not trends:
         return None
     coming = list_ahead(history)
     figures = []
-    for t in found:
+    for t in trends:
         line = _pick_side(t, affected)
         last = line.points[-1 if line.latest is None else line.latest]
         drawn = _figure(t, line, history.visits, coming, FIGURE_HEIGHT, small=True)
         figures.append({**drawn, "value": format_number(last.value, t.term.digits)})
-    kept = [(t, line) for t in found for line in (_pick_side(t, affected),)]
+    selected = [(t, line) for t in trends for line in (_pick_side(t, affected),)]
     return {
         "figures": figures,
         "condition": None if history.condition is None else history.condition.words,
         "others": len(history.others),
-        "has_mdc": any(line.mdc is not None for _, line in kept),
+        "has_mdc": any(line.mdc is not None for _, line in selected),
         "has_mcid": False,
-        "has_estimated": any(p.estimated for _, line in kept for p in line.points),
+        "has_estimated": any(p.estimated for _, line in selected for p in line.points),
         "has_training": any(v.kind == "training" for v in history.visits),
-        "norms": any(t.norm is not None for t in found),
+        "norms": any(t.norm is not None for t in trends),
     }
 
 
@@ -187,38 +187,40 @@ def view_trends(history: PatientHistory, chosen: Sequence[str], height: int = 19
     ----------
     height : of a chart in px.
     """
-    there = names_in(history.visits)
-    names = [n for n in there if n in chosen] or [n for n in PRIMARY if n in there]
-    names = names or list(there[: len(PRIMARY)])
-    found = follow_figures(history.visits, names, history.norms, history.usual, history.patient.affected_side)
+    available = names_in(history.visits)
+    names = [n for n in available if n in chosen] or [n for n in PRIMARY if n in available]
+    names = names or list(available[: len(PRIMARY)])
+    trends = follow_figures(
+        history.visits, names, history.norms, history.usual, history.patient.affected_side
+    )
     groups: dict[str, list[dict[str, Any]]] = {}
-    for name in there:
+    for name in available:
         term = find_term(name)
         groups.setdefault(term.group, []).append(
             {"name": name, "title": term.label, "unit": term.unit, "on": name in names}
         )
     return {
-        **_shown(history, found, height),
+        **_shown(history, trends, height),
         "groups": list(groups.items()),
         "query": "&".join(f"show={name}" for name in names),
         "condition": None if history.condition is None else history.condition.words,
         "like": history.visits[-1].session_id if history.visits else None,
         "others": [(o.session_id, o.condition.words, o.count) for o in history.others],
         "visits": [_column(v) for v in history.visits],
-        "rows": [row for trend in found for row in _rows(trend, history.visits)],
+        "rows": [row for trend in trends for row in _rows(trend, history.visits)],
     }
 
 
-def _shown(history: PatientHistory, found: Sequence[Trend], height: int) -> dict[str, Any]:
+def _shown(history: PatientHistory, trends: Sequence[Trend], height: int) -> dict[str, Any]:
     coming = list_ahead(history)
-    lines = [(t, line) for t in found for line in t.lines]
+    lines = [(t, line) for t in trends for line in t.lines]
     sources: dict[str, list[str]] = {}
     for t, line in lines:
         change = line.change
         for sentence in () if change is None else change_words(change).limits:
             sources.setdefault(sentence, []).append(t.term.label)
     norms: dict[str, list[str]] = {}
-    for t in found:
+    for t in trends:
         if t.norm is not None:
             norms.setdefault(f"{GROUPS.get(t.norm.group, t.norm.group)} ({t.norm.source})", []).append(
                 t.term.label

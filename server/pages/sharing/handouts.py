@@ -40,12 +40,12 @@ CHART_HEIGHT: Final = 108
 
 @router.get("/sessions/{sid}/leaflet")
 def show_leaflet(
-    request: Request, db: Db, reviewed: Reviewed, trail: OpenTrail, sid: Id, who: Reader
+    request: Request, db: Db, reviewed: Reviewed, trail: OpenTrail, sid: Id, user: Reader
 ) -> Response:
     """Leaflet for the patient in plain language and large print."""
     context = gather_leaflet(db, reviewed, sid)
-    trail.record_opened(who, "leaflet.opened", "session", sid)
-    return render_sheets(request, who, LEAFLET, **context)
+    trail.record_opened(user, "leaflet.opened", "session", sid)
+    return render_sheets(request, user, LEAFLET, **context)
 
 
 @router.get("/sessions/{sid}/leaflet.pdf")
@@ -56,22 +56,22 @@ def make_leaflet(
     trail: OpenTrail,
     settings: Config,
     sid: Id,
-    who: Reader,
+    user: Reader,
 ) -> Response:
     """The leaflet as PDF."""
     context = gather_leaflet(db, reviewed, sid)
-    trail.record_opened(who, "leaflet.opened", "session", sid)
+    trail.record_opened(user, "leaflet.opened", "session", sid)
     return print_pdf(request, settings, LEAFLET, context, f"leaflet-{sid[:8]}.pdf")
 
 
 @router.get("/patients/{pid}/course")
 def show_course(
-    request: Request, db: Db, reviewed: Reviewed, trail: OpenTrail, pid: Id, who: Reader
+    request: Request, db: Db, reviewed: Reviewed, trail: OpenTrail, pid: Id, user: Reader
 ) -> Response:
     """Report over all visits: main parameters with measurement errors, conditions, dates."""
     context = gather_course(db, reviewed, pid)
-    trail.record_opened(who, "course.opened", "patient", pid)
-    return render_sheets(request, who, COURSE, **context)
+    trail.record_opened(user, "course.opened", "patient", pid)
+    return render_sheets(request, user, COURSE, **context)
 
 
 @router.get("/patients/{pid}/course.pdf")
@@ -82,11 +82,11 @@ def make_course(
     trail: OpenTrail,
     settings: Config,
     pid: Id,
-    who: Reader,
+    user: Reader,
 ) -> Response:
     """The report over all visits as PDF."""
     context = gather_course(db, reviewed, pid)
-    trail.record_opened(who, "course.opened", "patient", pid)
+    trail.record_opened(user, "course.opened", "patient", pid)
     return print_pdf(request, settings, COURSE, context, f"course-{pid[:8]}.pdf")
 
 
@@ -97,17 +97,17 @@ def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[s
         done = histories.list_analysed(c, patient.id)
         this = next((a for a in done if a.session.id == sid), None)
         if this is None or this.session.protocol not in sessions.WALKS:
-            raise Conflict("no_walk", "This session has no analysed walk, so there is no leaflet of it.")
-        before = comparisons.find_previous(c, this.session, done)
+            raise Conflict("no_walk", "This visit has no analysed walk, so there is no leaflet.")
+        previous = comparisons.find_previous(c, this.session, done)
         written = prescriptions.of_patient(c, patient.id)
     new = reviewed.read_numbers(this.found, this.edits)
-    old = None if before is None else reviewed.read_numbers(before.found, before.edits)
+    old = None if previous is None else reviewed.read_numbers(previous.found, previous.edits)
     if old is not None and not _is_usable(old):
-        old = before = None
-    if before is None or old is None:
+        old = previous = None
+    if previous is None or old is None:
         changes: tuple[Change, ...] = ()
     else:
-        norms = comparisons.pair_norms(patient, (before.session, old), (this.session, new))
+        norms = comparisons.pair_norms(patient, (previous.session, old), (this.session, new))
         changes = compare_figures(old, new, norms, patient.affected_side)
     trained = next((w.content for w in written if w.ended_at is None), None)
     return {
@@ -116,7 +116,7 @@ def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[s
         "back": f"/sessions/{sid}/report",
         "pdf": f"/sessions/{sid}/leaflet.pdf",
         "figures": list_figures(new.parameters, changes, patient.affected_side) if _is_usable(new) else (),
-        "before": None if before is None else before.session.performed_on,
+        "before": None if previous is None else previous.session.performed_on,
         "practise": None if trained is None else CATALOGUE[trained.parameter].everyday,
         "practise_side": None if trained is None else side_words(trained.side),
         "made_by": f"Sagittal {this.found.code_version} · {day(this.found.created_at)}",
@@ -135,7 +135,9 @@ def gather_course(db: Database, reviewed: ReviewedAnalyses, pid: str) -> dict[st
         done, plans = histories.read(c, patient)
     walks = [a for a in done if a.session.protocol != "activity"]
     if not walks:
-        raise Conflict("no_visit", "No visit of this patient is analysed, so there is no report over visits.")
+        raise Conflict(
+            "no_visit", "No visit of this patient has been analysed, so there is no report over visits."
+        )
     history = histories.read_history(reviewed, patient, walks, plans)
     titles = {a.session.id: a.session.title for a in walks}
     conditions = {a.session.id: a.condition.words for a in walks}

@@ -14,13 +14,13 @@ from markupsafe import Markup
 from starlette.requests import Request
 from starlette.responses import Response
 
+from sagittal.core.user_text import UserText
 from sagittal.server.http.headers import allow_camera, lock_document
 from sagittal.server.http.templates import TEMPLATES, language_of
 from sagittal.server.pages.assets import STATIC
 from sagittal.server.pages.words import PROTOCOL_NAMES
 from sagittal.server.settings import Settings
 from sagittal.server.sharing import pdfs
-from sagittal.web.user_text import UserText
 
 SHEETS: Final = ("base", "pages", "visits", "daily", "paper")
 """Style sheets of paper, in their order."""
@@ -61,8 +61,8 @@ def show_document(content: bytes, *, is_shared: bool = False) -> Response:
     ----------
     is_shared : for a reader without an account; sends no referrer to linked pages.
     """
-    found = _STYLE.search(content.decode())
-    digest = hashlib.sha256((found[1] if found else "").encode()).digest()
+    match = _STYLE.search(content.decode())
+    digest = hashlib.sha256((match[1] if match else "").encode()).digest()
     headers = {
         "Content-Security-Policy": lock_document(base64.b64encode(digest).decode()),
         "Permissions-Policy": allow_camera("()"),

@@ -14,6 +14,7 @@ from sagittal.core.events.result import Stride, Strides
 from sagittal.core.frames import SIDES, Floats, Side
 from sagittal.core.plurals import plural
 from sagittal.core.signals.rest import find_runs
+from sagittal.core.user_text import quote
 from sagittal.server.report.charts.panels import CurvePanel, SideCurve
 from sagittal.server.report.charts.svg import (
     KEY,
@@ -25,7 +26,6 @@ from sagittal.server.report.charts.svg import (
     stretch,
 )
 from sagittal.server.report.words.wording import explain_exclusion, format_number
-from sagittal.web.user_text import quote
 
 X_TICKS: Final = (0, 20, 40, 60, 80, 100)
 
@@ -98,10 +98,10 @@ def cycle_svg(
     plot.words(v.up, v.down)
     n = ", ".join(f"{side} mean of {c.n}" for side, c in panel.sides.items())
     last = [c.n for c in panel.sides.values()][-1:] or [0]
-    counted = plural(last[0], over.counted.removesuffix("s"), over.counted)
+    noun = plural(last[0], over.counted.removesuffix("s"), over.counted)
     return plot.draw(
         "chart cycle x-unit" if x_unit else "chart cycle",
-        f"{panel.title} over {over.over}: {n} {counted}",
+        f"{panel.title} over {over.over}: {n} {noun}",
         f' data-variable="{v.name}"',
     )
 
@@ -137,7 +137,7 @@ def strip_svg(strides: Strides, duration_s: float, height: int = 92) -> str:
     )
     return (
         f'<div class="chart strip"><svg width="100%" height="{plot_height}" overflow="visible" role="img">'
-        "<title>Strides of this take over time; a cross marks a stride left out</title>"
+        "<title>Strides of this trial over time; a cross marks an excluded stride</title>"
         f'{stretch(marks)}<line class="cursor now" x1="0" x2="0" y1="0" y2="100%"/>'
         f"{letters}{make_time_labels(duration_s, plot_height, 15)}</svg></div>"
     )
@@ -147,15 +147,15 @@ def _stride_mark(s: Stride, duration_s: float) -> str:
     k, top, out = KEY[s.side], 40 if s.side == "left" else 540, s.excluded_reason is not None
     start, end = round(1000 * s.start_s / duration_s), round(1000 * s.end_s / duration_s)
     off = end if s.tc_s is None else round(1000 * s.tc_s / duration_s)
-    said, cross = "", ""
+    title_element, cross = "", ""
     if s.excluded_reason is not None:
-        title = f"{s.side} stride, {s.start_s:.2f} to {s.end_s:.2f} s, left out: "
-        said = f"<title>{escape(title + quote(explain_exclusion(s.excluded_reason)))}</title>"
-        across = end - start
-        cross = f'<path class="xx" d="M{start} {top + 60}l{across} 300M{start} {top + 360}l{across}-300"/>'
+        title = f"{s.side} stride, {s.start_s:.2f} to {s.end_s:.2f} s, excluded: "
+        title_element = f"<title>{escape(title + quote(explain_exclusion(s.excluded_reason)))}</title>"
+        width = end - start
+        cross = f'<path class="xx" d="M{start} {top + 60}l{width} 300M{start} {top + 360}l{width}-300"/>'
     faded = " x" if out else ""
     return (
-        f"<g>{said}"
+        f"<g>{title_element}"
         f'<path class="st{k}{faded}" d="M{start} {top}H{off}v420H{start}"/>'
         f'<path class="sw{k}{faded}" d="M{off} {top}H{end}v420H{off}"/>'
         f"{cross}</g>"
@@ -191,13 +191,13 @@ class _CyclePlot(PlotArea):
         self.add(f'<path class="{css}" d="{self._path(angle[::step], step)}"/>')
 
     def foot_offs(self, sides: Mapping[Side, SideCurve]) -> None:
-        found = {s: c.foot_off_pct for s, c in sides.items() if c.foot_off_pct is not None}
+        pct_by_side = {s: c.foot_off_pct for s, c in sides.items() if c.foot_off_pct is not None}
         # labels stand on their lines, the earlier one to the left; close ones make room for each other
-        earlier = min(found, key=lambda side: found[side], default=None)
-        close = len(found) == 2 and max(found.values()) - min(found.values()) < _CLOSE_PCT
-        for side, x in found.items():
+        earlier = min(pct_by_side, key=lambda side: pct_by_side[side], default=None)
+        close = len(pct_by_side) == 2 and max(pct_by_side.values()) - min(pct_by_side.values()) < _CLOSE_PCT
+        for side, x in pct_by_side.items():
             self.add_upright(f"fo{KEY[side]}", 10 * x)
-            anchor, out = ("end", -1) if side == earlier and len(found) == 2 else ("start", 1)
+            anchor, out = ("end", -1) if side == earlier and len(pct_by_side) == 2 else ("start", 1)
             label = f"{side[0].upper()}\u2009{x:.0f}"
             self.add_text(
                 f"{format_coordinate(x)}%", -5, label, f"t{KEY[side]}", anchor, dx=out * (3 if close else -4)
@@ -226,12 +226,12 @@ class _CyclePlot(PlotArea):
 
     def _path(self, angle: Floats, step: int) -> str:
         """Path of a curve in % of the plot, interrupted where it has no value."""
-        known = find_runs(np.isfinite(angle))
-        return "".join(self._run(angle[a:b], step, a) for a, b in known)
+        runs = find_runs(np.isfinite(angle))
+        return "".join(self._run(angle[a:b], step, a) for a, b in runs)
 
     def _run(self, angle: Floats, step: int, first: int) -> str:
         """One continuous part of a curve: its first point, then relative moves."""
         y = self._heights(angle)
-        across = 10 * step
-        moves = " ".join([f"{across}{b - a:+d}" for a, b in pairwise(y)])
+        step_x = 10 * step
+        moves = " ".join([f"{step_x}{b - a:+d}" for a, b in pairwise(y)])
         return f"M{10 * step * first} {y[0]}" + (f"l{moves}" if moves else "")

@@ -47,8 +47,8 @@ def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str
             left, width = x(i - 0.5), x(j + 0.5) - x(i - 0.5)
             plot.add_column("fb-block", left, width)
             if width >= NARROW:
-                at = f"{format_coordinate((left + width / 2) / 10)}%"
-                plot.add_text(at, plot.height + 14, word, "words", "middle")
+                x_text = f"{format_coordinate((left + width / 2) / 10)}%"
+                plot.add_text(x_text, plot.height + 14, word, "words", "middle")
     for i, j, m in _runs(strides, lambda m: (m.cue.zone_low, m.cue.zone_high)):
         plot.add_band("band", m.cue.zone_low, m.cue.zone_high, x(i - 0.5), x(j + 0.5) - x(i - 0.5))
     ticks, digits = find_round_ticks(low, high)
@@ -62,9 +62,9 @@ def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str
         plot.add_dot(x(i), min(max(m.value, low), high), css, 2.6)
     for i, j, m in _runs(strides, lambda m: (_opens(m), m.cue.level)):
         if not _opens(m) and x(j + 0.5) - x(i - 0.5) >= NARROW:
-            at = f"{format_coordinate(x(i - 0.5) / 10)}%"
-            plot.add_text(at, plot.height + 28, f"level {m.cue.level}", "words", "start")
-    title = f"{term.label} of every stride over the zone of its level; the table has the numbers"
+            x_text = f"{format_coordinate(x(i - 0.5) / 10)}%"
+            plot.add_text(x_text, plot.height + 28, f"level {m.cue.level}", "words", "start")
+    title = f"{term.label} of every stride against the target zone of its level; values in the table"
     return plot.draw("chart fb-plot", title)
 
 
@@ -75,10 +75,10 @@ def _opens(m: MatchedStride) -> bool:
 
 def _block(m: MatchedStride) -> str:
     """Name of a block without feedback, "" in training."""
-    why = m.cue.why_not
-    if why == "baseline":
+    reason = m.cue.why_not
+    if reason == "baseline":
         return "before"
-    return why if why in {"probe", "retention"} else ""
+    return reason if reason in {"probe", "retention"} else ""
 
 
 def _runs(
@@ -87,9 +87,9 @@ def _runs(
     """First and last index of consecutive strides with the same key, and the first stride."""
     start = 0
     for _, group in groupby(strides, key):
-        found = list(group)
-        yield start, start + len(found) - 1, found[0]
-        start += len(found)
+        members = list(group)
+        yield start, start + len(members) - 1, members[0]
+        start += len(members)
 
 
 def _range(strides: Sequence[MatchedStride], content: Prescription) -> tuple[float, float]:

@@ -23,15 +23,16 @@ from sagittal.server.report.words.estimator import list_estimated_variables
 from sagittal.server.report.words.wording import VARIABLES, ZERO_WORDS, Variable, reason_words
 
 NO_BAND: Final[Mapping[Zero, str]] = {
-    "standing": "No norm band: these curves start from this person's standing, the norm from the anatomical "
-    "zero. Enter goniometer angles of standing to compare.",
-    "walking": "No norm band: no usable standing, so these curves start from their own mean in walking.",
-    "stride_mean": "No norm band: measured from its own mean over the stride, the norm is not.",
-    "anatomical": "No norm band: the norm is measured from standing.",
+    "standing": "No norm band: these curves are relative to this person's standing, the norm to the "
+    "anatomical zero. Enter goniometer angles in standing to compare.",
+    "walking": "No norm band: no usable quiet standing, so these curves are relative to their own mean in "
+    "walking.",
+    "stride_mean": "No norm band: measured relative to its own mean over the stride, unlike the norm.",
+    "anatomical": "No norm band: the norm is relative to standing.",
 }
 """Zero of a curve → why none of the known bands may stand behind it."""
 
-FEW_BAND: Final = f"No norm band: fewer than {COMPARED} strides of a side are compared with nothing."
+FEW_BAND: Final = f"No norm band: at least {COMPARED} strides per side are needed for a comparison."
 """The same where no side has enough strides."""
 
 DRAWN_STRIDES: Final = 40
@@ -103,28 +104,28 @@ def curve_panels(
     estimated = list_estimated_variables(bundle.estimator)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
     level = set(anatomical_variables(standing)).difference(estimated)
-    known = () if own is None else (own.bands,)
-    found = []
+    band_sets = () if own is None else (own.bands,)
+    panels = []
     for v in VARIABLES:
-        bands = [b for by_name in (norms.bands, *known) if (b := by_name.get(v.name)) is not None]
+        bands = [b for by_name in (norms.bands, *band_sets) if (b := by_name.get(v.name)) is not None]
         added = {s: standing_offset_deg(v.name, s, standing) for s in SIDES} if v.name in level else {}
         panel = _panel(v, curves, added, bands, sure=v.name not in estimated)
         if panel.norm is not None and panel.norm is norms.bands.get(v.name):
             panel = replace(panel, comfortable=norms.comfortable_bands.get(v.name))
-        found.append(panel)
-    return tuple(found)
+        panels.append(panel)
+    return tuple(panels)
 
 
-def same_zero(before: CurvePanel, after: CurvePanel) -> tuple[CurvePanel, CurvePanel]:
+def same_zero(earlier: CurvePanel, later: CurvePanel) -> tuple[CurvePanel, CurvePanel]:
     """Convert two panels of a variable to a common zero: relative to standing unless both are anatomical. The
     earlier one loses its curves if only one trial includes quiet standing.
     """
-    if before.zero == after.zero or None in (before.zero, after.zero):
-        return before, after
-    if "walking" in (before.zero, after.zero):
+    if earlier.zero == later.zero or None in (earlier.zero, later.zero):
+        return earlier, later
+    if "walking" in (earlier.zero, later.zero):
         # a curve without a level is not drawn over one that has one
-        return replace(before, sides={}, reason=reason_words("no_standing")), after
-    return _from_standing(before), _from_standing(after)
+        return replace(earlier, sides={}, reason=reason_words("no_standing")), later
+    return _from_standing(earlier), _from_standing(later)
 
 
 def _from_standing(panel: CurvePanel) -> CurvePanel:
@@ -192,8 +193,8 @@ def _moved(curve: SideCurve, by_deg: float) -> SideCurve:
 def _why_missing(variable: Variable, curves: CycleCurves | None) -> str:
     if curves is None:
         return reason_words("not_reached")
-    why = next(iter(curves.why.get(variable.name, {}).values()), None)
-    return reason_words(why or ("no_strides" if variable.name in curves.curves else "joint_missing"))
+    reason = next(iter(curves.why.get(variable.name, {}).values()), None)
+    return reason_words(reason or ("no_strides" if variable.name in curves.curves else "joint_missing"))
 
 
 def _side(curves: CycleCurves, name: str, side: Side) -> SideCurve:
@@ -202,14 +203,14 @@ def _side(curves: CycleCurves, name: str, side: Side) -> SideCurve:
     strides: dict[int, Floats] = {}
     off = np.empty(0)
     if rows is not None and mean.n:
-        counted = np.flatnonzero(curves.used[side] & np.isfinite(rows).all(axis=1))
-        off = curves.foot_off_pct[side][counted]
+        included = np.flatnonzero(curves.used[side] & np.isfinite(rows).all(axis=1))
+        off = curves.foot_off_pct[side][included]
         off = off[np.isfinite(off)]
-        if len(counted) > DRAWN_STRIDES:
-            counted = counted[np.linspace(0, len(counted) - 1, DRAWN_STRIDES).round().astype(np.int64)]
-        drawn, index = rows[counted], curves.stride_index[side]
-        shown = np.where(rest_at_bound(curves, name, side, drawn), np.nan, np.degrees(drawn))
-        strides = {index[i]: row for i, row in zip(counted, shown, strict=True)}
+        if len(included) > DRAWN_STRIDES:
+            included = included[np.linspace(0, len(included) - 1, DRAWN_STRIDES).round().astype(np.int64)]
+        drawn, index = rows[included], curves.stride_index[side]
+        values = np.where(rest_at_bound(curves, name, side, drawn), np.nan, np.degrees(drawn))
+        strides = {index[i]: row for i, row in zip(included, values, strict=True)}
     foot_off, foot_off_sd = mean_and_sd(off) if len(off) else (None, None)
     return SideCurve(
         mean_deg=None if mean.mean is None else np.degrees(mean.mean),

@@ -42,15 +42,15 @@ def place_words(figure: Element, width: float, height: float, left: float) -> No
         p for part in figure.iter(f"{SVG}path") if _is_of(part, CURVES) for p in _sample(part.get("d", ""))
     ]
     uprights = [float(e.get("x1", "0")) for e in figure.iter(f"{SVG}line") if _is_of(e, UPRIGHTS)]
-    others = [_box_of(t) for t in figure.iter(f"{SVG}text") if _is_of(t, {"tl", "tr"})]
+    label_boxes = [_box_of(t) for t in figure.iter(f"{SVG}text") if _is_of(t, {"tl", "tr"})]
     for word in figure.iter(f"{SVG}text"):
         if not _is_of(word, {"words"}) or word.get("text-anchor") != "start":
             continue
         first = _box_of(word)
         is_upper = first[3] < height / 2
         best = _find_place(first, width, OUTWARDS_PX[is_upper], curves, uprights)
-        above = (-left, ABOVE_PLOT - ABOVE_PX, first[2] - first[0] - left, ABOVE_PLOT + BELOW_PX)
-        if is_upper and best.touched and not any(_overlap(above, other) for other in others):
+        box_above = (-left, ABOVE_PLOT - ABOVE_PX, first[2] - first[0] - left, ABOVE_PLOT + BELOW_PX)
+        if is_upper and best.touched and not any(_overlap(box_above, label_box) for label_box in label_boxes):
             best = _Place(0, -left, ABOVE_PLOT)
         word.set("x", f"{best.x:g}")
         word.set("y", f"{best.base:g}")
@@ -112,11 +112,11 @@ def _box_of(text: Element) -> Box:
 def _sample(path: str) -> Iterator[tuple[float, float]]:
     """Points about one px apart on a path of M, L and l, as written by `paper_charts.stretch_path`."""
     command, x, y = "M", 0.0, 0.0
-    for letter, across, down in _STEP.findall(path):
+    for letter, dx, down in _STEP.findall(path):
         if letter:
             command = letter
             continue
-        ends = (x + float(across), y + float(down)) if command == "l" else (float(across), float(down))
+        ends = (x + float(dx), y + float(down)) if command == "l" else (float(dx), float(down))
         steps = 1 if command == "M" else max(1, round(max(abs(ends[0] - x), abs(ends[1] - y))))
         for k in range(1, steps + 1):
             yield x + (ends[0] - x) * k / steps, y + (ends[1] - y) * k / steps

@@ -98,10 +98,10 @@ def draw_bar(
         )
     if middle is not None:
         parts.append(f'<line class="nm" x1="{f(x(middle))}" x2="{f(x(middle))}" y1="5" y2="21"/>')
-    shown = {str(name): value for name, value in marks.items()}
+    values = {str(name): value for name, value in marks.items()}
     for mark, css, radius in BAR_MARKS:
-        if mark in shown:
-            parts.append(f'<circle class="{css}" cx="{f(x(shown[mark]))}" cy="13" r="{radius}"/>')
+        if mark in values:
+            parts.append(f'<circle class="{css}" cx="{f(x(values[mark]))}" cy="13" r="{radius}"/>')
     return (
         f'<svg class="chart range" width="{width}" height="26" viewBox="0 0 {width} 26" aria-hidden="true">'
         f"{''.join(parts)}</svg>"
@@ -141,8 +141,8 @@ class PlotArea:
 
     def add_upright(self, css: str, x: float) -> None:
         """Add a vertical line at 0 to 1000 of the width."""
-        at = format_coordinate(x)
-        self.add(f'<line class="{css}" x1="{at}" x2="{at}" y1="0" y2="1000"/>')
+        position = format_coordinate(x)
+        self.add(f'<line class="{css}" x1="{position}" x2="{position}" y1="0" y2="1000"/>')
 
     def add_band(self, css: str, low: float, high: float, x: float = 0.0, width: float = 1000.0) -> None:
         """Add a band between two values, over all or part of the width."""

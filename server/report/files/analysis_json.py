@@ -66,14 +66,14 @@ def _functional(analysis: TakeAnalysis) -> dict[str, object] | None:
 
 def _quality(analysis: TakeAnalysis) -> dict[str, object]:
     """The quality report; `level` is the worse of signals and estimator, `signals_level` the former."""
-    found = reduce_to_plain(analysis.quality.to_json())
-    assert isinstance(found, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
+    report = reduce_to_plain(analysis.quality.to_json())
+    assert isinstance(report, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
     verdict = None if analysis.poses is None else find_worst_verdict(analysis.poses.health)
     level = find_shown_level(analysis.quality.level, verdict)
     bad = [] if analysis.poses is None else [f.name for f in analysis.poses.health if f.verdict == "bad"]
-    judged = PATH_JUDGED if concern_paths_alone(bad) else JUDGED.get(verdict)
-    reasons = [*analysis.quality.reasons, *([] if judged is None else [judged])]
-    return {**found, "level": level, "signals_level": analysis.quality.level, "reasons": reasons}
+    judgement = PATH_JUDGED if concern_paths_alone(bad) else JUDGED.get(verdict)
+    reasons = [*analysis.quality.reasons, *([] if judgement is None else [judgement])]
+    return {**report, "level": level, "signals_level": analysis.quality.level, "reasons": reasons}
 
 
 def _devices(analysis: TakeAnalysis) -> list[dict[str, object]]:
@@ -139,22 +139,24 @@ def _summarise_curves(analysis: TakeAnalysis) -> dict[str, object]:
     unsure = list_estimated_variables(_estimator(analysis))
     scored, means = CurveMeans(angles.standing_deg), dict[Side, dict[str, object]]()
 
-    def read(known: CycleCurves, variable: str, side: Side, rows: Floats) -> None:
-        curve = replace(known, curves={variable: {side: rows}})
+    def read(cycles: CycleCurves, variable: str, side: Side, rows: Floats) -> None:
+        curve = replace(cycles, curves={variable: {side: rows}})
         scored.add(curve)
-        for of, own in mean_curves(curve, unsure).items():
-            means.setdefault(of, {}).update({v: reduce_to_plain(np.round(c, 5)) for v, c in own.items()})
+        for curve_side, own in mean_curves(curve, unsure).items():
+            means.setdefault(curve_side, {}).update(
+                {v: reduce_to_plain(np.round(c, 5)) for v, c in own.items()}
+            )
 
-    known = read_cycles(angles, measured.strides, read)
-    found = score_curves(known, estimated=unsure, means=scored)
-    return {"scores": score_rows(found), "mean_curves": means}
+    cycles = read_cycles(angles, measured.strides, read)
+    scores = score_curves(cycles, estimated=unsure, means=scored)
+    return {"scores": score_rows(scores), "mean_curves": means}
 
 
-def score_rows(found: Scores) -> list[dict[str, object]]:
+def score_rows(score_set: Scores) -> list[dict[str, object]]:
     """Profiles and indices as JSON, without scores of single curves."""
     return [
         {name: reduce_to_plain(value) for name, value in vars(s).items() if name != "variable"}
-        for s in found.scores
+        for s in score_set.scores
         if s.variable is None
     ]
 
@@ -185,8 +187,8 @@ def _body(analysis: TakeAnalysis) -> dict[str, object] | None:
     if analysis.mounted is None:
         return None
     body, subject = analysis.mounted.body, analysis.recording.subject
-    said = {name: {"m": float(getattr(body, name)), "measured": name in body.measured} for name in LENGTHS}
-    return {"height_m": subject.height_m, "leg_m": subject.measures.leg_m, "lengths": said}
+    lengths = {name: {"m": float(getattr(body, name)), "measured": name in body.measured} for name in LENGTHS}
+    return {"height_m": subject.height_m, "leg_m": subject.measures.leg_m, "lengths": lengths}
 
 
 def _sensor_places(analysis: TakeAnalysis) -> object:

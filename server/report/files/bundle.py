@@ -35,8 +35,8 @@ EDIT_WORDS: Final[Mapping[EditKind, tuple[str, str]]] = {
     "move_event": ("event moved", "events moved"),
     "add_event": ("event added", "events added"),
     "delete_event": ("event deleted", "events deleted"),
-    "exclude_stride": ("stride left out", "strides left out"),
-    "include_stride": ("stride counted in spite of a rule", "strides counted in spite of a rule"),
+    "exclude_stride": ("stride excluded", "strides excluded"),
+    "include_stride": ("stride included despite a rule", "strides included despite a rule"),
 }
 """Kind of edit → words for one and for several."""
 
@@ -118,26 +118,26 @@ def load_bundle(files: Mapping[str, bytes]) -> Bundle:
 
 def read_repetitions(data: bytes) -> tuple[StoredRepetition, ...]:
     """Squats of repetitions.csv in order of time."""
-    found = []
+    repetitions = []
     for row in csv.DictReader(io.StringIO(data.decode())):
         side, start, end = cast("Side", row.pop("side")), float(row.pop("start_s")), float(row.pop("end_s"))
         excluded = row.pop("excluded_reason") or None
         values = {name: float(x) for name, x in row.items() if name != "bottom_s" and x}
-        found.append(StoredRepetition(side, start, end, values, excluded))
-    return tuple(found)
+        repetitions.append(StoredRepetition(side, start, end, values, excluded))
+    return tuple(repetitions)
 
 
 def read_warnings(data: Mapping[str, Any]) -> tuple[Notice, ...]:
     """Notices of analysis.json about the trial, without those about unused files, shown on the upload
     page.
     """
-    return keep_told(Notice(**row) for row in data["warnings"])
+    return keep_told(Notice.from_json(row) for row in data["warnings"])
 
 
 def keep_told(notices: Iterable[Notice]) -> tuple[Notice, ...]:
     """Notices to be shown with an analysis, one for each fault."""
-    told = {*ABOUT_FILES, "duplicate_stream"}
-    return join_faults(tuple(n for n in notices if n.severity == "error" or n.code not in told))
+    hidden_codes = {*ABOUT_FILES, "duplicate_stream"}
+    return join_faults(tuple(n for n in notices if n.severity == "error" or n.code not in hidden_codes))
 
 
 FAILURE_CAUSES: Final = ("unequal_lengths", "channel_stuck", "gap")
@@ -171,8 +171,8 @@ def apply_review(bundle: Bundle, measured: MeasuredGait, edits: Sequence[Edit]) 
     done = Counter(EDIT_WORDS[e.kind] for e in edits)
     notice = Notice(
         "edited",
-        f"Changed by hand: {', '.join(f'{n} {words[n > 1]}' for words, n in done.items())}. The stored "
-        "analysis stays as it was; its files are those before the changes.",
+        f"Manual changes: {', '.join((f'{n} {words[n > 1]}' for words, n in done.items()))}. The stored "
+        "analysis is unchanged; its files are from before the changes.",
         severity="info",
     )
     warnings = [n for n in bundle.warnings if n.code not in NOTICES]
@@ -197,17 +197,17 @@ def is_functional(name: str) -> bool:
 def read_angles(data: bytes) -> JointAngles:
     """Joint angles of angles.parquet in rad; null becomes NaN."""
     table, meta = read_table(data)
-    found = {
+    angles_rad = {
         name.removesuffix("_deg"): np.radians(floats_of(table, name))
         for name in table.column_names
         if name != "t_s"
     }
-    headings = {name: found.pop(name) for name in tuple(found) if name.endswith("_heading")}
+    headings = {name: angles_rad.pop(name) for name in tuple(angles_rad) if name.endswith("_heading")}
     zero = {name: math.radians(offset) for name, offset in meta["zero_offset_deg"].items()}
     standing = dict(meta.get("standing_angles_deg", {}))
     return JointAngles(
         floats_of(table, "t_s"),
-        found,
+        angles_rad,
         zero,
         meta["angle_zero"],
         diagnostics={"estimated": tuple(meta.get("estimated", ()))},
@@ -279,8 +279,8 @@ def read_strides(data: bytes) -> Strides:
 def read_columns(data: bytes) -> dict[str, Column]:
     """Parameters of strides.csv by name, one value per stride."""
     rows = list(_rows(data))
-    known = {*STRIDE_COLUMNS, "flags", "excluded_reason"}
-    names = [name for name in (rows[0] if rows else ()) if name not in known]
+    columns_known = {*STRIDE_COLUMNS, "flags", "excluded_reason"}
+    names = [name for name in (rows[0] if rows else ()) if name not in columns_known]
     return {name: tuple(_number(row[name]) for row in rows) for name in names}
 
 

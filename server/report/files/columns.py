@@ -74,9 +74,9 @@ def list_turns(turns: Iterable[Turn]) -> list[dict[str, object]]:
 
 def repeat_words(words: Sequence[str], times: int) -> pa.Array[Any]:
     """A dictionary-encoded column with each word repeated a given number of times."""
-    known = list(dict.fromkeys(words))
-    places = np.repeat(np.array([known.index(word) for word in words], np.int16), times)
-    return pa.DictionaryArray.from_arrays(places, pa.array(known, pa.string()))
+    distinct = list(dict.fromkeys(words))
+    places = np.repeat(np.array([distinct.index(word) for word in words], np.int16), times)
+    return pa.DictionaryArray.from_arrays(places, pa.array(distinct, pa.string()))
 
 
 ParquetColumn: TypeAlias = "np.ndarray | pa.Array[Any] | Callable[[slice], np.ndarray]"
@@ -98,10 +98,10 @@ def parquet_file(
     ----------
     written : called after each row group.
     """
-    kept = {"sagittal": json.dumps(reduce_to_plain(meta))}
+    metadata = {"sagittal": json.dumps(reduce_to_plain(meta))}
     sink, writer = io.BytesIO(), None
     for first in range(0, max(1, len(t_s)), GROUP):
-        table = _lay_out(t_s, columns, slice(first, first + GROUP)).replace_schema_metadata(kept)
+        table = _lay_out(t_s, columns, slice(first, first + GROUP)).replace_schema_metadata(metadata)
         if writer is None:
             # neighbouring samples share their high bytes: splitting the bytes halves the file
             split = [f.name for f in table.schema if pa.types.is_floating(f.type)]
@@ -164,10 +164,10 @@ def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
     Text that a spreadsheet could interpret as a formula is prefixed with an apostrophe (OWASP, "CSV
     injection").
     """
-    text, rest = io.StringIO(), iter(rows)
+    text, remaining = io.StringIO(), iter(rows)
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
-    while some := list(islice(rest, LINES)):
+    while some := list(islice(remaining, LINES)):
         # column by column: most are numbers, which are rounded together
         columns = [_cells(column) for column in zip(*some, strict=True)]
         writer.writerows(zip(*columns, strict=True))

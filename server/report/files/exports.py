@@ -165,9 +165,9 @@ def repetitions_csv(squats: Sequence[SquatSide]) -> bytes:
     """All squats of both legs in order of time, with the measures of the included ones."""
     rows: list[tuple[object, ...]] = []
     for leg in squats:
-        counted = iter(zip(*(leg.values[name].tolist() for name in leg.values), strict=True))
+        included = iter(zip(*(leg.values[name].tolist() for name in leg.values), strict=True))
         for r in leg.repetitions:
-            measured = next(counted) if r.excluded is None else ("",) * len(MEASURES)
+            measured = next(included) if r.excluded is None else ("",) * len(MEASURES)
             rows.append((r.side, r.start_s, r.bottom_s, r.end_s, *measured, r.excluded or ""))
     rows.sort(key=lambda row: row[1:2])
     return write_csv(("side", "start_s", "bottom_s", "end_s", *MEASURES, "excluded_reason"), rows)
@@ -192,7 +192,7 @@ def strides_csv(strides: Strides, columns: Mapping[str, Column]) -> bytes:
         )
         for s in strides.strides
     )
-    why = ((" ".join(s.flags), s.excluded_reason) for s in strides.strides)
+    reasons = ((" ".join(s.flags), s.excluded_reason) for s in strides.strides)
     measured = zip(*columns.values(), strict=True) if columns else repeat(())
-    lines = ((*o, *m, *w) for o, m, w in zip(own, measured, why, strict=False))
+    lines = ((*o, *m, *w) for o, m, w in zip(own, measured, reasons, strict=False))
     return write_csv((*STRIDE_COLUMNS, *columns, "flags", "excluded_reason"), lines)

@@ -95,16 +95,16 @@ def _are_equal(a: Floats, b: Floats) -> bool:
 def read_tracks(data: bytes, events: GaitEvents, angles: JointAngles | None) -> Tracks:
     """Read tracks.parquet; detected events and angles come from their own files."""
     table, meta = read_table(data)
-    worn: list[Segment] = [s for s in SEGMENTS if f"{s}_valid" in table.column_names]
+    segments: list[Segment] = [s for s in SEGMENTS if f"{s}_valid" in table.column_names]
     trunk: list[Segment] = [s for s in SEGMENTS if f"{s}_acc_x" in table.column_names]
-    q = {s: _gathered(table, f"{s}_q", "wxyz") for s in worn}
+    q = {s: _gathered(table, f"{s}_q", "wxyz") for s in segments}
     rate = float(meta["rate_hz"])
     return Tracks(
         t_s=floats_of(table, "t_s"),
         rate_hz=rate,
         events=events,
         q=q,
-        valid={s: bools_of(table, f"{s}_valid") for s in worn},
+        valid={s: bools_of(table, f"{s}_valid") for s in segments},
         turning=bools_of(table, "turning") if "turning" in table.column_names else None,
         feet=_feet(table, meta["feet"], rate, q),
         angles=angles,

@@ -19,7 +19,7 @@ from sagittal.core.activity.result import ActivityResult
 from sagittal.core.parameters.result import Parameter
 from sagittal.server.report.charts.svg import PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.words.wording import format_number
-from sagittal.web.language import MONTHS
+from sagittal.web.message_format import MONTHS
 
 LONG_BOUT_S: Final = 60.0
 """Walks at home whose cadence is compared last at least so long: short ones turn and stop."""
@@ -78,20 +78,22 @@ def read_capacity(
     session_id: str, day: dt.date, title: str, parameters: Sequence[Parameter]
 ) -> CapacityVisit | None:
     """Speed and cadence of a clinic walk; None if neither was measured."""
-    by = {p.name: p.mean for p in parameters if p.side is None}
-    speed, cadence = by.get("gait_speed_mps"), by.get("cadence_spm")
+    means = {p.name: p.mean for p in parameters if p.side is None}
+    speed, cadence = means.get("gait_speed_mps"), means.get("cadence_spm")
     if speed is None and cadence is None:
         return None
     return CapacityVisit(session_id, day, title, speed, cadence)
 
 
-def read_performance(session_id: str, performed_on: dt.date, found: ActivityResult) -> list[PerformanceDay]:
+def read_performance(
+    session_id: str, performed_on: dt.date, activity: ActivityResult
+) -> list[PerformanceDay]:
     """Days of a daily-life recording with any wear time."""
     days = []
-    for i, d in enumerate(found.days):
+    for i, d in enumerate(activity.days):
         own = [
             b.cadence_spm
-            for b in found.bouts
+            for b in activity.bouts
             if d.start_s <= b.start_s < d.end_s and b.kind == "walking" and b.duration_s >= LONG_BOUT_S
         ]
         if d.worn_h > 0.0:
@@ -127,8 +129,8 @@ def draw_daily_trend(
     if clinic or home:
         plot = _TimePanel(span, _range([x for _, x in clinic] + [x for _, x, _ in home]))
         plot.add_line(clinic)
-        for day, value, counted in home:
-            plot.add_dot(plot.x(day), value, "ak-ring" if counted else "ak-ring part", 4.0)
+        for day, value, is_counted in home:
+            plot.add_dot(plot.x(day), value, "ak-ring" if is_counted else "ak-ring part", 4.0)
         panels.append(TrendPanel("Cadence: clinic and walks at home", "steps/min", plot.finish("Cadence")))
     return tuple(panels)
 
@@ -177,4 +179,4 @@ class _TimePanel(PlotArea):
             day = self._first + dt.timedelta(days=days)
             label = f"{day.day} {MONTHS[day.month - 1]}"
             self.add_text(f"{format_coordinate(self.x(day) / 10)}%", self.height, label, "", "middle", dy=15)
-        return self.draw("chart trend-plot", f"{title} over time; the table has the numbers")
+        return self.draw("chart trend-plot", f"{title} over time; values in the table")

@@ -80,25 +80,25 @@ def list_figures(
     ----------
     changes : since the previous visit, empty if not comparable.
     """
-    found = []
+    figures = []
     for figure in FIGURES:
         mine = {p.side: (p.mean, p) for p in parameters if p.name == figure.name and p.mean is not None}
         if not mine:
             continue
         side = affected if affected in mine else min(mine, key=lambda s: mine[s][0])
-        value, told = mine[side]
+        value, change_text = mine[side]
         change = next((c for c in changes if (c.name, c.side) == (figure.name, side)), None)
-        before = None if change is None or change.difference is None else change.before
-        found.append(
+        previous = None if change is None or change.difference is None else change.before
+        figures.append(
             LeafletFigure(
                 figure.title.format(side=side),
                 _say(figure, value),
-                None if before is None else _say(figure, before),
+                None if previous is None else _say(figure, previous),
                 _judge(figure, change),
-                told.estimated,
+                change_text.estimated,
             )
         )
-    return tuple(found)
+    return tuple(figures)
 
 
 def _say(figure: PlainFigure, value: float) -> str:
@@ -108,11 +108,11 @@ def _say(figure: PlainFigure, value: float) -> str:
 def _judge(figure: PlainFigure, change: Change | None) -> str:
     """Name a change only if it exceeds the measurement error."""
     if change is not None and change.reason == NOT_MEASURED_ALIKE:
-        return "It was measured in another way last time, so the two numbers are not compared."
+        return "It was measured differently last time, so the two values are not compared."
     if change is None or change.difference is None:
-        return "There is no earlier number to compare with."
+        return "There is no earlier value to compare with."
     if change.verdict in REAL:
         return f"This is {figure.up if change.difference > 0 else figure.down} than last time."
     if change.verdict is None:
-        return "Nobody can say yet whether this is a change."
+        return "It is not yet possible to say whether this is a change."
     return "This is about the same as last time."

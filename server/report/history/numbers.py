@@ -100,28 +100,28 @@ def read_numbers(content: bytes) -> Numbers | None:
         return None
     parameters = stored.mark()
     severities = {n.severity for n in keep_told(stored.warnings)}
-    judged = data_verdict(stored.quality, stored.estimator, severities, parameters)
+    verdict = data_verdict(stored.quality, stored.estimator, severities, parameters)
     contacts_s = (stored.walking or {}).get("contact_uncertainty_s")
-    return Numbers(parameters, tuple(_score(row) for row in stored.scores), judged, contacts_s)
+    return Numbers(parameters, tuple(_score(row) for row in stored.scores), verdict, contacts_s)
 
 
 def numbers_of(bundle: Bundle) -> Numbers:
     """Results of an analysis that was loaded with its curves."""
     unsure = list_estimated_variables(bundle.estimator)
     parameters = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
-    judged = data_verdict(
+    verdict = data_verdict(
         bundle.quality, bundle.estimator, {n.severity for n in bundle.warnings}, bundle.parameters
     )
     contacts_s = bundle.events.contact_uncertainty_s
     if bundle.angles is None:
-        return Numbers(parameters, (), judged, contacts_s)
+        return Numbers(parameters, (), verdict, contacts_s)
     curves = cycle_curves(bundle.angles, bundle.strides)
-    found = score_curves(curves, bundle.angles.standing_deg, estimated=unsure)
-    scores = tuple(s for s in found.scores if s.variable is None)
-    return Numbers(parameters, scores, judged, contacts_s)
+    curve_scores = score_curves(curves, bundle.angles.standing_deg, estimated=unsure)
+    scores = tuple(s for s in curve_scores.scores if s.variable is None)
+    return Numbers(parameters, scores, verdict, contacts_s)
 
 
 def _score(row: Mapping[str, Any]) -> Score:
     healthy = row["healthy"]
-    known = {**row, "healthy": None if healthy is None else ScoreSpread(**healthy)}
-    return Score(variable=None, **{**known, "missing": tuple(row["missing"])})
+    fields = {**row, "healthy": None if healthy is None else ScoreSpread(**healthy)}
+    return Score(variable=None, **{**fields, "missing": tuple(row["missing"])})

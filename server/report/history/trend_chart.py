@@ -15,7 +15,7 @@ from typing import Final
 from sagittal.server.report.charts.svg import KEY, PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.history.trends import AnalysedVisit, Trend, TrendSeries
 from sagittal.server.report.words.wording import format_number
-from sagittal.web.language import MONTHS
+from sagittal.web.message_format import MONTHS
 
 TOP, BOTTOM, LEFT, RIGHT = 22, 22, 44, 12
 """Margins in px, the padding of `<div class="chart trend-plot">`."""
@@ -96,7 +96,7 @@ def trend_svg(
     title = f"{trend.term.label}{'' if line.side is None else f', {line.side}'}"
     return plot.draw(
         "chart trend-plot small" if small else "chart trend-plot",
-        f"{title} over the visits; the table has the numbers",
+        f"{title} over the visits; values in the table",
     )
 
 
@@ -122,15 +122,15 @@ class _TrendPlot(PlotArea):
 
     def days(self) -> None:
         """Hairlines of planned visits, and labels below the axis: assessments first, then trainings."""
-        wanted = [(v.performed_on, v.label or _day(v.performed_on), "words") for v in self._visits
+        labels = [(v.performed_on, v.label or _day(v.performed_on), "words") for v in self._visits
                   if v.kind == "assessment"]  # fmt: skip
-        wanted += [(a.day, a.label, "") for a in self._ahead]
-        wanted.sort(key=lambda w: (w[0] != self._visits[0].performed_on, w[0]))
-        taken: list[float] = []
-        for day, label, css in wanted:
+        labels += [(a.day, a.label, "") for a in self._ahead]
+        labels.sort(key=lambda w: (w[0] != self._visits[0].performed_on, w[0]))
+        placed: list[float] = []
+        for day, label, css in labels:
             x = self._x(day)
-            if all(abs(x - other) * self._width / 1000 >= LABEL_PX for other in taken):
-                taken.append(x)
+            if all(abs(x - position) * self._width / 1000 >= LABEL_PX for position in placed):
+                placed.append(x)
                 self.add_text(_pct(x), self.height, label, css, "middle", dy=15)
         for planned in self._ahead:
             self.add_upright("ax", self._x(planned.day))

@@ -96,20 +96,20 @@ def trend_strip(visits: Sequence[AnalysedVisit], affected: Side | None = None) -
     if not chosen:
         return None
     hidden = max(0, len(visits) - MOST_COLUMNS)
-    shown = [0, *range(1 + hidden, len(visits))]
+    indices = [0, *range(1 + hidden, len(visits))]
     missing = {
         (visits[i].performed_on, _explain(visits[i], trend.name, line.side))
         for trend, line in chosen
-        for i in set(shown).difference(p.visit for p in line.points)
+        for i in set(indices).difference(p.visit for p in line.points)
     }
-    lines = tuple(_write_line(trend.term, line, visits, shown) for trend, line in chosen)
+    lines = tuple(_write_line(trend.term, line, visits, indices) for trend, line in chosen)
     later = dict.fromkeys((line.title, line.since) for line in lines if line.since is not None)
-    days = tuple(visits[i].performed_on for i in shown)
+    days = tuple(visits[i].performed_on for i in indices)
     return TrendStrip(days, hidden, lines, tuple(sorted(missing)), tuple(later))
 
 
 def _write_line(
-    term: Term, line: TrendSeries, visits: Sequence[AnalysedVisit], shown: Sequence[int]
+    term: Term, line: TrendSeries, visits: Sequence[AnalysedVisit], indices: Sequence[int]
 ) -> TrendStripLine:
     points = {p.visit: p for p in line.points}
     last = points.get(len(visits) - 1)
@@ -119,8 +119,8 @@ def _write_line(
         term.label,
         term.unit,
         line.side,
-        tuple(format_number(points[i].value, term.digits) if i in points else "–" for i in shown),
-        tuple(i in points and points[i].estimated for i in shown),
+        tuple(format_number(points[i].value, term.digits) if i in points else "–" for i in indices),
+        tuple(i in points and points[i].estimated for i in indices),
         _draw_line(line, visits),
         None if change is None else change_words(change),
         "" if change is None or change.limit is None else format_limit(change.limit, term),
@@ -134,15 +134,15 @@ def _explain_none(line: TrendSeries, visits: Sequence[AnalysedVisit]) -> str:
     if last.change is not None or last.visit != len(visits) - 1:
         return ""
     if line.base is None:
-        return "not compared: trainings only, no assessment"
+        return "not compared: only trainings, no assessment"
     if visits[-1].feedback:
         return "not compared: walked with feedback"
     return "first value to compare with"
 
 
 def _explain(visit: AnalysedVisit, name: str, side: Side | None) -> str:
-    there = (p for p in collect_figures(visit.numbers) if (p.name, p.side) == (name, side))
-    return reason_words(next((p.reason for p in there), None))
+    matching = (p for p in collect_figures(visit.numbers) if (p.name, p.side) == (name, side))
+    return reason_words(next((p.reason for p in matching), None))
 
 
 def _draw_line(line: TrendSeries, visits: Sequence[AnalysedVisit]) -> str:

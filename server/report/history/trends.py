@@ -125,9 +125,9 @@ class Trend:
 
 def names_in(visits: Sequence[AnalysedVisit]) -> tuple[str, ...]:
     """Parameters with a value at any visit, in table order."""
-    found = {p.name for visit in visits for p in collect_figures(visit.numbers) if p.mean is not None}
-    known = (*CATALOGUE, *SCORE_TERMS)
-    return (*(n for n in known if n in found), *sorted(found.difference(known)))
+    names = {p.name for visit in visits for p in collect_figures(visit.numbers) if p.mean is not None}
+    ordered = (*CATALOGUE, *SCORE_TERMS)
+    return (*(n for n in ordered if n in names), *sorted(names.difference(ordered)))
 
 
 def follow_figures(
@@ -148,25 +148,25 @@ def follow_figures(
     affected : side, None = none or both.
     """
     tables = [{(p.name, p.side): p for p in collect_figures(visit.numbers)} for visit in visits]
-    found = []
+    trends = []
     last = next((i for i in reversed(range(len(visits))) if not visits[i].feedback), len(visits) - 1)
     for name in names:
         norm = _norm(name, visits, norms[last] if norms else None, usual or {})
         lines = [_line(name, side, visits, tables, norms, affected) for side in (None, *SIDES)]
-        kept = tuple(line for line in lines if line is not None)
-        if kept:
-            found.append(Trend(name, find_term(name, _unit(name, tables)), kept, norm))
-    return tuple(found)
+        series = tuple(line for line in lines if line is not None)
+        if series:
+            trends.append(Trend(name, find_term(name, _unit(name, tables)), series, norm))
+    return tuple(trends)
 
 
 def collect_figures(numbers: Numbers) -> tuple[Parameter, ...]:
     """Parameters, and the scores of the two legs in the form of parameters."""
-    made = [
+    as_parameters = [
         Parameter(s.name, s.side, s.n, s.value, None, s.unit, s.reason)
         for s in numbers.scores
         if s.name in SCORE_TERMS and s.mode == SCORE_MODE and s.side is not None
     ]
-    return (*numbers.parameters, *made)
+    return (*numbers.parameters, *as_parameters)
 
 
 Table = Mapping[tuple[str, Side | None], Parameter]
@@ -201,7 +201,7 @@ def _score_norm(name: str, visits: Sequence[AnalysedVisit]) -> NormValue | None:
         return None
     # GDI* is 100 ± 10 among the reference people by its definition
     mean, sd = (spread.mean_deg, spread.sd_deg) if name == "gps_sagittal_deg" else (100.0, 10.0)
-    return NormValue(name, mean, sd, None, "healthy adults", "Fukuchi et al. 2018, leave one out")
+    return NormValue(name, mean, sd, None, "healthy adults", "Fukuchi et al. 2018, leave-one-out")
 
 
 def _line(
@@ -227,8 +227,8 @@ def _line(
         i, p, _ = measured[k]
         if first is None or k == base or visits[i].feedback:
             return None
-        at = (norms[measured[base or 0][0]].values, norms[i].values) if norms else None
-        return parameter_changes([first], [p], affected, at)[0]
+        norm_pair = (norms[measured[base or 0][0]].values, norms[i].values) if norms else None
+        return parameter_changes([first], [p], affected, norm_pair)[0]
 
     points = [
         TrendPoint(i, value, p.sd, p.n, p.ci_low, p.ci_high, change(k), p.estimated)

@@ -11,12 +11,12 @@ from sagittal.core.events.result import Strides
 from sagittal.core.frames import SIDES, Side
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.core.parameters.rows import Column
+from sagittal.core.user_text import quote
 from sagittal.server.report.charts.svg import KEY, find_round_ticks, make_label, make_time_labels
 from sagittal.server.report.files.columns import reduce_to_plain
 from sagittal.server.report.view.level import define_parameter
 from sagittal.server.report.view.table import ParameterRow
 from sagittal.server.report.words.wording import explain_exclusion, format_number
-from sagittal.web.user_text import quote
 
 HEIGHT: Final = 220
 TOP, BOTTOM = 12, 24
@@ -95,10 +95,10 @@ def _chart(row: ParameterRow, values: Sequence[StrideValue], duration_s: float) 
     """Chart of all strides as linked marks, with the norm as a band and means of the included ones as
     lines.
     """
-    shown = [s for s in values if s.value is not None]
-    if not shown or duration_s <= 0.0:
+    valued = [s for s in values if s.value is not None]
+    if not valued or duration_s <= 0.0:
         return ""
-    figures = [s.value for s in shown if s.value is not None]
+    figures = [s.value for s in valued if s.value is not None]
     if row.norm_mean is not None and row.norm_sd is not None:
         figures += [row.norm_mean - row.norm_sd, row.norm_mean + row.norm_sd]
     low, high = min(figures), max(figures)
@@ -114,15 +114,15 @@ def _chart(row: ParameterRow, values: Sequence[StrideValue], duration_s: float) 
         top, foot = y(row.norm_mean + row.norm_sd), y(row.norm_mean - row.norm_sd)
         parts.append(f'<rect class="band" x="0" width="100%" y="{top:.1f}" height="{foot - top:.1f}"/>')
     ticks, digits = find_round_ticks(low, high)
-    for at in ticks:
-        parts.append(f'<line class="g" x1="0" x2="100%" y1="{y(at):.1f}" y2="{y(at):.1f}"/>')
-        parts.append(make_label("0", y(at), format_number(at, digits), "", "end", dx=-7, dy=4))
+    for tick in ticks:
+        parts.append(f'<line class="g" x1="0" x2="100%" y1="{y(tick):.1f}" y2="{y(tick):.1f}"/>')
+        parts.append(make_label("0", y(tick), format_number(tick, digits), "", "end", dx=-7, dy=4))
     parts.append(make_time_labels(duration_s, HEIGHT, -6))
     for side, cell in zip(SIDES, (row.left, row.right), strict=True):
         if cell is not None:
             line = f'x1="0" x2="100%" y1="{y(cell.value):.1f}" y2="{y(cell.value):.1f}"'
             parts.append(f'<line class="m{KEY[side]}" {line}/>')
-    parts += [_mark(s, y(s.value), duration_s) for s in shown if s.value is not None]
+    parts += [_mark(s, y(s.value), duration_s) for s in valued if s.value is not None]
     return (
         f'<div class="chart behind"><svg width="100%" height="{HEIGHT}" overflow="visible" role="group">'
         f"<title>{escape(row.title)} of every stride over time</title>{''.join(parts)}</svg></div>"
@@ -132,11 +132,11 @@ def _chart(row: ParameterRow, values: Sequence[StrideValue], duration_s: float) 
 def _mark(s: StrideValue, y: float, duration_s: float) -> str:
     css, radius = CSS[s.side]
     x = 100 * 0.5 * (s.start_s + s.end_s) / duration_s
-    said = f"{s.side} stride at {s.start_s:.2f} s: {s.text}" + (
-        f", left out: {quote(s.excluded)}" if s.excluded else ""
+    title = f"{s.side} stride at {s.start_s:.2f} s: {s.text}" + (
+        f", excluded: {quote(s.excluded)}" if s.excluded else ""
     )
     faded = "" if s.counted else " out"
     return (
         f'<a href="timeline#t={s.start_s:.3f}"><circle class="{css}{faded}" cx="{x:.2f}%" cy="{y:.1f}" '
-        f'r="{radius}"><title>{escape(said)}</title></circle></a>'
+        f'r="{radius}"><title>{escape(title)}</title></circle></a>'
     )

@@ -15,7 +15,7 @@ from sagittal.server.report.words.wording import format_number, place_words, spe
 VERDICT_WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "pass": ("ok", "pass"),
     "redo": ("bad", "redo"),
-    "not_judged": ("none", "not judged"),
+    "not_judged": ("none", "not assessed"),
 }
 """Verdict → its shape and its word."""
 
@@ -77,22 +77,22 @@ def view_calibration_checks(
     """View of `calibration_score`, `calibration` and notices of analysis.json; None without a score."""
     if score is None:
         return None
-    told: dict[str | None, list[str]] = {}
+    notices_by_sensor: dict[str | None, list[str]] = {}
     for notice in warnings:
         if notice.severity != "info":
-            told.setdefault(notice.sensor, []).append(speak_places(notice.message))
+            notices_by_sensor.setdefault(notice.sensor, []).append(speak_places(notice.message))
     checks: Sequence[Mapping[str, Any]] = score["checks"]
-    worn = [s for s in SEGMENTS if s in score["segments"]]
+    present = [s for s in SEGMENTS if s in score["segments"]]
     mounted = {} if calibration is None else calibration["segments"]
     whole = [c for c in checks if c["segment"] is None]
-    segments = [_view_segment(s, score["segments"][s], checks, mounted.get(s, {})) for s in worn]
-    segments = [replace(s, told=tuple(told.get(s.id, ()))) for s in segments]
+    segments = [_view_segment(s, score["segments"][s], checks, mounted.get(s, {})) for s in present]
+    segments = [replace(s, told=tuple(notices_by_sensor.get(s.id, ()))) for s in segments]
     if whole:
         kinds = {c["verdict"] for c in whole}
         verdict = next((v for v in ("redo", "pass") if v in kinds), "not_judged")
         kind, word = VERDICT_WORDS[verdict]
         rows = tuple(_view_check(c) for c in whole)
-        segments.insert(0, CheckedSegment(WHOLE, "Whole take", kind, word, "", "", rows))
+        segments.insert(0, CheckedSegment(WHOLE, "Whole trial", kind, word, "", "", rows))
     return CalibrationChecks(
         VERDICT_WORDS[score["verdict"]][0], say_verdict(score["verdict"], checks), tuple(segments)
     )
@@ -100,21 +100,21 @@ def view_calibration_checks(
 
 def say_verdict(verdict: str, checks: Sequence[Mapping[str, Any]]) -> str:
     """Overall result in one sentence."""
-    judged = [c for c in checks if c["verdict"] != "not_judged"]
+    checked = [c for c in checks if c["verdict"] != "not_judged"]
     if verdict == "pass":
         return plural(
-            len(judged),
-            "The calibration passes the one check that could be judged.",
-            f"The calibration passes all {len(judged)} checks that could be judged.",
+            len(checked),
+            "Calibration: the one applicable check passed.",
+            f"Calibration: all {len(checked)} checks passed.",
         )
     if verdict == "not_judged":
-        return "This take allows no check of its calibration."
+        return "The calibration of this trial cannot be checked."
     failed = [c for c in checks if c["verdict"] == "redo"]
     places = list(dict.fromkeys(place_words(c["segment"]) if c["segment"] else "walk" for c in failed))
-    shown = places if len(places) <= 3 else [*places[:2], f"{len(places) - 2} more"]
-    listed = " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))
-    which = plural(len(failed), "checks fails", "checks fail")
-    return f"Calibrate again: {len(failed)} of {len(judged)} {which}, at the {listed}."
+    shortened = places if len(places) <= 3 else [*places[:2], f"{len(places) - 2} more"]
+    listed = " and ".join(filter(None, (", ".join(shortened[:-1]), shortened[-1])))
+    which = plural(len(failed), "checks failed", "checks failed")
+    return f"Calibrate again: {len(failed)} of {len(checked)} {which}, at the {listed}."
 
 
 def _view_segment(

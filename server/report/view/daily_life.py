@@ -172,43 +172,43 @@ class DailyLifeView:
         }
 
 
-def daily_life_view(found: ActivityResult | None) -> DailyLifeView | None:
+def daily_life_view(activity: ActivityResult | None) -> DailyLifeView | None:
     """View of a daily-life recording; None for other trials."""
-    if found is None:
+    if activity is None:
         return None
-    days = tuple(_describe_day(found, i, d) for i, d in enumerate(found.days))
-    shown = tuple(
-        c for c, kinds in TOTALS.items() if c != "Not recorded" or any(found.minutes(k) for k in kinds)
+    days = tuple(_describe_day(activity, i, d) for i, d in enumerate(activity.days))
+    active = tuple(
+        c for c, kinds in TOTALS.items() if c != "Not recorded" or any(activity.minutes(k) for k in kinds)
     )
-    events: list[PosturalTransition | TransitionCandidate] = [*found.transitions, *found.candidates]
+    events: list[PosturalTransition | TransitionCandidate] = [*activity.transitions, *activity.candidates]
     events.sort(key=lambda e: e.time_s)
-    leans = _describe_leans(found)
+    leans = _describe_leans(activity)
     return DailyLifeView(
-        found=found,
-        place="chest" if found.segment == "chest" else "lower back",
-        has_clock=found.started_at is not None,
-        columns=shown,
+        found=activity,
+        place="chest" if activity.segment == "chest" else "lower back",
+        has_clock=activity.started_at is not None,
+        columns=active,
         days=days,
-        mean=_average(found.days),
+        mean=_average(activity.days),
         hours=tuple(
             HourTotals(
-                find_day_label(found, h.start_s),
-                clock_label(found, h.start_s),
+                find_day_label(activity, h.start_s),
+                clock_label(activity, h.start_s),
                 h.steps,
-                {c: format_number(_sum(h.minutes, TOTALS[c]), 0) for c in shown},
+                {c: format_number(_sum(h.minutes, TOTALS[c]), 0) for c in active},
             )
-            for h in found.hours
+            for h in activity.hours
         ),
-        transitions=tuple(_count_transitions(found, kind) for kind in TRANSITIONS),
-        events=tuple(_describe_event(found, e) for e in events[:EVENTS_SHOWN]),
+        transitions=tuple(_count_transitions(activity, kind) for kind in TRANSITIONS),
+        events=tuple(_describe_event(activity, e) for e in events[:EVENTS_SHOWN]),
         events_total=len(events),
-        bins=bin_bouts(found.bouts),
+        bins=bin_bouts(activity.bouts),
         stairs_steps=(
-            sum(b.stairs_up_steps for b in found.bouts),
-            sum(b.stairs_down_steps for b in found.bouts),
+            sum(b.stairs_up_steps for b in activity.bouts),
+            sum(b.stairs_down_steps for b in activity.bouts),
         ),
         leans=leans,
-        lean_reason=None if leans else "not known: no lean of the trunk showed which way is forward",
+        lean_reason=None if leans else "unknown: no trunk lean showed the forward direction",
     )
 
 
@@ -245,21 +245,21 @@ def _bin_label(low: float, high: float) -> str:
     return f"{low / size:.0f}–{high / size:.0f}\u202f{unit}"
 
 
-def _describe_day(found: ActivityResult, i: int, d: ActivityDay) -> DayTotals:
-    begins = f"{clock_label(found, d.start_s)}–" if found.started_at is not None else ""
+def _describe_day(activity: ActivityResult, i: int, d: ActivityDay) -> DayTotals:
+    begins = f"{clock_label(activity, d.start_s)}–" if activity.started_at is not None else ""
     whole = d.end_s - d.start_s > DAY_S - 60.0
-    ends = clock_label(found, d.end_s) if begins else f"first {format_hours((d.end_s - d.start_s) / 60)} h"
-    worn = d.worn_h > 0.0
+    ends = clock_label(activity, d.end_s) if begins else f"first {format_hours((d.end_s - d.start_s) / 60)} h"
+    is_worn = d.worn_h > 0.0
     return DayTotals(
         label=day_label(i, d.date),
         part="" if whole else begins + (ends if ends != "00:00" else "24:00"),
-        midnight_s=find_midnight(found, d.start_s),
+        midnight_s=find_midnight(activity, d.start_s),
         start_s=d.start_s,
         end_s=d.end_s,
         worn=format_hours(60.0 * d.worn_h),
         times={c: format_hours(_sum(d.minutes, kinds)) for c, kinds in TOTALS.items()},
-        steps=format_number(d.steps, 0) if worn else DASH,
-        bouts=str(d.bouts) if worn else DASH,
+        steps=format_number(d.steps, 0) if is_worn else DASH,
+        bouts=str(d.bouts) if is_worn else DASH,
         longest=DASH if d.longest_bout_s is None else format_number(d.longest_bout_s / 60.0, 1),
         counted=d.worn_h >= WORN_H,
     )
@@ -291,12 +291,12 @@ def _sum(minutes: Mapping[ActivityKind, float], kinds: Sequence[ActivityKind]) -
     return sum(minutes.get(kind, 0.0) for kind in kinds)
 
 
-def _count_transitions(found: ActivityResult, kind: TransitionKind) -> TransitionTotals:
-    own = [t for t in found.transitions if t.kind == kind]
+def _count_transitions(activity: ActivityResult, kind: TransitionKind) -> TransitionTotals:
+    own = [t for t in activity.transitions if t.kind == kind]
     rises = [abs(t.rise_m) for t in own if t.rise_m is not None]
     return TransitionTotals(
         label=TRANSITION_LABELS[kind],
-        per_day=tuple(d.transitions.get(kind, 0) for d in found.days),
+        per_day=tuple(d.transitions.get(kind, 0) for d in activity.days),
         total=len(own),
         lean=format_number(float(np.median([t.lean_deg for t in own])), 0) if own else DASH,
         rise=format_number(float(np.median(rises)), 2) if rises else DASH,
@@ -304,20 +304,20 @@ def _count_transitions(found: ActivityResult, kind: TransitionKind) -> Transitio
     )
 
 
-def _describe_event(found: ActivityResult, e: PosturalTransition | TransitionCandidate) -> TransitionEvent:
-    when = f"{find_day_label(found, e.time_s)} {clock_label(found, e.time_s)}"
+def _describe_event(activity: ActivityResult, e: PosturalTransition | TransitionCandidate) -> TransitionEvent:
+    when = f"{find_day_label(activity, e.time_s)} {clock_label(activity, e.time_s)}"
     lean = format_number(e.lean_deg, 0)
     rise = DASH if e.rise_m is None else format_number(e.rise_m, 2)
     if isinstance(e, TransitionCandidate):
         label = "" if e.likely is None else f"{TRANSITION_LABELS[e.likely]}?"
         return TransitionEvent(when, label or DASH, lean, rise, REFUSALS[e.refused], counts=False)
-    status = "counts" if e.consistent else "counts, but the posture before it does not fit"
+    status = "included" if e.consistent else "counted, but inconsistent with the preceding posture"
     return TransitionEvent(when, TRANSITION_LABELS[e.kind], lean, rise, status, counts=True)
 
 
-def _describe_leans(found: ActivityResult) -> tuple[LeanRow, ...]:
+def _describe_leans(activity: ActivityResult) -> tuple[LeanRow, ...]:
     """Median and central 90 % of inclination per activity; lying is excluded."""
-    values, kinds = found.inclination_deg, label_seconds(found)
+    values, kinds = activity.inclination_deg, label_seconds(activity)
     rows = []
     for i, kind in enumerate(KINDS):
         own = values[kinds == i]
@@ -329,15 +329,15 @@ def _describe_leans(found: ActivityResult) -> tuple[LeanRow, ...]:
     return tuple(rows)
 
 
-def label_seconds(found: ActivityResult) -> np.ndarray:
+def label_seconds(activity: ActivityResult) -> np.ndarray:
     """(seconds,) index into KINDS of the activity at the middle of every second."""
-    seconds = np.arange(len(found.inclination_deg)) + 0.5
-    places = np.searchsorted([s.start_s for s in found.spans], seconds, "right") - 1
-    kinds = np.array([KINDS.index(s.kind) for s in found.spans], dtype=np.intp)
+    seconds = np.arange(len(activity.inclination_deg)) + 0.5
+    places = np.searchsorted([s.start_s for s in activity.spans], seconds, "right") - 1
+    kinds = np.array([KINDS.index(s.kind) for s in activity.spans], dtype=np.intp)
     return kinds[np.maximum(places, 0)] if len(kinds) else np.full(len(seconds), KINDS.index("gap"))
 
 
-def inclination_course(found: ActivityResult, start_s: float, end_s: float) -> tuple[Floats, Floats]:
+def inclination_course(activity: ActivityResult, start_s: float, end_s: float) -> tuple[Floats, Floats]:
     """Inclination in windows of COURSE_S.
 
     Returns
@@ -345,15 +345,15 @@ def inclination_course(found: ActivityResult, start_s: float, end_s: float) -> t
     t_s : (n,) start of each window. course : (n, 3) 10 %, 50 % and 90 % of its seconds, NaN if fewer than a
         tenth of them are known.
     """
-    first, last = int(start_s), min(int(np.ceil(end_s)), len(found.inclination_deg))
+    first, last = int(start_s), min(int(np.ceil(end_s)), len(activity.inclination_deg))
     n = max(0, -(-(last - first) // COURSE_S))
     rows = np.full((n, COURSE_S), np.nan)
-    rows.flat[: max(0, last - first)] = found.inclination_deg[first:last]
+    rows.flat[: max(0, last - first)] = activity.inclination_deg[first:last]
     rows.sort(axis=1)
-    known = np.isfinite(rows).sum(axis=1)
+    finite = np.isfinite(rows).sum(axis=1)
     course = np.full((n, 3), np.nan)
-    enough = known * 10 >= COURSE_S
+    enough = finite * 10 >= COURSE_S
     for k, share in enumerate((0.1, 0.5, 0.9)):
-        place = np.round(share * np.maximum(known - 1, 0)).astype(np.intp)
+        place = np.round(share * np.maximum(finite - 1, 0)).astype(np.intp)
         course[enough, k] = rows[np.arange(n), place][enough]
     return first + COURSE_S * np.arange(n, dtype=np.float64), course

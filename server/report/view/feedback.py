@@ -37,16 +37,16 @@ KINDS: Final[tuple[tuple[Kind, str, bool], ...]] = (
     ("retention", "Retention test, first strides", False),
     ("with", "With feedback", False),
     ("without", "Without feedback", False),
-    ("probe", "of these in probe blocks", True),
-    ("faded", "of these left out by the schedule", True),
-    ("off", "of these while off, paused or stale", True),
-    ("stopped", "of these after the end", True),
+    ("probe", "of these, in probe blocks", True),
+    ("faded", "of these, without feedback by schedule", True),
+    ("off", "of these, while off, paused or without current data", True),
+    ("stopped", "of these, after the end", True),
 )
 """Kind of stride, its words, and whether it is a part of the one above."""
 
 _HOW_TO_READ: Final = (
-    "Values are those of the finished analysis, the zone is that of the level at that stride. Only strides "
-    "without feedback show what stays when it goes."
+    "Values are from the completed analysis; the zone is that of the level at each stride. Only strides "
+    "without feedback show what is retained."
 )
 
 
@@ -89,7 +89,7 @@ class FeedbackView:
 
     def to_json(self) -> dict[str, object]:
         """JSON types with all strides."""
-        shown = reduce_to_plain(
+        plain = reduce_to_plain(
             {
                 "prescription": self.content.to_json(),
                 "words": [f"{label}: {text}" for label, text in self.words],
@@ -109,7 +109,7 @@ class FeedbackView:
                 ],
             }
         )
-        return shown if isinstance(shown, dict) else {}
+        return plain if isinstance(plain, dict) else {}
 
 
 def list_analysed_strides(strides: Strides, column: Column) -> tuple[AnalysedStride, ...]:
@@ -124,14 +124,14 @@ def feedback_view(
     content: Prescription,
     split: FeedbackSplit,
     guard: GuardState,
-    before: PreviousTraining | None = None,
+    previous: PreviousTraining | None = None,
     limb: Limb | None = None,
 ) -> FeedbackView:
     """View of the result of a trial.
 
     Parameters
     ----------
-    before : visit whose end is compared with the retention block. limb : of the trained side.
+    previous : visit whose end is compared with the retention block. limb : of the trained side.
     """
     term = parameter_term(content.parameter)
     rows = tuple(
@@ -156,7 +156,7 @@ def feedback_view(
         ),
         levels=tuple((s.n, s.t_s, s.level) for s in split.levels),
         effects=describe_effects(content, guard, term),
-        retention=None if before is None else compare_retention(content, split, before, term, limb),
+        retention=None if previous is None else compare_retention(content, split, previous, term, limb),
         notes=_notes(split, term),
         svg=feedback_svg(split, content, term) if split.strides else "",
         split=split,
@@ -165,15 +165,16 @@ def feedback_view(
 
 def _notes(split: FeedbackSplit, term: Term) -> tuple[str, ...]:
     """Explanations, and data that could not be used."""
-    said = [_HOW_TO_READ, f"Side effects: the last {LAST} strides against the first {FIRST} of the take."]
+    notes = [_HOW_TO_READ, f"Side effects: the last {LAST} strides vs the first {FIRST} of the trial."]
     live = split.live_difference
     if live.mean is not None and live.sd is not None:
-        said.append(
-            f"What was fed back differed from the analysis by {format_number(live.mean, term.digits + 1)} ± "
+        notes.append(
+            "Live feedback values differed from the analysis by "
+            f"{format_number(live.mean, term.digits + 1)} ± "
             f"{format_quantity(live.sd, term, term.digits + 1)}."
         )
-    for n, what in ((split.unmatched, "no stride"), (split.left_out, "a stride that does not count")):
+    for n, outcome in ((split.unmatched, "no stride"), (split.left_out, "an excluded stride")):
         if n:
-            cues = plural(n, "1 cue, left out, has", f"{n} cues, left out, have")
-            said.append(f"{cues} {what} in the analysis.")
-    return tuple(said)
+            cues = plural(n, "1 cue, excluded, has", f"{n} cues, excluded, have")
+            notes.append(f"{cues} {outcome} in the analysis.")
+    return tuple(notes)

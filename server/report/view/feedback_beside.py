@@ -26,10 +26,10 @@ from sagittal.server.report.words.feedback_words import digits_of, format_quanti
 from sagittal.server.report.words.wording import Term
 
 EFFECT_REASONS: Final = {
-    "too_few_strides": f"needs {FIRST} strides at the start and {FIRST} after them, on this side",
-    "joint_missing": "needs the joint angles of both legs",
+    "too_few_strides": f"requires {FIRST} strides at the start and {FIRST} afterwards on this side",
+    "joint_missing": "requires joint angles of both legs",
     "both_sides_trained": "both sides are trained",
-    "no_limit": "no limit is prescribed",
+    "no_limit": "no limit prescribed",
 }
 
 
@@ -87,30 +87,32 @@ def side_effects(
         s = strides[i]
         if not s.counted or s.value is None:
             continue
-        found = {}
+        values = {}
         if curves is not None:
             for variable, sides in curves.curves.items():
                 row = sides[s.side][rows[s.side, i]] if s.side in sides else None
                 if row is not None and np.isfinite(row).all():
-                    found[variable] = row
-        watch.add_stride(s.side, s.value, found)
+                    values[variable] = row
+        watch.add_stride(s.side, s.value, values)
     return watch.state
 
 
 def describe_effects(content: Prescription, guard: GuardState, term: Term) -> tuple[SideEffectRow, ...]:
     """Side effects on the other side and the sagittal profile, in words."""
-    other = "other side" if content.side is None else "right" if content.side == "left" else "left"
+    opposite = "other side" if content.side is None else "right" if content.side == "left" else "left"
     gps = Term("Sagittal profile score", "°", "", 1, (0, 20), ("larger", "smaller"))
     return (
-        _effect("other_side", f"{term.label}, {other}", guard.other, term),
+        _effect("other_side", f"{term.label}, {opposite}", guard.other, term),
         _effect("gps_sagittal_deg", "Sagittal profile score, both sides", guard.gps, gps),
     )
 
 
 def _effect(name: str, label: str, effect: SideEffect, term: Term) -> SideEffectRow:
     if effect.change is None:
-        why = EFFECT_REASONS.get(effect.reason or "", effect.reason or "")
-        return SideEffectRow(name, label, "none", None, None, None, NO_STRIDES, f"not judged: {why}")
+        explanation = EFFECT_REASONS.get(effect.reason or "", effect.reason or "")
+        return SideEffectRow(
+            name, label, "none", None, None, None, NO_STRIDES, f"not assessed: {explanation}"
+        )
     text = format_signed(effect.change, term)
     if effect.limit is None:
         return SideEffectRow(
@@ -123,23 +125,23 @@ def _effect(name: str, label: str, effect: SideEffect, term: Term) -> SideEffect
 
 
 def compare_retention(
-    content: Prescription, split: FeedbackSplit, before: PreviousTraining, term: Term, limb: Limb | None
+    content: Prescription, split: FeedbackSplit, previous: PreviousTraining, term: Term, limb: Limb | None
 ) -> Retention | None:
     """Compare the retention block with the end of the previous training; None if either is missing."""
-    now, end = split.kinds.get("retention"), before.split.end
+    now, end = split.kinds.get("retention"), previous.split.end
     if now is None or now.mean is None or end.mean is None:
         return None
     difference = now.mean - end.mean
     limit = find_detectable_change(content.parameter, end.mean, limb)
     if limit is None:
-        verdict = "no measurement error of this parameter is known"
+        verdict = "the measurement error of this parameter is unknown"
     elif abs(difference) <= limit.value:
         verdict = f"within the measurement error of {format_quantity(limit.value, term, term.digits + 1)}"
     else:
         verdict = f"more than the measurement error of {format_quantity(limit.value, term, term.digits + 1)}"
     return Retention(
-        before.session_id,
-        before.performed_on,
+        previous.session_id,
+        previous.performed_on,
         describe_summary("end", "End of the last training", False, end, digits_of(content)),
         describe_summary(
             "retention", "Start of this visit, without feedback", False, now, digits_of(content)

@@ -39,5 +39,5 @@ def describe_summary(kind: str, label: str, part: bool, s: Summary, digits: int)
 
 def format_signed(value: float, term: Term) -> str:
     """A difference with its sign, unless it rounds to zero."""
-    shown = format_quantity(value, term)
-    return f"+{shown}" if value > 0 and float(f"{value:.{term.digits}f}") else shown
+    text = format_quantity(value, term)
+    return f"+{text}" if value > 0 and float(f"{value:.{term.digits}f}") else text

@@ -39,9 +39,9 @@ require_entries(TOTALS, "sagittal.server.report.view.functional")
 
 SEGMENTS: Final[Mapping[str, str]] = {
     "sit_to_stand": "Rising",
-    "walk_out": "Way out",
+    "walk_out": "Walk out",
     "turn": "Turn",
-    "walk_back": "Way back",
+    "walk_back": "Walk back",
     "turn_to_sit": "Turn and sitting down",
     "stand_to_sit": "Sitting down",
     "speeding_up": "Speeding up",
@@ -54,16 +54,16 @@ SEGMENTS: Final[Mapping[str, str]] = {
 MEANT: Final[Mapping[str, str]] = {
     "tug_duration_s": "From the first lean forward to the end of sitting down.",
     "five_sit_to_stand_s": "From the first lean forward to the end of the fifth sitting down.",
-    "walk_10m_speed_mps": "Over the middle of the longest straight walk, two metres at either end left out.",
-    "walk_6min_distance_m": "By the strides of the feet, turns included.",
-    "sway_rms_mps2": "Of the horizontal acceleration below 3.5 Hz; which way is forward is not known.",
+    "walk_10m_speed_mps": "Over the middle of the longest straight walk, excluding two metres at each end.",
+    "walk_6min_distance_m": "From the strides of the feet, turns included.",
+    "sway_rms_mps2": "From the horizontal acceleration below 3.5 Hz; the forward direction is unknown.",
 }
 """How the total of a test is meant."""
 
-TEST_NORM_NOTE: Final = "The norm of a test, where there is one, stands below its segments."
+TEST_NORM_NOTE: Final = "If a norm exists for the test, it is shown below its phases."
 """Below the table of a test's parameters."""
 
-NO_NORM: Final = "No norm: none whose source gives figures for this test."
+NO_NORM: Final = "No norm: no published values for this test."
 NO_AGE: Final = "No norm: enter the year of birth."
 NO_SEX: Final = "No norm: enter the sex."
 OTHER_AGE: Final = "No norm for this age."
@@ -113,22 +113,22 @@ class FunctionalView:
         total = sum(s.length_s for s in self.segments)
         if total <= 0.0 or len(self.segments) < 2:
             return ""
-        at, shapes = 0.0, []
+        x, shapes = 0.0, []
         for i, segment in enumerate(self.segments):
             width = 1000.0 * segment.length_s / total
             wide = format_coordinate(max(width - 3.0, 1.0))
-            box = f'x="{format_coordinate(at)}" y="0" width="{wide}" height="1000"'
+            box = f'x="{format_coordinate(x)}" y="0" width="{wide}" height="1000"'
             shapes.append(f'<rect class="seg1" {box}/>' if i % 2 else f'<rect class="seg0" {box}/>')
-            at += width
-        said = ", ".join(f"{s.label} {s.duration} s" for s in self.segments)
+            x += width
+        labels = ", ".join(f"{s.label} {s.duration} s" for s in self.segments)
         return (
-            f'<svg class="chart segbar" width="100%" height="28" role="img" aria-label="{said}">'
+            f'<svg class="chart segbar" width="100%" height="28" role="img" aria-label="{labels}">'
             f"{stretch(''.join(shapes))}</svg>"
         )
 
-    def compare_with(self, before: Sequence[Parameter]) -> FunctionalView:
+    def compare_with(self, earlier: Sequence[Parameter]) -> FunctionalView:
         """The view with the value of an earlier visit."""
-        value = next((p.mean for p in before if p.name == self.name), None)
+        value = next((p.mean for p in earlier if p.name == self.name), None)
         if value is None:
             return self
         return replace(self, previous=format_number(value, parameter_term(self.name).digits))
@@ -140,8 +140,8 @@ def functional_view(
     """The functional test of a finished analysis; None for other trials."""
     if bundle.functional is None:
         return None
-    found = {p.name: p for p in bundle.parameters}
-    total = next((found[name] for name in TOTALS if name in found), None)
+    by_name = {p.name: p for p in bundle.parameters}
+    total = next((by_name[name] for name in TOTALS if name in by_name), None)
     if total is None:
         return None
     term, test = parameter_term(total.name), bundle.functional

@@ -117,9 +117,9 @@ class Headline:
     @property
     def compared_with(self) -> str:
         """Reference groups of the displayed sentences; empty without any."""
-        *before, last = dict.fromkeys(s.against for s in self.shown) or ("",)
-        said = f"{', '.join(before)} and {last}" if before else last
-        return f"against {said}" if said else ""
+        *groups, last = dict.fromkeys(s.against for s in self.shown) or ("",)
+        groups_text = f"{', '.join(groups)} and {last}" if groups else last
+        return f"against {groups_text}" if groups_text else ""
 
     @property
     def ranks(self) -> dict[str, int]:
@@ -178,12 +178,12 @@ def say_badge(kind: str, strides: Strides) -> str:
         return ""
     left, right = (len(strides.select_used(side)) for side in SIDES)
     count = left + right
-    counted = f"{count} {plural(count, 'stride', 'strides')} used, {left} left and {right} right"
+    count_text = f"{count} {plural(count, 'stride', 'strides')} included, {left} left and {right} right"
     if min(left, right) < COMPARED and strides.strides:
-        return f"{counted}: fewer than {COMPARED} of a side are compared with nobody."
+        return f"{count_text}: at least {COMPARED} per side are needed for a comparison."
     if not strides.strides:
-        return "Steps are told by the trunk; sides are not compared."
-    return f"{counted}."
+        return "Steps are from the trunk sensor; sides are not compared."
+    return f"{count_text}."
 
 
 def find_changes(changes: SortedChanges) -> tuple[HeadlineSentence, ...]:
@@ -195,18 +195,18 @@ def find_changes(changes: SortedChanges) -> tuple[HeadlineSentence, ...]:
         if c is not None and c.difference is not None and c.limit:
             real.setdefault(c.name, []).append((c, min(abs(c.difference) / c.limit, LARGEST)))
             relevant |= {c.name} if fact.relevant else set()
-    found = [s for group in real.values() for s in _of_change(group)]
-    return take_largest([replace(s, relevant=s.name in relevant) for s in found])
+    sentences = [s for group in real.values() for s in _of_change(group)]
+    return take_largest([replace(s, relevant=s.name in relevant) for s in sentences])
 
 
-def take_largest(found: Sequence[HeadlineSentence]) -> tuple[HeadlineSentence, ...]:
+def take_largest(sentences: Sequence[HeadlineSentence]) -> tuple[HeadlineSentence, ...]:
     """The most important sentence of each family: relevant ones first, then the largest."""
     order = {name: i for i, name in enumerate(PHRASES)}
 
     def place(s: HeadlineSentence) -> tuple[bool, float, int]:
         return not s.relevant, -s.size, order.get(from_standing(s.name) or s.name, len(order))
 
-    ranked = sorted(found, key=place)
+    ranked = sorted(sentences, key=place)
     largest: dict[str, HeadlineSentence] = {}
     for s in ranked:
         largest.setdefault(s.family, s)
@@ -216,22 +216,22 @@ def take_largest(found: Sequence[HeadlineSentence]) -> tuple[HeadlineSentence, .
 def _of_change(group: Sequence[tuple[Change, float]]) -> Iterator[HeadlineSentence]:
     """One sentence for the sides of a parameter that changed."""
     worst, size = max(group, key=lambda pair: pair[1])
-    p, by = PHRASES[worst.name], worst.difference or 0.0
+    p, change = PHRASES[worst.name], worst.difference or 0.0
     sides = {c.side: c.difference or 0.0 for c, _ in group}
     if worst.name == "step_length_m" and set(sides) == set(SIDES) and sides["left"] * sides["right"] > 0.0:
         digits = parameter_term(worst.name).digits
         lengths = {side[0]: format_number(abs(sides[side]), digits) for side in SIDES}
-        both = BOTH_LONGER if by > 0 else BOTH_SHORTER
+        both = BOTH_LONGER if change > 0 else BOTH_SHORTER
         yield make_sentence(worst.name, p.family, "change", size, both, lengths, None)
         return
     words = {
         "noun": p.noun,
-        "d": format_amount(worst.name, abs(by)),
+        "d": format_amount(worst.name, abs(change)),
         "before": format_amount(worst.name, p.sign * (worst.before or 0.0)),
         "after": format_amount(worst.name, p.sign * (worst.after or 0.0)),
     }
     patterns = (TRIAL_CHANGED_DOWN, TRIAL_CHANGED_UP) if worst.side is None else (CHANGED_DOWN, CHANGED_UP)
-    pattern = patterns[p.sign * by > 0.0]
+    pattern = patterns[p.sign * change > 0.0]
     yield make_sentence(worst.name, p.family, "change", size, pattern, words, worst.side)
 
 
@@ -248,8 +248,8 @@ def make_sentence(
     """Create a sentence from a pattern with its bold part between asterisks; sizes are capped at LARGEST."""
     against = people or {"sides": "the other side", "limit": "limits"}.get(kind, "")
     legs = {} if side is None else {"side": side, "other": OTHER[side]}
-    before, strong, after = pattern.format(**words, **legs).split("*")
-    return HeadlineSentence(name, side, family, kind, min(size, LARGEST), before, strong, after, against)
+    head, strong, tail = pattern.format(**words, **legs).split("*")
+    return HeadlineSentence(name, side, family, kind, min(size, LARGEST), head, strong, tail, against)
 
 
 def choose_digits(name: str) -> int:

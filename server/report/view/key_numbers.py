@@ -49,8 +49,10 @@ class KeyNumber:
 
 def choose_key_numbers(rows: Sequence[ParameterRow]) -> tuple[KeyNumber, ...]:
     """The first of KEY_NUMBERS that were measured reliably."""
-    found = (r for name in KEY_NUMBERS for r in rows if r.name == name)
-    return tuple(_key_number(r) for r in found if r.reason is None and not r.low_confidence)[:SHOWN_LARGE]
+    candidates = (r for name in KEY_NUMBERS for r in rows if r.name == name)
+    return tuple(_key_number(r) for r in candidates if r.reason is None and not r.low_confidence)[
+        :SHOWN_LARGE
+    ]
 
 
 def _key_number(row: ParameterRow) -> KeyNumber:
@@ -73,9 +75,9 @@ def _key_number(row: ParameterRow) -> KeyNumber:
 def say_plus_minus(row: ParameterRow) -> str:
     """Uncertainty: "± 0.02", "± 4 | 5" if it differs between sides, "± 4 | –" for one side."""
     cells = (row.both,) if row.both is not None else (row.left, row.right)
-    found = ["" if c is None else c.plus_minus for c in cells]
-    if not any(found):
+    texts = ["" if c is None else c.plus_minus for c in cells]
+    if not any(texts):
         return ""
-    if len(set(found)) == 1:
-        return found[0]
-    return f"± {' | '.join(x.removeprefix('± ') or '–' for x in found)}"
+    if len(set(texts)) == 1:
+        return texts[0]
+    return f"± {' | '.join(x.removeprefix('± ') or '–' for x in texts)}"

@@ -17,12 +17,12 @@ from sagittal.core.subject.standing_angles import JOINTS, PELVIS
 from sagittal.server.report.view.table import ParameterRow, parameter_rows
 from sagittal.server.report.words.wording import title_of
 
-GROUP = "Angles from the anatomical zero"
+GROUP = "Angles from neutral (0°)"
 
-STANDING: Final = "from the person's own standing"
+STANDING: Final = "relative to standing"
 """Words of definitions that do not hold for an anatomical angle."""
 
-ANATOMICAL: Final = "from the anatomical zero"
+ANATOMICAL: Final = "from neutral (0°)"
 """Words in their place."""
 
 _SUFFIX: Final = "_anatomical_deg"
@@ -78,8 +78,8 @@ def level_parameters(
     ----------
     estimated : variables estimated by a model, for which a goniometer reading is not used.
     """
-    found = _measured_parameters(curves, standing_deg, estimated)
-    return tuple(replace(p, name=_level_name(p.name)) for p in found)
+    measured = _measured_parameters(curves, standing_deg, estimated)
+    return tuple(replace(p, name=_level_name(p.name)) for p in measured)
 
 
 def level_rows(
@@ -94,8 +94,8 @@ def level_rows(
     ----------
     norms : for the patient, looked up with `anatomical` = the variables of `anatomical_variables`.
     """
-    found = _measured_parameters(curves, standing_deg, estimated)
-    rows = parameter_rows(found, norms, zero="anatomical")
+    measured = _measured_parameters(curves, standing_deg, estimated)
+    rows = parameter_rows(measured, norms, zero="anatomical")
     return tuple(replace(row, name=_level_name(row.name), group=GROUP) for row in rows)
 
 
@@ -106,8 +106,8 @@ def choose_zero(rows: Iterable[ParameterRow], anatomical: Collection[str]) -> tu
     ----------
     anatomical : variables with curves relative to the anatomical zero.
     """
-    given = tuple(rows)
-    names = {row.name for row in given}
+    all_rows = tuple(rows)
+    names = {row.name for row in all_rows}
 
     def is_of_page(row: ParameterRow) -> bool:
         entry = find_entry(from_standing(row.name) or row.name)
@@ -116,7 +116,7 @@ def choose_zero(rows: Iterable[ParameterRow], anatomical: Collection[str]) -> tu
             return is_anatomical
         return not (is_anatomical and _level_name(row.name) in names)
 
-    return tuple(row for row in given if is_of_page(row))
+    return tuple(row for row in all_rows if is_of_page(row))
 
 
 def _measured_parameters(

@@ -172,7 +172,8 @@ class ReportModel:
                 "called": "squat",
                 "strides": [asdict(span) for span in self.squats.spans],
                 "curves": {
-                    name: {side: round_curve(mean) for side, mean in of.items()} for name, of in means.items()
+                    name: {side: round_curve(mean) for side, mean in by_side.items()}
+                    for name, by_side in means.items()
                 },
             }
         return {
@@ -310,8 +311,8 @@ def _mark_unsure(bundle: Bundle) -> tuple[Parameter, ...]:
 
 
 def _stride_row(s: Stride) -> StrideRow:
-    why = None if s.excluded_reason is None else explain_exclusion(s.excluded_reason)
-    return StrideRow(s.side, s.start_s, s.tc_s, s.end_s, s.excluded_reason is None, why)
+    reason = None if s.excluded_reason is None else explain_exclusion(s.excluded_reason)
+    return StrideRow(s.side, s.start_s, s.tc_s, s.end_s, s.excluded_reason is None, reason)
 
 
 def _profile(bundle: Bundle, curves: CycleCurves, age: float | None, norms: Norms) -> ProfileView | None:
@@ -379,17 +380,17 @@ def _norm_note(bundle: Bundle) -> str | None:
     if _is_told_by_trunk(bundle):
         return TEST_NORM_NOTE
     if bundle.activity is not None:
-        return "Daily life is held against no norm."
+        return "Daily life is not compared with a norm."
     return NORM_NOTE if bundle.repetitions is not None else None
 
 
 def _warning(n: Notice) -> ReportWarning:
     title = n.code.replace("_", " ").capitalize()
-    where = "" if n.sensor is None else f", {place_words(n.sensor)}"
+    location = "" if n.sensor is None else f", {place_words(n.sensor)}"
     return ReportWarning(
         kind=_KINDS[n.severity],
         code=n.code,
-        title=f"{title}{where}",
+        title=f"{title}{location}",
         message=speak_places(n.message),
         sensor=n.sensor,
         t_s=n.t_s,

@@ -38,14 +38,14 @@ def norm_note(
     bands = norms.comfortable_bands if matched else norms.bands
     band = next(iter(bands.values()), None)
     if band is not None and angles:
-        who = GROUPS.get(band.group, band.group)
+        group = GROUPS.get(band.group, band.group)
         sentences.append(
-            f"{'Comfortable' if matched else 'Norm'}: {band.n} {who}, overground at their comfortable "
+            f"{'Comfortable' if matched else 'Norm'}: {band.n} {group}, overground at their comfortable "
             f"1.25 ± 0.16 m/s, mean ± 1 SD ({band.source})."
         )
     if norms.timing_reason is not None and norms.timing_reason != norms.reason:
         sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
-    elif shown := [
+    elif displayed := [
         r
         for r in rows
         if r.norm is not None
@@ -54,7 +54,7 @@ def norm_note(
         and not is_angle(r.name)
         and r.unit != "°"
     ]:
-        sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
+        sentences.append(f"Timing: {norms.values[displayed[0].name].group} ({displayed[0].norm_source}).")
     if any(r.norm_note == FEW_NOTE for r in rows):
         sentences.append(FEW_NOTE)
     if any(r.name == SPEED and r.norm is not None for r in rows):
@@ -67,19 +67,19 @@ def norm_note(
 
 def _matched_note(norms: Norms) -> str:
     """Reference group that was asked to walk at this speed, and its limitations."""
-    at = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
+    speed = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
     return (
-        f"Norm: {ASKED}{at}, overground, mean ± 1 SD ({SOURCE}). They are not people who are slow from habit "
-        "or age."
+        f"Norm: {ASKED}{speed}, overground, mean ± 1 SD ({SOURCE}). They are not people who are slow from "
+        "habit or age."
     )
 
 
 def _own_note(controls: ControlGroup) -> str:
     """Description of the clinic's own controls, or that there are too few."""
     if controls.reason is not None:
-        return f"Own controls who walk as fast: {controls.n}, too few to compare with."
+        return f"Own controls at the same speed: {controls.n}, too few for a comparison."
     small = ", a small group" if controls.note == "small_group" else ""
-    return f"Where no published norm compares: {controls.group}, {controls.n} people{small}."
+    return f"Where no published norm is comparable: {controls.group}, {controls.n} people{small}."
 
 
 def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]:
@@ -99,17 +99,18 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
     about_zero = []
     if any(p.zero == "standing" and p.reason is None for p in panels):
         about_zero.append(
-            "Curves named from standing have the posture of the standing part at 0°. "
-            f"Subtracted: {', '.join(offsets)}. A person who stands bent gets curves shifted by that much."
+            "Curves relative to standing have the posture during quiet standing at 0°. Subtracted: "
+            f"{', '.join(offsets)}. If the person stands with flexed joints, the curves are offset by "
+            "that amount."
         )
     if any(p.zero == "walking" and p.reason is None for p in panels):
         about_zero.append(
-            "Nobody stood still in this take: these curves start from their own mean in straight walking. "
-            "Read their shape and range; they have no level."
+            "No quiet standing in this trial: these curves are relative to their own mean in straight "
+            "walking. Interpret shape and range only; they have no absolute level."
         )
     if any(p.zero == "anatomical" and p.reason is None for p in panels):
         about_zero.append(
-            "Curves named anatomical start from what the goniometer read in standing, as the norm does."
+            "Curves from neutral use the goniometer angles in standing as reference, like the norm."
         )
     view = estimator_view(bundle.estimator)
     notes = [
@@ -122,7 +123,8 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
     most = max((c.n for p in panels for c in p.sides.values()), default=0)
     if most > drawn:
         notes.append(
-            f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the take; means are of all."
+            f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the trial; means include all "
+            "strides."
         )
     return tuple(notes)
 
@@ -134,8 +136,8 @@ def _interrupted(panels: Sequence[CurvePanel]) -> list[str]:
         for p in panels
         if any(c.mean_deg is not None and np.isnan(c.mean_deg).any() for c in p.sides.values())
     ]
-    why = "interrupted where the leg model's knee rests on its limit in most strides"
-    return [f"{', '.join(broken).capitalize()}: {why}; nothing is measured there."] if broken else []
+    reason = "interrupted where the knee of the leg model is at its limit in most strides"
+    return [f"{', '.join(broken).capitalize()}: {reason}; nothing is measured there."] if broken else []
 
 
 def _norm_notes(panels: Sequence[CurvePanel]) -> list[str]:

@@ -106,19 +106,19 @@ def profile_view(comfortable: Scores, matched: Scores | None = None) -> ProfileV
     scores = comfortable if matched is None else matched
     rows, bars = [], []
     for variable in dict.fromkeys(s.variable for s in scores.scores if s.variable is not None):
-        found = {side: scores.find("gvs_deg", MODE, side, variable) for side in SIDES}
-        if any(s.value is not None for s in found.values()):
+        side_scores = {side: scores.find("gvs_deg", MODE, side, variable) for side in SIDES}
+        if any(s.value is not None for s in side_scores.values()):
             label, plane = LABELS.get(variable, variable), PLANES.get(variable)
-            row = _row(label, found, low=plane != "sagittal", total=False)
+            row = _row(label, side_scores, low=plane != "sagittal", total=False)
             rows.append(_beside(row, comfortable, scores, "gvs_deg", MODE, variable))
             if plane == "sagittal":
-                bars.append(_numbers(label, found))
+                bars.append(_numbers(label, side_scores))
     if not rows:
         return None
     for name, mode, title in TOTALS:
-        both = {side: scores.find(name, mode, side) for side in SIDES}
-        if any(s.value is not None for s in both.values()):
-            row = _row(title, both, low=name == "gps_deg", total=True)
+        by_side = {side: scores.find(name, mode, side) for side in SIDES}
+        if any(s.value is not None for s in by_side.values()):
+            row = _row(title, by_side, low=name == "gps_deg", total=True)
             rows.append(_beside(row, comfortable, scores, name, mode))
     return ProfileView(
         tuple(rows),
@@ -132,12 +132,12 @@ def profile_view(comfortable: Scores, matched: Scores | None = None) -> ProfileV
 
 
 def _total(scores: Scores) -> ProfileBar | None:
-    found = {side: scores.find("gps_sagittal_deg", MODE, side) for side in SIDES}
-    total = _numbers(SCORE_TERMS["gps_sagittal_deg"].label, found)
+    by_side = {side: scores.find("gps_sagittal_deg", MODE, side) for side in SIDES}
+    total = _numbers(SCORE_TERMS["gps_sagittal_deg"].label, by_side)
     return total if total.values else None
 
 
-def bar_svg(bar: ProfileBar, before: ProfileBar | None, height: int = BAR_HEIGHT) -> str:
+def bar_svg(bar: ProfileBar, previous: ProfileBar | None, height: int = BAR_HEIGHT) -> str:
     """Draw the bars of both sides, left filled, right outlined, with a tick at the previous visit.
 
     Solid line: median of healthy subjects; dashed: 95th percentile. Bars are clipped at BARS_DEG. `height` in
@@ -153,11 +153,11 @@ def bar_svg(bar: ProfileBar, before: ProfileBar | None, height: int = BAR_HEIGHT
         value = bar.values.get(cast("Side", side))
         if value is not None:
             shapes.append(f'<rect class="{css}" x="0" y="{y:.1f}" width="{x(value)}" height="{thick:.1f}"/>')
-        earlier = None if before is None else before.values.get(cast("Side", side))
+        earlier = None if previous is None else previous.values.get(cast("Side", side))
         if earlier is not None:
-            at = x(earlier)
+            x_earlier = x(earlier)
             ends = f'y1="{y - 0.07 * height:.1f}" y2="{y + 0.36 * height:.1f}"'
-            shapes.append(f'<line class="mapb" x1="{at}" x2="{at}" {ends}/>')
+            shapes.append(f'<line class="mapb" x1="{x_earlier}" x2="{x_earlier}" {ends}/>')
     for css, end in (("mapm", bar.median), ("map95", bar.p95)):
         if end is not None:
             shapes.append(f'<line class="{css}" x1="{x(end)}" x2="{x(end)}" y1="0" y2="{height}"/>')
@@ -165,34 +165,34 @@ def bar_svg(bar: ProfileBar, before: ProfileBar | None, height: int = BAR_HEIGHT
     return f'<svg class="chart mapbar" width="100%" height="{height}" aria-hidden="true">{drawn}</svg>'
 
 
-def _numbers(title: str, found: Mapping[Side, Score]) -> ProfileBar:
-    healthy = next((s.healthy for s in found.values() if s.healthy is not None), None)
+def _numbers(title: str, by_side: Mapping[Side, Score]) -> ProfileBar:
+    healthy = next((s.healthy for s in by_side.values() if s.healthy is not None), None)
     return ProfileBar(
         title,
-        {side: s.value for side, s in found.items() if s.value is not None},
+        {side: s.value for side, s in by_side.items() if s.value is not None},
         None if healthy is None else healthy.median_deg,
         None if healthy is None else healthy.p95_deg,
     )
 
 
 def _beside(
-    row: ProfileRow, comfortable: Scores, shown: Scores, name: str, mode: Mode, variable: str | None = None
+    row: ProfileRow, comfortable: Scores, scores: Scores, name: str, mode: Mode, variable: str | None = None
 ) -> ProfileRow:
     """The row with added scores against subjects at comfortable speed, if others are shown."""
-    if comfortable is shown:
+    if comfortable is scores:
         return row
     left, right = (_text(comfortable.find(name, mode, side, variable)) for side in SIDES)
     return replace(row, comfortable_left=left, comfortable_right=right)
 
 
-def _row(title: str, found: dict[Side, Score], *, low: bool, total: bool) -> ProfileRow:
-    healthy = next((s.healthy for s in found.values() if s.healthy is not None), None)
-    marks = {side: s.value for side, s in found.items() if s.value is not None}
+def _row(title: str, by_side: dict[Side, Score], *, low: bool, total: bool) -> ProfileRow:
+    healthy = next((s.healthy for s in by_side.values() if s.healthy is not None), None)
+    marks = {side: s.value for side, s in by_side.items() if s.value is not None}
     ends = None if healthy is None else (healthy.median_deg, healthy.p75_deg, healthy.p95_deg)
     return ProfileRow(
         title=title,
-        left=_text(found["left"]),
-        right=_text(found["right"]),
+        left=_text(by_side["left"]),
+        right=_text(by_side["right"]),
         healthy="" if healthy is None else format_number(healthy.median_deg, 1),
         svg=_bar(marks, ends),
         low_confidence=low,
@@ -221,8 +221,8 @@ def _index(scores: Scores) -> str:
         if s.value is not None:
             parts.append(f"{side} {format_number(s.value)}")
     return (
-        f"GDI*, sagittal: {', '.join(parts)} (100 is the middle of healthy adults at their own speed, "
-        "10 is one SD)."
+        f"GDI*, sagittal: {', '.join(parts)} (100: mean of healthy adults at their own speed; 10 points: "
+        "one SD)."
         if parts
         else ""
     )
@@ -232,7 +232,7 @@ def _note(scores: Scores) -> str:
     gps = scores.find("gps_deg", MODE, "left")
     missing = [LABELS.get(v, v.replace("_", " ").capitalize()).lower() for v in gps.missing]
     without = (
-        f"There is no GPS: {', '.join(missing)} ({reason_words(gps.reason)})."
+        f"GPS not available: {', '.join(missing)} ({reason_words(gps.reason)})."
         if gps.value is None and missing
         else ""
     )
@@ -242,8 +242,8 @@ def _note(scores: Scores) -> str:
         else f"{scores.reference_n} healthy adults at their own comfortable speed"
     )
     measured = (
-        f"Root mean square distance of each mean curve from that of {people}. The level of each curve is "
-        "removed, because angles start from the person's standing. Dark to the 75th, light to the 95th "
-        "percentile of these adults, their median as a line."
+        f"Root-mean-square deviation of each mean curve from that of {people}. The level of each curve is "
+        "removed because angles are relative to the person's standing. Dark: up to the 75th, light: up "
+        "to the 95th percentile of these adults; line: median."
     )
     return " ".join(filter(None, (measured, without, f"{scores.source}.")))

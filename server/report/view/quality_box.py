@@ -19,17 +19,17 @@ from sagittal.server.report.words.wording import format_number, place_words, spe
 CALIBRATION_METHODS: Final[Mapping[str, str]] = {
     "walking_direction": "from standing and walking",
     "gyro_pca": "from leg rotation",
-    "declared": "mounting as declared",
-    "neighbour": "guessed from neighbours",
-    "fixed_offset": "put on as agreed",
-    "table_top": "carried from a table",
-    "hip_swing": "from swings of the leg",
-    "trunk_bow": "from bows of the trunk",
+    "declared": "declared placement",
+    "neighbour": "inferred from adjacent segments",
+    "fixed_offset": "placed according to protocol",
+    "table_top": "transferred from a table",
+    "hip_swing": "from leg swings",
+    "trunk_bow": "from trunk bows",
 }
 """Method of a calibration → words."""
 
 NO_WHOLE_DAY: Final = f"No day has {WORN_H:g} hours of wear time, so no values per day are reported."
-IN_DOUBT: Final = "Numbers are withheld or in doubt."
+IN_DOUBT: Final = "Some values are not reported or are unreliable."
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def quality_box(bundle: Bundle) -> QualityBox:
     )
     items = [
         *_counted(bundle),
-        *_signals(bundle.quality, rest=bundle.activity is None),
+        *_signals(bundle.quality, with_rest=bundle.activity is None),
         *_calibration(
             bundle.calibration,
             bundle.calibration_score,
@@ -108,14 +108,14 @@ def explain_verdict(kind: str, bundle: Bundle) -> tuple[str, int]:
     daily = _daily_steps(bundle.parameters)
     if kind == "warn" and daily is not None and not daily.n:
         return NO_WHOLE_DAY, sum(n.severity == "warning" for n in bundle.warnings)
-    told = [n for n in bundle.warnings if n.severity in ("error", "warning")]
-    told.sort(key=lambda n: (n.severity != "error", n.code != "sensor_failed"))
+    problems = [n for n in bundle.warnings if n.severity in ("error", "warning")]
+    problems.sort(key=lambda n: (n.severity != "error", n.code != "sensor_failed"))
     health = None if bundle.estimator is None else bundle.estimator["verdict"]
     reasons = tuple(bundle.quality.get("reasons", ()))
-    if kind == "bad" and health == "bad" and reasons and not (told and told[0].severity == "error"):
-        return speak_places(reasons[-1]), len(told)
-    if told:
-        return speak_places(told[0].message), len(told) - 1
+    if kind == "bad" and health == "bad" and reasons and not (problems and problems[0].severity == "error"):
+        return speak_places(reasons[-1]), len(problems)
+    if problems:
+        return speak_places(problems[0].message), len(problems) - 1
     if reasons:
         return speak_places(reasons[0]), 0
     return (IN_DOUBT if kind == "bad" else ""), 0
@@ -155,7 +155,7 @@ def data_verdict(
     if level == "poor":
         return "bad", "Poor data" if estimator is None or health != "bad" else _name_bad_estimate(estimator)
     if level == "usable" or "warning" in severities:
-        return "warn", "Usable, see notices"
+        return "warn", "Usable with caution"
     if daily is not None and not daily.n:
         return "warn", "No complete day"
     return "ok", "Good data"
@@ -164,7 +164,7 @@ def data_verdict(
 def _name_bad_estimate(estimator: Mapping[str, Any]) -> str:
     """The inconsistency: between sensors, or between a foot's path and its rest periods."""
     bad = [f["name"] for f in estimator.get("health", ()) if f["verdict"] == "bad"]
-    return "Foot path in doubt" if concern_paths_alone(bad) else "Sensors disagree"
+    return "Foot path unreliable" if concern_paths_alone(bad) else "Sensors disagree"
 
 
 def _trunk_steps(parameters: Sequence[Parameter]) -> int:
@@ -193,12 +193,12 @@ def _counted(bundle: Bundle) -> list[QualityItem]:
     For daily life the hours of wear, and the number of days with sufficient wear time.
     """
     if bundle.activity is not None:
-        worn = sum(day.worn_h for day in bundle.activity.days)
+        hours = sum(day.worn_h for day in bundle.activity.days)
         whole, days = _daily_steps(bundle.parameters), len(bundle.activity.days)
         return [
-            QualityItem("Worn", f"{format_number(worn, 1)}\u202fh"),
+            QualityItem("Worn", f"{format_number(hours, 1)}\u202fh"),
             QualityItem(
-                "Days that count", f"{0 if whole is None else whole.n} of {days}", "worn 10 h or longer"
+                "Days included", f"{0 if whole is None else whole.n} of {days}", "worn 10 h or longer"
             ),
         ]
     if is_test(bundle.parameters) and not bundle.strides.strides:
@@ -207,7 +207,7 @@ def _counted(bundle: Bundle) -> list[QualityItem]:
     if squats:
         done = [p for p in squats if p.n] or squats
         if len(done) == 1:
-            return [QualityItem("Squats used", str(done[0].n), f"{done[0].side} leg")]
+            return [QualityItem("Squats included", str(done[0].n), f"{done[0].side} leg")]
         return [_squats_of_both(bundle)]
     steps = _trunk_steps(bundle.parameters)
     if steps and not bundle.strides.strides:
@@ -219,7 +219,7 @@ def _squats_of_both(bundle: Bundle) -> QualityItem:
     own = [r for r in bundle.repetitions or () if r.excluded != FOOT_LIFTED]
     left, right = ([r for r in own if r.side == side] for side in ("left", "right"))
     return QualityItem(
-        "Squats used",
+        "Squats included",
         sides=True,
         left=sum(r.excluded is None for r in left),
         left_of=len(left),
@@ -231,7 +231,7 @@ def _squats_of_both(bundle: Bundle) -> QualityItem:
 def _strides(bundle: Bundle) -> QualityItem:
     left, right = ([s for s in bundle.strides.strides if s.side == side] for side in ("left", "right"))
     return QualityItem(
-        "Strides used",
+        "Strides included",
         sides=True,
         left=sum(s.excluded_reason is None for s in left),
         left_of=len(left),
@@ -240,7 +240,7 @@ def _strides(bundle: Bundle) -> QualityItem:
     )
 
 
-def _signals(quality: Mapping[str, Any], *, rest: bool) -> list[QualityItem]:
+def _signals(quality: Mapping[str, Any], *, with_rest: bool) -> list[QualityItem]:
     """Lost samples of the worst sensor, magnetic field, and still periods if required by the analysis."""
     items = []
     sensors = [s for s in quality.get("sensors", ()) if isinstance(s, Mapping)]
@@ -249,7 +249,7 @@ def _signals(quality: Mapping[str, Any], *, rest: bool) -> list[QualityItem]:
         worst, name = max(lost)
         extra = "" if worst == 0 else f"at most, {name}"
         items.append(QualityItem("Lost samples", f"{format_number(worst, 1)} %", extra))
-    still = quality.get("rest_s") if rest else None
+    still = quality.get("rest_s") if with_rest else None
     if still is not None:
         total = sum(end - start for start, end in still)
         times = f"in {len(still)} parts" if len(still) > 1 else ""
@@ -271,11 +271,11 @@ def _calibration(
     method = CALIBRATION_METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
     if calibration.get("posture") == "walking" and calibration["method"] == "walking_direction":
         method = "from walking alone"
-    judged = [c["verdict"] for c in (score or {"checks": ()})["checks"] if c["verdict"] != "not_judged"]
-    if judged:
-        passed = judged.count("pass")
-        kind = None if passed == len(judged) else "warn"
-        value = f"{passed} of {len(judged)} {plural(len(judged), 'check', 'checks')}"
+    verdicts = [c["verdict"] for c in (score or {"checks": ()})["checks"] if c["verdict"] != "not_judged"]
+    if verdicts:
+        passed = verdicts.count("pass")
+        kind = None if passed == len(verdicts) else "warn"
+        value = f"{passed} of {len(verdicts)} {plural(len(verdicts), 'check', 'checks')}"
         items = [QualityItem("Calibration", value, method, kind=kind, page="calibration")]
     else:
         items = [QualityItem("Calibration", method)]
@@ -292,7 +292,9 @@ def _estimator(section: Mapping[str, Any] | None) -> list[QualityItem]:
         return []
     extra = view.reduced or view.verdict
     kind = None if view.kind == "ok" and view.reduced is None else view.kind
-    return [QualityItem("Poses by", view.name, extra, kind="warn" if kind == "ok" else kind, page="data")]
+    return [
+        QualityItem("Pose estimator", view.name, extra, kind="warn" if kind == "ok" else kind, page="data")
+    ]
 
 
 def _sensor_name(sensor: Mapping[str, Any]) -> str:

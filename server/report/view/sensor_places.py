@@ -92,12 +92,14 @@ def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
 def _view_place(title: str, left: bool, stored: Mapping[str, Any], measured: Sequence[bool]) -> PlaceRow:
     # outward is to the left on the left
     out = (1.0, 1.0, -1.0 if left else 1.0)
-    found, guess = ([a * b for a, b in zip(stored[k], out, strict=True)] for k in ("cm", "guess_cm"))
+    estimate, guess = ([a * b for a, b in zip(stored[k], out, strict=True)] for k in ("cm", "guess_cm"))
     spread = stored["sd_cm"]
-    a, b, c = (f"{format_number(x, 1)} ± {format_number(sd, 1)}" for x, sd in zip(found, spread, strict=True))
+    a, b, c = (
+        f"{format_number(x, 1)} ± {format_number(sd, 1)}" for x, sd in zip(estimate, spread, strict=True)
+    )
     off = [
         f"{format_number(abs(x - y), 1)} cm {axis if x > y else OPPOSITE[axis]}"
-        for axis, x, y, sd, heard in zip(AXES, found, guess, spread, measured, strict=True)
+        for axis, x, y, sd, heard in zip(AXES, estimate, guess, spread, measured, strict=True)
         if heard and abs(x - y) > OFF_SD * sd
     ]
     nominal = ", ".join(format_number(x, 1) for x in guess)

@@ -36,7 +36,7 @@ VARIABLES: Final = (
 )
 """Charts of a squat; the knee bends further than in walking, so the axes are their own."""
 
-NORM_NOTE: Final = "Squats have no norm."
+NORM_NOTE: Final = "There is no norm for squats."
 
 SURE: Final = ("knee_flexion", "hip_flexion", "ankle_dorsiflexion")
 """Of the others the level is not, or less surely, known (docs/science/squat.md, "Limits")."""
@@ -106,7 +106,7 @@ class SquatView:
         legs = [f"{n} of the {side} knee" for side, n in self.lifted.items() if n]
         if not legs:
             return ""
-        return f"Bends with the foot off the floor are no squats: {' and '.join(legs)}."
+        return f"Knee flexion with the foot off the floor is not counted as a squat: {' and '.join(legs)}."
 
     def to_json(self) -> dict[str, object]:
         """Content of the report's JSON; curves are in angles.parquet, values in repetitions.csv."""
@@ -120,17 +120,17 @@ class SquatView:
 
 def squat_view(bundle: Bundle) -> SquatView | None:
     """The squats of a finished analysis; None for other movements or without squats."""
-    found = [r for r in bundle.repetitions or () if r.excluded != FOOT_LIFTED]
-    if not found:
+    squats = [r for r in bundle.repetitions or () if r.excluded != FOOT_LIFTED]
+    if not squats:
         return None
     lifted = Counter(r.side for r in bundle.repetitions or () if r.excluded == FOOT_LIFTED)
     numbers: Counter[Side] = Counter()
     rows = []
-    for r in found:
+    for r in squats:
         numbers[r.side] += 1
         rows.append(_row(numbers[r.side], r))
     curves = {
-        side: _curves(bundle, side, [r for r in found if r.side == side and r.excluded is None])
+        side: _curves(bundle, side, [r for r in squats if r.side == side and r.excluded is None])
         for side in SIDES
         if numbers[side]
     }
@@ -138,7 +138,7 @@ def squat_view(bundle: Bundle) -> SquatView | None:
     return SquatView(
         sides=tuple(curves),
         rows=tuple(rows),
-        used={side: sum(r.excluded is None for r in found if r.side == side) for side in curves},
+        used={side: sum(r.excluded is None for r in squats if r.side == side) for side in curves},
         lifted={side: lifted[side] for side in SIDES if lifted[side]},
         charts=tuple(
             {
@@ -154,7 +154,7 @@ def squat_view(bundle: Bundle) -> SquatView | None:
             p.variable.name: {s: c.mean_deg for s, c in p.sides.items() if c.mean_deg is not None}
             for p in panels
         },
-        spans=tuple(SquatSpan(r.side, r.start_s, r.end_s, r.excluded is None) for r in found),
+        spans=tuple(SquatSpan(r.side, r.start_s, r.end_s, r.excluded is None) for r in squats),
     )
 
 
@@ -174,12 +174,12 @@ def _row(number: int, r: StoredRepetition) -> RepetitionRow:
     )
 
 
-def _curves(bundle: Bundle, side: Side, counted: Sequence[StoredRepetition]) -> dict[str, Floats]:
+def _curves(bundle: Bundle, side: Side, included: Sequence[StoredRepetition]) -> dict[str, Floats]:
     """Variable → (included, 101) degrees."""
-    if bundle.angles is None or not counted:
+    if bundle.angles is None or not included:
         return {}
-    found = cut_curves(bundle.angles, side, [(r.start_s, r.end_s) for r in counted])
-    return {name: np.degrees(rows) for name, rows in found.items()}
+    cycles = cut_curves(bundle.angles, side, [(r.start_s, r.end_s) for r in included])
+    return {name: np.degrees(rows) for name, rows in cycles.items()}
 
 
 def _panel(variable: Variable, curves: Mapping[Side, Mapping[str, Floats]]) -> CurvePanel | None:
@@ -189,13 +189,13 @@ def _panel(variable: Variable, curves: Mapping[Side, Mapping[str, Floats]]) -> C
         return None
     sides, first = {}, 0
     for side, rows in legs.items():
-        known: Sequence[int] = np.flatnonzero(np.isfinite(rows).all(axis=1)).tolist()
-        if known:
+        complete: Sequence[int] = np.flatnonzero(np.isfinite(rows).all(axis=1)).tolist()
+        if complete:
             sides[side] = SideCurve(
-                mean_deg=rows[known].mean(axis=0),
-                sd_deg=rows[known].std(axis=0, ddof=1) if len(known) > 1 else None,
-                n=len(known),
-                strides={first + i: rows[i] for i in known},
+                mean_deg=rows[complete].mean(axis=0),
+                sd_deg=rows[complete].std(axis=0, ddof=1) if len(complete) > 1 else None,
+                n=len(complete),
+                strides={first + i: rows[i] for i in complete},
                 foot_off_pct=None,
                 foot_off_sd=None,
             )
@@ -206,7 +206,7 @@ def _panel(variable: Variable, curves: Mapping[Side, Mapping[str, Floats]]) -> C
         zero="standing",
         added_deg={},
         low_confidence=variable.name not in SURE,
-        reason=None if sides else "not known throughout any squat",
+        reason=None if sides else "not available throughout any squat",
         norm=None,
         norm_note="",
         sides=sides,

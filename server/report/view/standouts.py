@@ -54,16 +54,16 @@ def find_standouts(
     norms : used for the comparison.
     flags : values against limits.
     """
-    told = [row for row in rows if _phrases(row.name) is not None and not row.low_confidence]
-    found = [s for row in told for s in _of_row(row, norms)]
-    found = _join_steps(found, {row.name: row for row in told})
-    found += _of_flags(flags)
+    candidates = [row for row in rows if _phrases(row.name) is not None and not row.low_confidence]
+    sentences = [s for row in candidates for s in _of_row(row, norms)]
+    sentences = _join_steps(sentences, {row.name: row for row in candidates})
+    sentences += _of_flags(flags)
     looked_at = sum(
         any(c is not None and c.z is not None for c in (row.both, row.left, row.right))
         or row.symmetry is not None
-        for row in told
+        for row in candidates
     )
-    return take_largest(found), looked_at
+    return take_largest(sentences), looked_at
 
 
 def _phrases(name: str) -> Phrases | None:
@@ -183,15 +183,17 @@ def _side_off_norm(row: ParameterRow) -> Side | None:
     return furthest if abs(z[furthest]) > BEYOND_SD else None
 
 
-def _join_steps(found: list[HeadlineSentence], rows: Mapping[str, ParameterRow]) -> list[HeadlineSentence]:
+def _join_steps(
+    sentences: list[HeadlineSentence], rows: Mapping[str, ParameterRow]
+) -> list[HeadlineSentence]:
     """Combine short steps and high cadence into one sentence."""
     steps, cadence = rows.get("step_length_m"), rows.get("cadence_spm")
     if steps is None or cadence is None or cadence.both is None or steps.norm_mean is None:
-        return found
+        return sentences
     z = [z for c in (steps.left, steps.right) if (z := _certain_z(steps, c)) is not None]
     quick = _certain_z(cadence, cadence.both)
     if len(z) < len(SIDES) or max(z) >= -BEYOND_SD or quick is None or quick <= BEYOND_SD:
-        return found
+        return sentences
     mean = sum(c.value for c in (steps.left, steps.right) if c is not None) / len(SIDES)
     words = {
         "l": format_amount(steps.name, mean),
@@ -199,9 +201,9 @@ def _join_steps(found: list[HeadlineSentence], rows: Mapping[str, ParameterRow])
         "norm": _norm_words(steps, PHRASES["step_length_m"]),
     }
     size = max(-min(z), quick) / BEYOND_SD
-    others = [s for s in found if s.name not in ("step_length_m", "cadence_spm")]
-    told = make_sentence("step_length_m", "step", "norm", size, SHORT_AND_QUICK, words, None, AT_SPEED)
-    return [*others, told]
+    remaining = [s for s in sentences if s.name not in ("step_length_m", "cadence_spm")]
+    sentence = make_sentence("step_length_m", "step", "norm", size, SHORT_AND_QUICK, words, None, AT_SPEED)
+    return [*remaining, sentence]
 
 
 def _of_flags(flags: Sequence[Flag]) -> list[HeadlineSentence]:

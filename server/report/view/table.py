@@ -36,7 +36,7 @@ NOBODY: Final = Norms(None, None)
 """No reference people at all."""
 
 
-FEW_NOTE: Final = f"No norm: fewer than {COMPARED} strides of a side are compared with nothing."
+FEW_NOTE: Final = f"No norm: at least {COMPARED} strides per side are needed for a comparison."
 """What stands in place of a norm where no side has enough strides."""
 
 
@@ -171,13 +171,13 @@ def parameter_rows(
     affected : numerator of ratios, None = left over right.
     zero : zero of joint angles.
     """
-    found: dict[str, dict[str | None, Parameter]] = {}
+    by_name: dict[str, dict[str | None, Parameter]] = {}
     for p in parameters:
-        found.setdefault(p.name, {})[p.side] = p
-    known = [name for name in CATALOGUE if name in found]
-    other = [name for name in found if name not in CATALOGUE]
-    rows = (_row(name, found[name], norms, affected, zero) for name in (*known, *other))
-    return tuple(_unsure(row, found[row.name]) for row in rows)
+        by_name.setdefault(p.name, {})[p.side] = p
+    ordered = [name for name in CATALOGUE if name in by_name]
+    unknown = [name for name in by_name if name not in CATALOGUE]
+    rows = (_row(name, by_name[name], norms, affected, zero) for name in (*ordered, *unknown))
+    return tuple(_unsure(row, by_name[row.name]) for row in rows)
 
 
 def group_rows(rows: Sequence[ParameterRow]) -> tuple[tuple[str, tuple[ParameterRow, ...]], ...]:
@@ -191,36 +191,40 @@ def _row(
 ) -> ParameterRow:
     term = parameter_term(name) if name in CATALOGUE else _unknown(name, sides)
     norm = norms.values.get(name)
-    both, left, right = (_cell(sides.get(side), term, norms) for side in (None, "left", "right"))
-    missing = both is None and left is None and right is None
+    whole_trial, left, right = (_cell(sides.get(side), term, norms) for side in (None, "left", "right"))
+    missing = whole_trial is None and left is None and right is None
     symmetry = next(iter(compare_sides(tuple(sides.values()), affected)), None)
-    shown = norm if norm is not None and norm.comparable else None
-    few = shown is not None and not missing and all(c is None or c.few for c in (both, left, right))
-    shown = None if few else shown
-    usual = None if shown is None else norms.comfortable.get(name)
+    displayed_norm = norm if norm is not None and norm.comparable else None
+    few = (
+        displayed_norm is not None
+        and not missing
+        and all(c is None or c.few for c in (whole_trial, left, right))
+    )
+    displayed_norm = None if few else displayed_norm
+    usual = None if displayed_norm is None else norms.comfortable.get(name)
     usual = usual if usual is not None and usual.comparable else None
     absent = [side for side, cell in (("left", left), ("right", right)) if cell is None]
-    side_reason = _reason_of(sides.get(absent[0])) if len(absent) == 1 and both is None else None
-    told = None if side_reason is None else f"{absent[0]} {side_reason}"
+    side_reason = _reason_of(sides.get(absent[0])) if len(absent) == 1 and whole_trial is None else None
+    side_text = None if side_reason is None else f"{absent[0]} {side_reason}"
     return ParameterRow(
         name=name,
         title=title_of(name, term.label, zero),
         unit=term.unit,
         group=term.group,
-        both=both,
+        both=whole_trial,
         left=left,
         right=right,
-        difference=told or _difference(left, right, term, symmetry),
+        difference=side_text or _difference(left, right, term, symmetry),
         reason=_reason_of(next(iter(sides.values()))) if missing else None,
         scale=term.scale,
         side_reason=side_reason,
         whole=None in sides,
-        norm=_norm_text(shown, term),
-        norm_mean=None if shown is None else shown.mean,
-        norm_sd=None if shown is None else shown.sd,
-        norm_n=None if shown is None else shown.n,
-        norm_source=None if shown is None else shown.source,
-        norm_group=None if shown is None else GROUPS.get(shown.group, shown.group),
+        norm=_norm_text(displayed_norm, term),
+        norm_mean=None if displayed_norm is None else displayed_norm.mean,
+        norm_sd=None if displayed_norm is None else displayed_norm.sd,
+        norm_n=None if displayed_norm is None else displayed_norm.n,
+        norm_source=None if displayed_norm is None else displayed_norm.source,
+        norm_group=None if displayed_norm is None else GROUPS.get(displayed_norm.group, displayed_norm.group),
         norm_note=FEW_NOTE if few else "" if norm is None else norm.note,
         comfortable=_norm_text(usual, term),
         comfortable_mean=None if usual is None else usual.mean,
@@ -246,7 +250,7 @@ def _unsure(row: ParameterRow, sides: Mapping[str | None, Parameter]) -> Paramet
     def bare(side: Side | None, cell: TableCell | None) -> TableCell | None:
         return cell if cell is None or side not in unsure else replace(cell, z=None, percentile=None)
 
-    told = replace(
+    marked = replace(
         row,
         both=bare(None, row.both),
         left=bare("left", row.left),
@@ -257,9 +261,9 @@ def _unsure(row: ParameterRow, sides: Mapping[str | None, Parameter]) -> Paramet
         symmetry=None,
     )
     if any(p.mean is not None for side, p in sides.items() if side not in unsure):
-        return told
+        return marked
     return replace(
-        told,
+        marked,
         norm=None,
         norm_mean=None,
         norm_sd=None,
@@ -294,20 +298,20 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
         return None
     digits = max(term.digits, 1)
     spread = "" if p.sd is None else f" ± {format_number(p.sd, _sd_digits(term))}"
-    what = name_counted(p.name)
-    counted = plural(p.n, what.removesuffix("s"), what)
-    told = [f"{format_number(p.mean, digits)}{spread}\u202f{term.unit}, mean ± SD of {p.n} {counted}"]
+    cycle_name = name_counted(p.name)
+    cycles = plural(p.n, cycle_name.removesuffix("s"), cycle_name)
+    title_parts = [f"{format_number(p.mean, digits)}{spread}\u202f{term.unit}, mean ± SD of {p.n} {cycles}"]
     ci = None if p.ci_low is None or p.ci_high is None else (p.ci_low, p.ci_high)
     if ci is not None:
-        told.append(f"95 % CI {format_number(ci[0], digits)} to {format_number(ci[1], digits)}")
+        title_parts.append(f"95 % CI {format_number(ci[0], digits)} to {format_number(ci[1], digits)}")
     if p.cv_pct is not None:
-        told.append(
-            f"CV {format_number(p.cv_pct, 1)} %{f' of few {what}' if p.note == 'few_strides' else ''}"
+        title_parts.append(
+            f"CV {format_number(p.cv_pct, 1)} %{f' of few {cycle_name}' if p.note == 'few_strides' else ''}"
         )
     enough = has_enough_values(p)
     place = norms.place(p.name, p.mean if enough else None, p.uncertainty)
     if place.z is not None and place.percentile is not None:
-        told.append(
+        title_parts.append(
             f"z {format_number(place.z, 1)}, percentile {format_number(place.percentile)} of the norm"
         )
     return TableCell(
@@ -315,12 +319,12 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
         p.sd,
         p.n,
         format_number(p.mean, term.digits),
-        "; ".join(told),
+        "; ".join(title_parts),
         ci,
         p.cv_pct,
         place.z,
         place.percentile,
-        "" if enough else f"{p.n} {counted}",
+        "" if enough else f"{p.n} {cycles}",
         p.uncertainty,
         "" if p.uncertainty is None else format_uncertainty(p.uncertainty, term.digits),
         _known_by(p, term),

@@ -18,18 +18,18 @@ VERDICTS: Final[Mapping[str, str]] = {
 }
 """Verdict → words (docs/science/change.md, "Verdict")."""
 
-NO_LIMIT: Final = "no measurement error known"
-SHORT: Final[Mapping[str, str]] = {NO_LIMIT: "no limit known"}
+NO_LIMIT: Final = "measurement error unknown"
+SHORT: Final[Mapping[str, str]] = {NO_LIMIT: "no known limit"}
 TOO_FEW_WORDS: Final = "too few strides to compare"
 NOT_ALIKE_WORDS: Final = "not compared: one is measured, the other estimated"
-UNLIKE_WORDS: Final = "not judged, the conditions differ"
+UNLIKE_WORDS: Final = "not assessed: the conditions differ"
 
 SCORE_TERMS: Final[Mapping[str, Term]] = {
     "gps_sagittal_deg": Term(
-        "Sagittal profile score", "°", "Distance from healthy adults", 1, (0, 20), ("larger", "smaller")
+        "Sagittal profile score", "°", "Deviation from healthy adults", 1, (0, 20), ("larger", "smaller")
     ),
     "gdi_star_sagittal": Term(
-        "GDI*, sagittal", "points", "Distance from healthy adults", 0, (40, 120), ("larger", "smaller")
+        "GDI*, sagittal", "points", "Deviation from healthy adults", 0, (40, 120), ("larger", "smaller")
     ),
 }
 """Scores that are followed over visits, after the parameters: shape of the curves, offsets removed."""
@@ -59,7 +59,7 @@ class ChangeWords:
         """The assessment in two words, if possible."""
         if self.mark in {"up", "down"}:
             return "changed"
-        return "within error" if not self.mark else SHORT.get(self.verdict, self.verdict)
+        return "within measurement error" if not self.mark else SHORT.get(self.verdict, self.verdict)
 
 
 def find_term(name: str, unit: str = "") -> Term:
@@ -67,17 +67,17 @@ def find_term(name: str, unit: str = "") -> Term:
     if name in CATALOGUE:
         term = parameter_term(name)
         return replace(term, label=title_of(name, term.label))
-    known = SCORE_TERMS.get(name)
-    shown = "°" if unit == "deg" else unit
-    return known or Term(name, shown, "Other", 2, (0.0, 1.0), ("larger", "smaller"))
+    score_term = SCORE_TERMS.get(name)
+    printed_unit = "°" if unit == "deg" else unit
+    return score_term or Term(name, printed_unit, "Other", 2, (0.0, 1.0), ("larger", "smaller"))
 
 
 def change_words(change: Change) -> ChangeWords:
     """Describe a change in words."""
     term = find_term(change.name, change.unit)
     if change.difference is None:
-        said = NOT_ALIKE_WORDS if change.reason == NOT_MEASURED_ALIKE else "not measured in both"
-        return ChangeWords(change.side, "–", "none", said, limit_words(change))
+        text = NOT_ALIKE_WORDS if change.reason == NOT_MEASURED_ALIKE else "not measured in both"
+        return ChangeWords(change.side, "–", "none", text, limit_words(change))
     mark = "none" if change.verdict is None else ""
     if change.verdict in {"real_change", "clinically_relevant"}:
         mark = "up" if change.difference > 0 else "down"
@@ -96,13 +96,13 @@ def limit_words(change: Change) -> tuple[str, ...]:
     """Limits of a parameter with their sources, for any population."""
     term = find_term(change.name, change.unit)
     unit = "" if not term.unit else term.unit if term.unit in "°%" else f"\u202f{term.unit}"
-    said = []
+    sentences = []
     if change.limit is not None:
         people = f" ({change.people})" if change.people else ""
-        said.append(f"MDC {format_limit(change.limit, term)}{unit}: {change.limit_source}{people}.")
+        sentences.append(f"MDC {format_limit(change.limit, term)}{unit}: {change.limit_source}{people}.")
     if change.mcid is not None:
-        said.append(f"MCID {format_limit(change.mcid, term)}{unit}: {change.mcid_source}.")
-    return tuple(said)
+        sentences.append(f"MCID {format_limit(change.mcid, term)}{unit}: {change.mcid_source}.")
+    return tuple(sentences)
 
 
 def format_limit(limit: float, term: Term) -> str:
@@ -113,11 +113,11 @@ def format_limit(limit: float, term: Term) -> str:
 def _verdict(change: Change) -> str:
     if change.verdict is None:
         return {TOO_FEW: TOO_FEW_WORDS, UNLIKE: UNLIKE_WORDS}.get(change.reason or "", NO_LIMIT)
-    said = VERDICTS[change.verdict]
+    text = VERDICTS[change.verdict]
     if change.verdict == "real_change" and change.mcid is not None:
-        said += ", smaller than clinically relevant"
+        text += ", smaller than clinically relevant"
     if change.verdict != "within_measurement_error" and change.towards_norm is not None:
-        said += ", towards the norm" if change.towards_norm else ", away from the norm"
+        text += ", towards the norm" if change.towards_norm else ", away from the norm"
     if change.note == "from_standing":
-        said += "; includes how the person stood"
-    return said
+        text += "; includes the standing posture"
+    return text

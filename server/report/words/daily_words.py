@@ -31,14 +31,14 @@ KIND_LABELS: Final[Mapping[ActivityKind, str]] = {
 }
 
 KIND_WORDS: Final[Mapping[ActivityKind, str]] = {
-    "lying": "the trunk is more than 70° from upright and holds still",
+    "lying": "trunk more than 70° from upright and still",
     "sitting": "after a stand-to-sit or before a sit-to-stand, no steps",
     "standing": "after a sit-to-stand, before a stand-to-sit, or between walks, no steps",
-    "walking": "steps in a row, on the level",
-    "stairs_up": "experimental: walking with the trunk leaning forward and rocking",
-    "stairs_down": "experimental: walking with the trunk rocking strongly; most are missed",
-    "unknown": "worn, but the signals contradict each other or say nothing",
-    "non_wear": "no movement for half an hour or longer, not even breathing",
+    "walking": "consecutive steps on level ground",
+    "stairs_up": "experimental: walking with forward trunk inclination and sway",
+    "stairs_down": "experimental: walking with strong trunk sway; most are missed",
+    "unknown": "worn, but the signals are contradictory or inconclusive",
+    "non_wear": "no movement for at least half an hour, not even breathing",
     "gap": "the device stored no samples",
 }
 """How each kind is told, in the words of its definition (docs/science/activity.md)."""
@@ -64,10 +64,10 @@ TRANSITION_LABELS: Final[Mapping[TransitionKind, str]] = {
 }
 
 REFUSALS: Final[Mapping[TransitionRefusal, str]] = {
-    "lean_below_limit": "below the limit: the trunk leaned less than 20°",
-    "chest_did_not_rise": "a bow: the chest did not rise or fall enough",
-    "direction_unclear": "up or down is not clear",
-    "near_lying": "belongs to lying down or getting up",
+    "lean_below_limit": "below the limit: trunk inclination less than 20°",
+    "chest_did_not_rise": "a bow: insufficient rise or fall of the chest",
+    "direction_unclear": "direction unclear",
+    "near_lying": "part of lying down or getting up",
     "while_walking": "amid walking",
 }
 
@@ -78,22 +78,22 @@ def format_hours(minutes: float) -> str:
     return f"{whole // 60}:{whole % 60:02d}"
 
 
-def find_midnight(found: ActivityResult, at_s: float) -> float:
+def find_midnight(activity: ActivityResult, at_s: float) -> float:
     """Start of the day that contains a time, s from the first sample (negative on the first day of a
     clock).
     """
-    return float(np.floor((at_s + _since_midnight(found)) / DAY_S) * DAY_S - _since_midnight(found))
+    return float(np.floor((at_s + _since_midnight(activity)) / DAY_S) * DAY_S - _since_midnight(activity))
 
 
-def clock_label(found: ActivityResult, at_s: float) -> str:
+def clock_label(activity: ActivityResult, at_s: float) -> str:
     """Time of day as "14:05", or hours and minutes since the first sample without a clock."""
-    minutes = int((at_s + _since_midnight(found)) // 60)
+    minutes = int((at_s + _since_midnight(activity)) // 60)
     return f"{minutes // 60 % 24:02d}:{minutes % 60:02d}"
 
 
-def find_day_label(found: ActivityResult, at_s: float) -> str:
+def find_day_label(activity: ActivityResult, at_s: float) -> str:
     """Name of the day that contains a time, empty outside all days."""
-    for i, d in enumerate(found.days):
+    for i, d in enumerate(activity.days):
         if d.start_s <= at_s < d.end_s:
             return day_label(i, d.date)
     return ""
@@ -104,6 +104,10 @@ def day_label(number: int, date: dt.date | None) -> str:
     return f"Day {number + 1}" if date is None else f"{date:%a} {date.day} {date:%b}"
 
 
-def _since_midnight(found: ActivityResult) -> float:
-    at = found.started_at
-    return 0.0 if at is None else at.hour * HOUR_S + at.minute * 60.0 + at.second + at.microsecond * 1e-6
+def _since_midnight(activity: ActivityResult) -> float:
+    start = activity.started_at
+    return (
+        0.0
+        if start is None
+        else start.hour * HOUR_S + start.minute * 60.0 + start.second + start.microsecond * 1e-6
+    )

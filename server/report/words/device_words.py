@@ -14,9 +14,9 @@ from sagittal.server.report.words.wording import format_number
 from sagittal.web.words import day
 
 NOT_MEASURED: Final = {
-    "no_rest": "It was never at rest for a second. Let the person stand still at the start.",
-    "no_gyroscope": "It sent no rate of turn.",
-    "unit_suspect": "What it reads at rest cannot be gravity. Check the unit of the export.",
+    "no_rest": "It was never still for one second. Ask the person to stand still at the start.",
+    "no_gyroscope": "It sent no angular rate.",
+    "unit_suspect": "Its reading at rest is not gravity. Check the unit of the export.",
 }
 """Reason of a check → a sentence."""
 
@@ -24,8 +24,8 @@ ADVICE: Final = {
     "gyro_bias": "Let it warm up for ten minutes and record again; if it stays, recalibrate it.",
     "scale": "Let it warm up for ten minutes and record again; if it stays, recalibrate its accelerometer.",
     "scale_off": "Recalibrate its accelerometer.",
-    "gyro_noise": "Check strap and case. A trembling wearer does this too.",
-    "acc_noise": "Check strap and case. A trembling wearer does this too.",
+    "gyro_noise": "Check strap and case. Tremor of the wearer has the same effect.",
+    "acc_noise": "Check strap and case. Tremor of the wearer has the same effect.",
 }
 """Quantity of a finding → what to do."""
 
@@ -52,15 +52,15 @@ def judge_device(
         return DeviceVerdict("none", "Not measured", (NOT_MEASURED[checks[-1].reason or "no_rest"],))
     late: tuple[str, ...] = ()
     if checks[-1].reason is not None:
-        said = NOT_MEASURED[checks[-1].reason]
-        late = (f"Measured last on {day(days[course.newest])}, not in its newest take. {said}",)
+        cause = NOT_MEASURED[checks[-1].reason]
+        late = (f"Measured last on {day(days[course.newest])}, not in its newest take. {cause}",)
     if course.findings:
-        told = [_tell(f, days) for f in course.findings]
-        others = ["" if what == told[0] else f"{what}. " for what in told]
-        reasons = [f"{what}{ADVICE[f.quantity]}" for what, f in zip(others, course.findings, strict=True)]
-        return DeviceVerdict("warn", told[0], (*reasons, *late))
+        texts = [_tell(f, days) for f in course.findings]
+        prefixes = ["" if text == texts[0] else f"{text}. " for text in texts]
+        reasons = [f"{text}{ADVICE[f.quantity]}" for text, f in zip(prefixes, course.findings, strict=True)]
+        return DeviceVerdict("warn", texts[0], (*reasons, *late))
     if course.compared == 0:
-        return DeviceVerdict("none", "First check", ("There is nothing to compare with yet.", *late))
+        return DeviceVerdict("none", "First check", ("Nothing to compare with yet.", *late))
     return DeviceVerdict("ok", "Steady", late)
 
 
@@ -79,5 +79,5 @@ def _tell(f: DeviceFinding, days: Sequence[dt.date]) -> str:
     if f.quantity == "scale_off":
         way = "much" if f.value > 0 else "little"
         return f"Gravity reads {format_number(100 * abs(f.value), 1)} % too {way}"
-    what = "Gyroscope" if f.quantity == "gyro_noise" else "Accelerometer"
-    return f"{what} noise {format_number(f.value, 1)} times its usual{since}"
+    sensor_kind = "Gyroscope" if f.quantity == "gyro_noise" else "Accelerometer"
+    return f"{sensor_kind} noise {format_number(f.value, 1)} times its usual{since}"

@@ -18,38 +18,42 @@ from sagittal.core.estimators import (
 from sagittal.server.report.words.wording import format_number, place_words
 
 KINDS: Final[Mapping[str, str]] = {"good": "ok", "warn": "warn", "bad": "bad"}
-VERDICTS: Final[Mapping[str, str]] = {"good": "consistent", "warn": "doubtful in part", "bad": "inconsistent"}
-NOT_JUDGED: Final = "does not check itself"
+VERDICTS: Final[Mapping[str, str]] = {
+    "good": "consistent",
+    "warn": "partly unreliable",
+    "bad": "inconsistent",
+}
+NOT_JUDGED: Final = "has no self-check"
 """Of an estimator that has no quantity with a limit."""
 
 REDUCED: Final[Mapping[str, str]] = {
-    "sensor_failed": "reduced: a sensor failed in this take",
-    "not_calibrated": "reduced: which way a sensor faces is not known",
-    "no_standing": "none: no usable standing in this take",
-    "estimator_failed": "reduced: the better estimator could not finish",
+    "sensor_failed": "reduced: a sensor failed in this trial",
+    "not_calibrated": "reduced: the facing direction of a sensor is unknown",
+    "no_standing": "none: no usable quiet standing in this trial",
+    "estimator_failed": "reduced: the preferred estimator could not finish",
 }
 
 QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
-    "joint_residual_mm": ("Joint ends apart", 0, "mm"),
-    "zero_velocity_refused_pct": ("Rests refused", 1, "%"),
-    "contact_pct": ("Foot at rest, of the take", 0, "%"),
-    "longest_moving_s": ("Longest without rest", 1, "s"),
-    "climb_pct": ("Floor rises or falls, of the way", 1, "%"),
-    "gap_s": ("Longest loss", 1, "s"),
-    "start_heading_off_deg": ("First heading off", 0, "°"),
-    "heading_sd_deg": ("Heading uncertain by", 1, "°"),
+    "joint_residual_mm": ("Joint separation", 0, "mm"),
+    "zero_velocity_refused_pct": ("Rejected foot-flat periods", 1, "%"),
+    "contact_pct": ("Foot-flat, share of the trial", 0, "%"),
+    "longest_moving_s": ("Longest time without foot-flat", 1, "s"),
+    "climb_pct": ("Floor inclination, share of the distance", 1, "%"),
+    "gap_s": ("Longest data loss", 1, "s"),
+    "start_heading_off_deg": ("Initial heading error", 0, "°"),
+    "heading_sd_deg": ("Heading uncertainty", 1, "°"),
     "min_eigenvalue": ("Smallest eigenvalue of P", 0, ""),
-    "forward_axis_turned_deg": ("Forward axis turned", 0, "°"),
-    "leg_excess_mm": ("Leg longer than it is", 1, "mm"),
-    "hinge_mm": ("Joint off its hinge", 1, "mm"),
-    "knee_straight_pct": ("Knee straight", 0, "%"),
-    "foot_turned_deg": ("Foot sensor turned", 0, "°"),
+    "forward_axis_turned_deg": ("Anterior axis rotated", 0, "°"),
+    "leg_excess_mm": ("Leg over-extended", 1, "mm"),
+    "hinge_mm": ("Hinge violation", 1, "mm"),
+    "knee_straight_pct": ("Knee fully extended", 0, "%"),
+    "foot_turned_deg": ("Foot sensor rotated", 0, "°"),
     "feet_out_of_place_pct": ("Feet not under the hips", 0, "%"),
-    "phase_off_pct": ("Feet out of step by", 0, "% of a stride"),
-    "toward_foot_mps2": ("Pelvis falls toward the standing foot", 2, "m/s²"),
-    "inner_foot_m": ("Inner foot ahead in turns; up to the limit, sides are undecided", 2, "m/rad"),
-    "pelvis_rise_cm": ("Pelvis rises and sinks by", 0, "cm"),
-    "places_moved_mm": ("Places still moving by", 1, "mm"),
+    "phase_off_pct": ("Deviation from alternation", 0, "% of a stride"),
+    "toward_foot_mps2": ("Pelvis acceleration towards the stance foot", 2, "m/s²"),
+    "inner_foot_m": ("Inner foot ahead in turns; sides undecided up to the limit", 2, "m/rad"),
+    "pelvis_rise_cm": ("Vertical pelvis excursion", 0, "cm"),
+    "places_moved_mm": ("Residual position change", 1, "mm"),
     "pelvis_tilt_sd_deg": ("Pelvis tilt, standard deviation", 1, "°"),
 }
 """Name of a finding → label, decimals, unit."""
@@ -97,20 +101,20 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
     """View of `estimator` in analysis.json; None if the analysis stopped before the poses."""
     if e is None:
         return None
-    name, verdict, asked = str(e["name"]), str(e["verdict"]), str(e["requested"])
+    name, verdict, requested = str(e["name"]), str(e["verdict"]), str(e["requested"])
     reduced = e["reduced"]
-    judged = any(f["warn"] is not None or f["bad"] is not None for f in e["health"])
+    is_judged = any(f["warn"] is not None or f["bad"] is not None for f in e["health"])
     return EstimatorView(
         name=method_label(name),
         meaning=_method_note(name),
         sensors=len(e["sensors"]),
         kind=KINDS[verdict],
-        verdict=VERDICTS[verdict] if judged else NOT_JUDGED,
+        verdict=VERDICTS[verdict] if is_judged else NOT_JUDGED,
         reduced=None if reduced is None else REDUCED.get(reduced, str(reduced)),
         health=_rows(e["health"]),
         choices=(
-            (AUTO, "Automatic: the best for what is worn", asked == AUTO),
-            *((x, choice_label(x), asked == x) for x in e["possible"]),
+            (AUTO, "Automatic: best for the sensors in use", requested == AUTO),
+            *((x, choice_label(x), requested == x) for x in e["possible"]),
         ),
         estimated=_estimated(_told(list_estimated_angles(e), name)),
         paper=BY_METHOD[name].paper if name in BY_METHOD else None,
@@ -119,8 +123,8 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
 
 def method_label(method: str) -> str:
     """Label of `Poses.method`; unchanged if unknown to this version."""
-    known = BY_METHOD.get(method)
-    return known.label if known is not None else NO_FIGURE_LABEL if method == NO_FIGURE else method
+    estimator = BY_METHOD.get(method)
+    return estimator.label if estimator is not None else NO_FIGURE_LABEL if method == NO_FIGURE else method
 
 
 def choice_label(name: str) -> str:
@@ -129,8 +133,8 @@ def choice_label(name: str) -> str:
 
 
 def _method_note(method: str) -> str:
-    known = BY_METHOD.get(method)
-    return known.note if known is not None else NO_FIGURE_NOTE if method == NO_FIGURE else ""
+    estimator = BY_METHOD.get(method)
+    return estimator.note if estimator is not None else NO_FIGURE_NOTE if method == NO_FIGURE else ""
 
 
 def list_estimated_angles(e: Mapping[str, Any] | None) -> frozenset[str]:
@@ -155,10 +159,10 @@ def _estimated(angles: frozenset[str]) -> str:
     joints = sorted({a.split("_")[0] for a in angles})
     sides = {"l": "left", "r": "right"}
     on = sorted({sides[a[-1]] for a in angles if a[-2:] in ("_l", "_r")})
-    who = "both sides" if len(on) > 1 else f"the {on[0]} side" if on else "the pelvis"
+    region = "both sides" if len(on) > 1 else f"the {on[0]} side" if on else "the pelvis"
     return (
-        f"{', '.join(joints).capitalize()} angles of {who} are estimated by the leg model, not measured by "
-        "two sensors: low confidence."
+        f"{', '.join(joints).capitalize()} angles of {region} are estimated by the leg model, not measured "
+        "by two sensors: low confidence."
     )
 
 
@@ -169,9 +173,9 @@ def _rows(health: list[Mapping[str, Any]]) -> tuple[HealthRow, ...]:
         was = worst.get(f["name"])
         if was is None or f["value"] is None or (was["value"] is not None and f["value"] > was["value"]):
             worst[f["name"]] = f
-    shown = [f for name, f in worst.items() if name not in HIDDEN]
-    shown.sort(key=lambda f: f["warn"] is None and f["bad"] is None)
-    return tuple(_row(f) for f in shown)
+    measures = [f for name, f in worst.items() if name not in HIDDEN]
+    measures.sort(key=lambda f: f["warn"] is None and f["bad"] is None)
+    return tuple(_row(f) for f in measures)
 
 
 def _row(f: Mapping[str, Any]) -> HealthRow:
@@ -179,10 +183,10 @@ def _row(f: Mapping[str, Any]) -> HealthRow:
     label, digits, unit = QUANTITIES.get(name, (name.replace("_", " ").capitalize(), 2, ""))
     gap = "" if unit == "°" else "\u202f"
     limit = f["bad"] if f["warn"] is None else f["warn"]
-    where = " and ".join(place_words(part) for part in str(f["of"] or "").split("-") if part)
+    location = " and ".join(place_words(part) for part in str(f["of"] or "").split("-") if part)
     return HealthRow(
         label=label,
-        where=where,
+        where=location,
         text="not measured"
         if f["value"] is None
         else f"{format_number(float(f['value']), digits)}{gap}{unit}",

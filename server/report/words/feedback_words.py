@@ -53,8 +53,8 @@ def target_words(content: Prescription) -> str:
     if t.mean is None or t.sd is None:
         return SOURCE_WORDS[t.source]
     digits = digits_of(content)
-    who = "entered" if t.source == "manual" else t.words or SOURCE_WORDS[t.source]
-    return f"{format_number(t.mean, digits)} ± {format_quantity(t.sd, term, digits)}, {who}"
+    origin = "entered" if t.source == "manual" else t.words or SOURCE_WORDS[t.source]
+    return f"{format_number(t.mean, digits)} ± {format_quantity(t.sd, term, digits)}, {origin}"
 
 
 def prescription_words(content: Prescription) -> list[tuple[str, str]]:
@@ -75,59 +75,59 @@ def schedule_words(content: Prescription) -> str:
     """Schedule of strides with feedback, in words."""
     s = content.schedule
     if s.kind == "every":
-        said = "every stride"
+        text = "every stride"
     else:
         shares = " → ".join(f"{p}{NBSP}%" for p in s.shares_pct)
-        said = f"{shares} of the strides"
+        text = f"{shares} of the strides"
         if len(s.shares_pct) > 1:
-            said = f"{shares} of the strides, {s.strides_per_share} strides each"
+            text = f"{shares} of the strides, {s.strides_per_share} strides each"
     if s.probe_every is not None:
-        said += f"; after every {s.probe_every}, {s.probe_strides} without"
+        text += f"; after every {s.probe_every}, {s.probe_strides} without"
     if s.retention_strides:
-        said += f"; a visit after a training begins with {s.retention_strides} without"
-    return said
+        text += f"; a visit after a training starts with {s.retention_strides} without"
+    return text
 
 
 def _zone(content: Prescription) -> str:
-    return f"target ± {content.band_sd:g} SD; one level is {content.progression.sd_per_level:g} SD wider"
+    return f"target ± {content.band_sd:g} SD; each level is {content.progression.sd_per_level:g} SD wider"
 
 
 def _shown(content: Prescription) -> str:
-    said = ", ".join(MODE_WORDS[m] for m in content.modes)
+    text = ", ".join(MODE_WORDS[m] for m in content.modes)
     if content.positive_only:
-        return f"{said}; only strides in the zone"
-    return f"{said}; only strides outside the zone" if content.bandwidth else said
+        return f"{text}; only strides in the zone"
+    return f"{text}; only strides outside the zone" if content.bandwidth else text
 
 
 def _level(content: Prescription) -> str:
     p = content.progression
-    start = "as hard as the last walk allows" if p.start_level is None else f"at level {p.start_level}"
+    start = "as difficult as the last walk allows" if p.start_level is None else f"at level {p.start_level}"
     if not p.automatic:
-        return f"begins {start}; changed by hand"
+        return f"starts {start}; changed manually"
     return (
-        f"begins {start}; harder when more than {100 * p.share:g}{NBSP}% of {p.window} strides are in the "
-        f"zone, easier when more than {100 * p.away_share:g}{NBSP}% are far off"
+        f"starts {start}; harder when more than {100 * p.share:g}{NBSP}% of {p.window} strides are in the "
+        f"zone, easier when more than {100 * p.away_share:g}{NBSP}% are far off target"
     )
 
 
 def _ends(content: Prescription) -> str:
     r = content.stop_rule
-    said = []
+    conditions = []
     if r.max_minutes is not None:
-        said.append(f"after {r.max_minutes:g} min")
+        conditions.append(f"after {r.max_minutes:g} min")
     if r.max_strides is not None:
-        said.append(f"after {r.max_strides} {plural(r.max_strides, 'stride', 'strides')}")
+        conditions.append(f"after {r.max_strides} {plural(r.max_strides, 'stride', 'strides')}")
     if r.gps_rise_deg is not None:
-        said.append(f"when the sagittal profile score rises by {r.gps_rise_deg:g}°")
-    return ", ".join(said) or "when the therapist ends it"
+        conditions.append(f"when the sagittal profile score rises by {r.gps_rise_deg:g}°")
+    return ", ".join(conditions) or "when the therapist stops it"
 
 
 def _watched(content: Prescription) -> str:
     g, term = content.guard, parameter_term(content.parameter)
-    said = []
+    parts = []
     if content.side is not None:
         limit = "its MDC" if g.other_change is None else format_quantity(g.other_change, term)
-        said.append(f"a change of the other side by {limit}")
+        parts.append(f"a change of the other side by {limit}")
     if g.gps_rise_deg is not None:
-        said.append(f"a rise of the sagittal profile score by {g.gps_rise_deg:g}°")
-    return ", ".join(said) or "nothing"
+        parts.append(f"a rise of the sagittal profile score by {g.gps_rise_deg:g}°")
+    return ", ".join(parts) or "nothing"

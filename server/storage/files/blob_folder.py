@@ -102,9 +102,9 @@ class FolderBlobs(BlobStore):
     def _age_of(self, one: BlobFile) -> float | None:
         return age_of(self.find_path(one))
 
-    def discard(self, found: Iterable[BlobFile]) -> None:
+    def discard(self, blob_files: Iterable[BlobFile]) -> None:
         """See BlobStore; names may be arbitrary."""
-        for one in found:
+        for one in blob_files:
             fs.remove_file(self.find_path(one))
 
     def remove(self, space: str, *names: str) -> None:

@@ -206,17 +206,17 @@ class BlobStore(ABC):
 
     def is_older(self, one: BlobFile, age_s: float) -> bool:
         """Whether a listed file still exists and has not been rewritten since."""
-        found = age_of(self.incoming / one.name) if one.space == INCOMING else self._age_of(one)
-        return found is not None and found >= age_s
+        age = age_of(self.incoming / one.name) if one.space == INCOMING else self._age_of(one)
+        return age is not None and age >= age_s
 
     @abstractmethod
     def _age_of(self, one: BlobFile) -> float | None:
         """Seconds since a stored file was written; None = it is missing."""
 
-    def discard(self, found: Iterable[BlobFile]) -> None:
+    def discard(self, blob_files: Iterable[BlobFile]) -> None:
         """Permanently remove listed files."""
         of_spaces: dict[str, list[str]] = {}
-        for one in found:
+        for one in blob_files:
             if one.space == INCOMING:
                 fs.remove_file(self.incoming / one.name)
             else:

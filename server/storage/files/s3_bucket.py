@@ -164,9 +164,9 @@ class _AbsentError(Exception):
 
 def _shorten(text: str) -> str:
     """Message of the store's response, or of the failure to reach it."""
-    said = re.search(r"<Code>(.*?)</Code>\s*(?:<Message>(.*?)</Message>)?", text)
-    if said is not None:
-        return ": ".join(part for part in said.groups() if part)[:300]
+    match = re.search(r"<Code>(.*?)</Code>\s*(?:<Message>(.*?)</Message>)?", text)
+    if match is not None:
+        return ": ".join(part for part in match.groups() if part)[:300]
     return text.split("\n", 1)[0].strip()[:300]
 
 

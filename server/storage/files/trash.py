@@ -58,19 +58,19 @@ class Trash(ABC):
         """All files, oldest first; foreign files and those that disappear meanwhile are skipped."""
 
     @abstractmethod
-    def prepare(self, found: Collection[Address], at: dt.datetime) -> None:
+    def prepare(self, addresses: Collection[Address], time: dt.datetime) -> None:
         """Do the time-consuming part of `take`, which is called under a lock."""
 
     @abstractmethod
-    def take(self, found: Collection[Address], at: dt.datetime) -> None:
+    def take(self, addresses: Collection[Address], time: dt.datetime) -> None:
         """Move prepared files here; durable only after `settle`."""
 
     @abstractmethod
-    def forget(self, found: Collection[Address], at: dt.datetime) -> None:
+    def forget(self, addresses: Collection[Address], time: dt.datetime) -> None:
         """Undo `prepare` for files not taken."""
 
     @abstractmethod
-    def settle(self, found: Collection[Address], at: dt.datetime) -> None:
+    def settle(self, addresses: Collection[Address], time: dt.datetime) -> None:
         """Make the effects of `take` durable."""
 
     @abstractmethod
@@ -86,7 +86,7 @@ class Trash(ABC):
         """Permanently and durably remove these files of a space; None = the whole space."""
 
     @abstractmethod
-    def drop(self, found: Collection[TrashedFile]) -> None:
+    def drop(self, trashed: Collection[TrashedFile]) -> None:
         """Permanently remove files."""
 
     def expire(self, now: dt.datetime) -> int:
@@ -101,15 +101,15 @@ class Trash(ABC):
         """Clean up after files have been removed."""
 
 
-def name_stamp(at: dt.datetime) -> str:
+def name_stamp(time: dt.datetime) -> str:
     """Format `<when>`."""
-    return at.astimezone(dt.UTC).strftime(_STAMP)
+    return time.astimezone(dt.UTC).strftime(_STAMP)
 
 
 def parse_way(way: str, size: int) -> TrashedFile | None:
     """The file at `<when>/<space>/<sha256>`; None if the path is foreign."""
-    stamp, _, rest = way.partition("/")
-    space, _, name = rest.partition("/")
+    stamp, _, tail = way.partition("/")
+    space, _, name = tail.partition("/")
     since = _parse_stamp(stamp)
     if since is None or not (_SPACE.fullmatch(space) and _NAME.fullmatch(name)):
         return None
@@ -118,10 +118,10 @@ def parse_way(way: str, size: int) -> TrashedFile | None:
 
 def _parse_stamp(name: str) -> dt.datetime | None:
     try:
-        at = dt.datetime.strptime(name, _STAMP).replace(tzinfo=dt.UTC)
+        time = dt.datetime.strptime(name, _STAMP).replace(tzinfo=dt.UTC)
     except ValueError:
         return None
-    return at if name_stamp(at) == name else None
+    return time if name_stamp(time) == name else None
 
 
 class FolderTrash(Trash):
@@ -150,23 +150,23 @@ class FolderTrash(Trash):
                     if _NAME.fullmatch(path.name) and (size := _size(path)) is not None:
                         yield TrashedFile(folder.name, path.name, size, since)
 
-    def prepare(self, found: Collection[Address], at: dt.datetime) -> None:
+    def prepare(self, addresses: Collection[Address], time: dt.datetime) -> None:
         """See Trash; a rename requires no preparation."""
 
-    def take(self, found: Collection[Address], at: dt.datetime) -> None:
+    def take(self, addresses: Collection[Address], time: dt.datetime) -> None:
         """See Trash."""
-        for space, name in found:
-            fs.move_file(self._blobs / space / name, self._folder(at) / space / name)
+        for space, name in addresses:
+            fs.move_file(self._blobs / space / name, self._folder(time) / space / name)
 
-    def forget(self, found: Collection[Address], at: dt.datetime) -> None:
+    def forget(self, addresses: Collection[Address], time: dt.datetime) -> None:
         """See Trash; there is nothing to undo."""
 
-    def settle(self, found: Collection[Address], at: dt.datetime) -> None:
+    def settle(self, addresses: Collection[Address], time: dt.datetime) -> None:
         """See Trash; also writes the list."""
-        if not found:
+        if not addresses:
             return
-        for space in sorted({space for space, _ in found}):
-            fs.sync_folder(self._folder(at) / space)
+        for space in sorted({space for space, _ in addresses}):
+            fs.sync_folder(self._folder(time) / space)
             fs.sync_folder(self._blobs / space)
         self.write_list()
 
@@ -183,21 +183,21 @@ class FolderTrash(Trash):
 
     def remove(self, space: str, names: Iterable[str] | None = None) -> None:
         """See Trash."""
-        wanted = None if names is None else set(names)
+        selected = None if names is None else set(names)
         for stamp, _ in self._stamps():
             folder = stamp / space
             if folder.is_symlink() or not folder.is_dir():
                 continue
-            if wanted is None:
+            if selected is None:
                 fs.remove_folder(folder)
             else:
-                for name in wanted:
+                for name in selected:
                     fs.remove_file(folder / name)
                 fs.sync_folder(folder)
 
-    def drop(self, found: Collection[TrashedFile]) -> None:
+    def drop(self, trashed: Collection[TrashedFile]) -> None:
         """See Trash."""
-        for one in found:
+        for one in trashed:
             fs.remove_file(self.path(one))
         self.tidy()
 
@@ -220,17 +220,17 @@ class FolderTrash(Trash):
         head = "# Stored files that the database does not know: since, removed on, bytes, place.\n"
         fs.write_file(self.root / "list.txt", (head + "".join(lines)).encode())
 
-    def _folder(self, at: dt.datetime) -> Path:
-        return self.root / name_stamp(at)
+    def _folder(self, time: dt.datetime) -> Path:
+        return self.root / name_stamp(time)
 
     def _stamps(self) -> list[tuple[Path, dt.datetime]]:
         """Folders and their times, oldest first."""
-        found = []
+        stamps = []
         for path in sorted(self.root.iterdir()) if self.root.is_dir() else ():
             since = _parse_stamp(path.name)
             if since is not None and path.is_dir() and not path.is_symlink():
-                found.append((path, since))
-        return found
+                stamps.append((path, since))
+        return stamps
 
 
 def _entries(folder: Path) -> list[Path]:
@@ -244,7 +244,7 @@ def _entries(folder: Path) -> list[Path]:
 def _size(path: Path) -> int | None:
     """Size of a file in bytes; None if it is not a file or has disappeared."""
     try:
-        found = path.lstat()
+        status = path.lstat()
     except FileNotFoundError:
         return None
-    return found.st_size if stat.S_ISREG(found.st_mode) else None
+    return status.st_size if stat.S_ISREG(status.st_mode) else None

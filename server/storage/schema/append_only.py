@@ -21,15 +21,15 @@ def write_triggers(dialect: str, table: str, verbs: tuple[str, ...], sentence: s
             for verb in verbs
         )
     call = f"EXECUTE FUNCTION refuse_change('{sentence}')"
-    made = [
+    statements = [
         f"CREATE TRIGGER {table}_no_{verb.lower()} BEFORE {verb} ON {table} FOR EACH ROW {call}"
         for verb in verbs
     ]
     if "DELETE" in verbs:
-        made.append(
+        statements.append(
             f"CREATE TRIGGER {table}_no_truncate BEFORE TRUNCATE ON {table} FOR EACH STATEMENT {call}"
         )
-    return (_REFUSE, *made)
+    return (_REFUSE, *statements)
 
 
 def make_append_only(table: Table, verbs: tuple[str, ...], sentence: str) -> None:

@@ -23,7 +23,7 @@ from sqlalchemy import (
     TypeDecorator,
 )
 
-from sagittal.web.user_text import UserText, mark_user_text
+from sagittal.core.user_text import UserText, mark_user_text
 
 Made = TypeVar("Made")
 

@@ -107,11 +107,11 @@ class LiveFigure:
         if rows is not None and self._reference is not None:
             # the ghost is one frame more of the same layout
             q, p = np.concatenate((q, q)), np.concatenate((p, p))
-            other = self._reference.at(moment.phase, (x, y), heading)
+            ghost_pose = self._reference.at(moment.phase, (x, y), heading)
             # a trunk that only the person has hangs on the ghost's pelvis as on the person's
-            p[1] = _BURIED if other is None else other[1][0]
-            if other is not None:
-                q[1, rows], p[1, rows] = other
+            p[1] = _BURIED if ghost_pose is None else ghost_pose[1][0]
+            if ghost_pose is not None:
+                q[1, rows], p[1, rows] = ghost_pose
         ghost = rows is not None
         key = (segments, moment.method, ghost)
         layout = self._layout

@@ -103,14 +103,14 @@ class _Trail:
         self._next = 0
         self._last: Vector | None = None
 
-    def push(self, t_s: float, at: Vector) -> None:
+    def push(self, t_s: float, point: Vector) -> None:
         if self._last is None:
-            self._last = at
-        elif dist(at, self._last) >= PIECE_M:
+            self._last = point
+        elif dist(point, self._last) >= PIECE_M:
             self._t_s[self._next] = t_s
-            self._pieces[self._next] = self._last, at
+            self._pieces[self._next] = self._last, point
             self._next = (self._next + 1) % PIECES
-            self._last = at
+            self._last = point
 
     def lose(self) -> None:
         self._last = None
@@ -175,9 +175,9 @@ class _Steps:
         """Show a footprint at rest; while the foot keeps moving, its last print is updated."""
         last = (self._next - 1) % PRINTS
         place = self._rest[0]
-        again = self._scale[last] > 0 and np.hypot(*(self._position[last] - place)[:2]) <= SAME_M
-        self._shown = last if again else self._next
-        if not again:
+        is_same = self._scale[last] > 0 and np.hypot(*(self._position[last] - place)[:2]) <= SAME_M
+        self._shown = last if is_same else self._next
+        if not is_same:
             self._next = (self._next + 1) % PRINTS
         self._put(self._shown)
 

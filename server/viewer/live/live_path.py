@@ -41,15 +41,15 @@ class LivePath:
             self._early.add(self._late.drop())
         while self._early.samples and self._early.samples[0][0] <= t_s - 2 * ROOT_WINDOW_S:
             self._early.drop()
-        now, *at = self._late.mean()
+        now, *position = self._late.mean()
         if self._early.samples and self._early.samples[0][0] <= t_s - 1.5 * ROOT_WINDOW_S:
             # both windows by what is in them: the older one may not be full yet
-            before, *was = self._early.mean()
-            share = (t_s - now) / (now - before)
-            at = [a + (a - b) * share for a, b in zip(at, was, strict=True)]
-        off_x, off_y = at[0] - x, at[1] - y
+            earlier, *was = self._early.mean()
+            share = (t_s - now) / (now - earlier)
+            position = [a + (a - b) * share for a, b in zip(position, was, strict=True)]
+        off_x, off_y = position[0] - x, position[1] - y
         share = min(1.0, NEAR_M / (hypot(off_x, off_y) or NEAR_M))
-        return x + share * off_x, y + share * off_y, at[2]
+        return x + share * off_x, y + share * off_y, position[2]
 
     def _clear(self) -> None:
         self._late, self._early = _Window(), _Window()

@@ -67,7 +67,7 @@ class LiveReference:
         newest = strides[-1] if strides else b""
         if newest is not self._last:
             self._last = newest
-            self._strides = {told.n: told for told in map(_told, strides)}
+            self._strides = {feed_stride.n: feed_stride for feed_stride in map(_told, strides)}
             self._walks.clear()
         key = str(choice)
         if key not in self._walks:
@@ -89,8 +89,8 @@ class LiveReference:
 
     def _norm(self) -> Mapping[str, Floats]:
         """Curves of healthy adults at the speed of recent strides."""
-        told = list(self._strides.values())[-SPEED_OF:]
-        speeds = [v for s in told if (v := s.values.get("gait_speed_mps")) is not None]
+        strides = list(self._strides.values())[-SPEED_OF:]
+        speeds = [v for s in strides if (v := s.values.get("gait_speed_mps")) is not None]
         speed = float(np.mean(speeds)) if len(speeds) >= SPEED_FROM else None
         norm = self._norm_at(None if speed is None else SPEED_STEP_MPS * round(speed / SPEED_STEP_MPS))
         return norm if all(name in norm for name in SAGITTAL) else {}
@@ -102,8 +102,8 @@ def average_curves(strides: Iterable[FeedStride]) -> dict[str, Floats]:
     if not last:
         return {}
     shared = set.intersection(*(set(curves) for curves in last))
-    found = {name: np.array([curves[name] for curves in last], np.float64).mean(axis=0) for name in shared}
-    return {name: np.radians(mean) for name, mean in found.items() if np.isfinite(mean).all()}
+    means = {name: np.array([curves[name] for curves in last], np.float64).mean(axis=0) for name in shared}
+    return {name: np.radians(mean) for name, mean in means.items() if np.isfinite(mean).all()}
 
 
 def find_standing_angles(moment: FigureMoment, angles_deg: Mapping[str, float | None]) -> dict[str, float]:
@@ -119,10 +119,10 @@ def find_standing_angles(moment: FigureMoment, angles_deg: Mapping[str, float | 
                 abc = cardan_zxy(multiply(conjugate(q[proximal]), q[distal])).tolist()
                 for (name, right, left), x in zip(SIGNS[joint], abc, strict=True):
                     raw[f"{name}_{SUFFIX[side]}"] = (right if side == "right" else left) * x
-    found = {
+    offsets = {
         name: x - np.radians(now) for name, x in raw.items() if (now := angles_deg.get(name)) is not None
     }
-    return {name: float((x + np.pi) % (2 * np.pi) - np.pi) for name, x in found.items()}
+    return {name: float((x + np.pi) % (2 * np.pi) - np.pi) for name, x in offsets.items()}
 
 
 def _other(side: Side) -> Side:

@@ -106,18 +106,18 @@ class ReplayFigure:
 
     def set_ghost(self, name: GhostName | None) -> bool:
         """Overlay another walk, None = none; return whether it is available."""
-        found = self._motion.ghosts.get(name, lambda: None)() if name is not None else None
+        overlay = self._motion.ghosts.get(name, lambda: None)() if name is not None else None
         for part in self._ghost.values():
             part.handle.remove()
-        self._matched, self._ghost = found, {}
-        if found is not None:
+        self._matched, self._ghost = overlay, {}
+        if overlay is not None:
             # each has names of its own: under a name in use the client may keep an older shader
             x, y = self._middle.tolist()
-            self._ghost = draw_ghost(self._server.scene, found.batches, f"_{name}", (x, y))
+            self._ghost = draw_ghost(self._server.scene, overlay.batches, f"_{name}", (x, y))
             for part in self._ghost.values():
                 part.handle.batched_colors = colour_copies(part.batch, self._dark, ghost=True)
         self.pose(self._t_s)
-        return found is not None
+        return overlay is not None
 
     def set_ground(self, visible: bool) -> None:
         """Show or hide footprints and trails."""
@@ -132,11 +132,11 @@ def _whole(motion: ReplayMotion) -> CameraShot:
     right /= np.linalg.norm(right)
     half = np.append(np.ptp(motion.root, axis=0) / 2, motion.size) + 0.2
     corners = half * np.stack(np.meshgrid(*[(-1, 1)] * 3), axis=-1).reshape(-1, 3)
-    across, up, ahead = (corners @ np.stack((right, np.cross(right, sight), sight)).T).T
+    horizontal, up, ahead = (corners @ np.stack((right, np.cross(right, sight), sight)).T).T
     # how far back the eye must be for a corner to be inside a square picture of this angle
-    back = np.maximum(abs(across), abs(up)) / np.tan(FOV_RAD / 2) - ahead
-    at = np.array([0.0, 0.0, motion.size])
-    x, y, z = at - back.max() * sight
+    back = np.maximum(abs(horizontal), abs(up)) / np.tan(FOV_RAD / 2) - ahead
+    target = np.array([0.0, 0.0, motion.size])
+    x, y, z = target - back.max() * sight
     return CameraShot(
-        (0.0, 0.0, at[2]), (float(x), float(y), float(z)), fade=2.5 * float(back.max()), section=5.0
+        (0.0, 0.0, target[2]), (float(x), float(y), float(z)), fade=2.5 * float(back.max()), section=5.0
     )

@@ -45,9 +45,9 @@ class ReplayFloor:
 
     def show(self, t_s: float, recent: bool) -> None:
         """Show the marks up to a time, all of them or the last strides."""
-        for part, shown in self._shown.items():
+        for part, state in self._shown.items():
             count = int(np.searchsorted(part.t_s, t_s, side="right"))
-            if (count, recent) != shown:
+            if (count, recent) != state:
                 part.show(count, recent)
                 self._shown[part] = (count, recent)
 

@@ -33,8 +33,8 @@ def find_references(
 
     @cache
     def find_norm() -> GhostMotion | None:
-        known = find_norms(patient, this.session, reviewed.read_numbers(this.found, this.edits))
-        return match({name: np.radians(band.mean_deg) for name, band in known.bands.items()}, "left")
+        norms = find_norms(patient, this.session, reviewed.read_numbers(this.found, this.edits))
+        return match({name: np.radians(band.mean_deg) for name, band in norms.bands.items()}, "left")
 
     @cache
     def find_side(side: Side) -> GhostMotion | None:
@@ -51,5 +51,5 @@ def _average_side(reviewed: ReviewedAnalyses, this: AnalysedSession, side: Side)
         return {}
     cycles = cycle_curves(bundle.angles, bundle.strides)
     means = {name: mean_curve(cycles, name, side).mean for name in cycles.curves}
-    known = {name: x for name, x in means.items() if x is not None and np.isfinite(x).all()}
-    return add_standing_angles(known, bundle.angles.zero_offset, side)
+    finite = {name: x for name, x in means.items() if x is not None and np.isfinite(x).all()}
+    return add_standing_angles(finite, bundle.angles.zero_offset, side)

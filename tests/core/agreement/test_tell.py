@@ -62,7 +62,7 @@ def test_a_drift_has_a_direction(change_s: float, which: str) -> None:
 def test_an_exchange_names_its_pairs() -> None:
     sensor_exchange = SensorExchange((("thigh_l", "thigh_r"), ("foot_l", "foot_r")), 1.5, None)
     assert say_exchange(sensor_exchange) == (
-        "The joints show that sensors are exchanged: thigh_l with thigh_r and foot_l with foot_r."
+        "Joint motion shows that sensors are swapped: thigh_l with thigh_r and foot_l with foot_r."
     )
     text = tell_exchange(sensor_exchange, ExchangeParams())
     assert (text.code, text.sensor) == ("sensors_exchanged", "thigh_l")

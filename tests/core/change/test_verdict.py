@@ -115,7 +115,7 @@ def test_few_wild_strides_widen_the_limit() -> None:
     (result,) = parameter_changes([initial], [final])
     assert result.limit is not None
     assert result.limit > 0.067
-    assert result.limit_source == "strides and measurement of the two sessions, 95 %"
+    assert result.limit_source == "strides and measurement of the two visits, 95 %"
     many = [summarise_values("step_length_m", "left", [m - 0.01, m + 0.01] * 30, "m") for m in (0.40, 0.50)]
     (steady,) = parameter_changes([many[0]], [many[1]])
     assert (steady.limit, steady.verdict) == (0.067, "real_change")

@@ -124,12 +124,12 @@ async def test_unlike_walks_side_by_side_say_so_and_claim_no_change(clinic: Clin
     assert value["comparable"] is False
     assert "own pace, then fast" in value["cautions"][0]
     assert [c["condition"]["pace"] for c in (value["before"], value["after"])] == ["comfortable", "fast"]
-    target = [c for c in value["changes"] if c["difference"] is not None]
-    assert target
-    assert {(c["verdict"], c["towards_norm"]) for c in target} == {(None, None)}
-    assert {c["words"] for c in target} == {"not judged, the conditions differ"}
+    there = [c for c in value["changes"] if c["difference"] is not None]
+    assert there
+    assert {(c["verdict"], c["towards_norm"]) for c in there} == {(None, None)}
+    assert {c["words"] for c in there} == {"not assessed: the conditions differ"}
     page = await _get(clinic, f"/sessions/{fast}/compare/{own}")
-    assert "No change is judged" in page
+    assert "Changes not assessed" in page
     assert "real change" not in page.lower()
     rows = csv.DictReader(io.StringIO(await _get(clinic, f"{API}/sessions/{fast}/compare/{own}/changes.csv")))
     assert {(r["verdict"], r["reason"]) for r in rows if r["change"]} == {("", "conditions_differ")}
@@ -144,7 +144,7 @@ async def test_walks_of_unstated_condition_are_compared_with_a_caution(clinic: C
     response = await _get(clinic, f"{API}/sessions/{two}/compare/{one}")
     assert response["comparable"] is True
     assert response["cautions"] == [
-        "Not stated in either session: pace, aid, orthosis, shoes. They are taken to be alike."
+        "Not stated for either visit: pace, aid, orthosis, shoes. Assumed to be the same."
     ]
     assert await _since(clinic, two) == one
     assert "condition not stated" in await _get(clinic, f"/patients/{patient}")
@@ -263,16 +263,16 @@ async def test_the_take_that_counts_says_whether_there_was_feedback(clinic: Clin
     session, second = feedback.visit(clinic, patient, 0), feedback.visit(clinic, patient, 1, feedback=True)
     view = Cue(1, "left", 1.0, 2.0, 64.0, 0.0, "in", True, None, 0, 63.0, 65.0)
     hidden = replace(view, shown=False, why_not="probe")
-    for position, cue, noted in (
+    for at, cue, noted in (
         (session, hidden, False),
         (session, view, True),
         (session, hidden, False),  # recorded once more without feedback
         (second, hidden, True),  # somebody said so, and no take says otherwise
     ):
-        take = feedback.take(clinic, position, prescription, [cue])
+        take = feedback.take(clinic, at, prescription, [cue])
         with clinic.db.write() as c:
             live_training.settle_feedback(c, None, live.get(c, take))
-            assert sessions.get(c, position).feedback is noted
+            assert sessions.get(c, at).feedback is noted
     with clinic.db.write() as c:
         live_training.note_feedback(c, [take.id for take in live.takes_of(c, session)])
         assert sessions.get(c, session).feedback is True
@@ -285,7 +285,7 @@ async def test_paper_has_the_sentences_that_its_numbers_refer_to_the_changes_and
     patient = feedback.person(clinic)
     first, later = feedback.walked(clinic, patient, 0, **OWN), feedback.walked(clinic, patient, 7, **OWN)
     screen, paper = [await _get(clinic, f"/sessions/{later}{page}") for page in ("", "/print")]
-    for words in ("What stands out", "Changed since 2 Mar 2026", "Sagittal profile score"):
+    for words in ("Findings", "Changed since 2 Mar 2026", "Sagittal profile score"):
         assert words in paper
         assert words in screen
     begins = paper.index("r-tbl params")

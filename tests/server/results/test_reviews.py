@@ -40,8 +40,10 @@ def session_of(clinic: Clinic) -> str:
     return session
 
 
-def make(clinic: Clinic, session: str, edit: Edit, seen: int | None = None) -> edit_log.EditHistory:
-    return reviews.make(clinic.db, clinic.app.state.reviewed, None, session, edit, seen=seen)[1]
+def make(clinic: Clinic, session: str, edit: Edit, observations: int | None = None) -> edit_log.EditHistory:
+    return reviews.make(clinic.db, clinic.app.state.reviewed, None, session, edit, base_version=observations)[
+        1
+    ]
 
 
 def rows(clinic: Clinic) -> list[str]:

@@ -57,21 +57,21 @@ async def test_off_until_there_is_a_key(tmp_path: Path) -> None:
 
 async def test_written_read_changed_and_taken_away(ward: tuple[Clinic, str, str]) -> None:
     clinic, pid, _ = ward
-    address = f"{API}/patients/{pid}/identity"
+    here = f"{API}/patients/{pid}/identity"
     async with clinic.client("clinician") as client:
-        assert (await client.get(address)).json() == dict.fromkeys([*WHO, "changed_at"])
-        response = await client.patch(address, json=WHO)
+        assert (await client.get(here)).json() == dict.fromkeys([*WHO, "changed_at"])
+        response = await client.patch(here, json=WHO)
         assert response.status_code == 200, response.text
         assert {name: response.json()[name] for name in WHO} == WHO
-        assert (await client.get(address)).json() == response.json()
+        assert (await client.get(here)).json() == response.json()
         page = await client.get(f"/patients/{pid}/identity")
         assert f'value="Erika {CANARY}"' in page.text
         assert page.headers["cache-control"] == "no-store"
         assert CANARY not in (await client.get(f"/patients/{pid}")).text
-        gone = await client.patch(address, json={"name": None})
+        gone = await client.patch(here, json={"name": None})
         assert (gone.json()["name"], gone.json()["contact"]) == (None, WHO["contact"])
         for wrong in ({"name": "a\nb"}, {"name": "x" * 201}, {"born_on": "30.4.1951"}, {"shoe": "size 42"}):
-            refused = await client.patch(address, json=wrong)
+            refused = await client.patch(here, json=wrong)
             assert refused.status_code == 422, refused.text
             assert not [v for v in wrong.values() if v in refused.text]
     async with clinic.client("admin") as client:
@@ -84,9 +84,9 @@ async def test_written_read_changed_and_taken_away(ward: tuple[Clinic, str, str]
         async with clinic.client(role) as client:
             assert "Identity" not in (await client.get(f"/patients/{pid}")).text
             for answer in (
-                await client.get(address),
+                await client.get(here),
                 await client.get(f"/patients/{pid}/identity"),
-                await client.patch(address, json=WHO),
+                await client.patch(here, json=WHO),
             ):
                 assert answer.status_code == 403
                 assert CANARY not in answer.text
@@ -106,26 +106,26 @@ async def test_no_token_reads_a_name(ward: tuple[Clinic, str, str]) -> None:
 @pytest.mark.slow
 async def test_the_name_stands_on_paper_only_where_it_was_ticked(ward: tuple[Clinic, str, str]) -> None:
     clinic, pid, sid = ward
-    address = f"/sessions/{sid}/print"
+    here = f"/sessions/{sid}/print"
     async with clinic.client("clinician") as client:
         await client.patch(f"{API}/patients/{pid}/identity", json=WHO)
-        plain = await client.get(address)
-        assert "With the name" in plain.text
+        plain = await client.get(here)
+        assert "With the patient's name" in plain.text
         assert CANARY not in plain.text
-        named = await client.get(address, params={"named": "true"})
+        named = await client.get(here, params={"named": "true"})
         assert f"Erika {CANARY}" in named.text
         assert "report.pdf?named=true" in named.text
-        assert CANARY not in (await client.get(address)).text  # nothing of it was kept
+        assert CANARY not in (await client.get(here)).text  # nothing of it was kept
         signed = (await client.post(f"/sessions/{sid}/report/sign?named=true", json={})).json()["id"]
     with clinic.db.read() as c:
         for name in (DOCUMENT, PSEUDONYMISED):
             document = signed_reports.read_document(c, clinic.app.state.blobs, signed, name)
             assert CANARY.encode() not in document
     async with clinic.client("viewer") as client:
-        visible_response = await client.get(address, params={"named": "true"})
+        visible_response = await client.get(here, params={"named": "true"})
         assert visible_response.status_code == 200
         assert CANARY not in visible_response.text
-        assert "With the name" not in visible_response.text
+        assert "With the patient's name" not in visible_response.text
     async with clinic.client("admin") as client:
         rows = (await client.get(f"{API}/audit")).json()
         assert [r["action"] for r in rows].count("identity.printed") == 1

@@ -145,7 +145,7 @@ async def test_a_visit_without_the_number_has_a_dash_and_the_reason(clinic: Clin
     trend = await read_trend(clinic, late)
     assert trend is not None
     assert trend[1][1:] == ["–", "0.50", "0.58", "", "+0.08 within error MDC 0.15"]
-    reason = "not measured: needs at least 10 strides that count"
+    reason = "not measured: requires at least 10 included strides"
     assert trend[-1] == [f"No value: 23 Sep 2026, {reason}. Gait speed: change since 21 Oct 2026."]
     lacking = await read_trend(clinic, await add_visits(clinic, "T-6", files, [(0.5, {})] * 9 + [(None, {})]))
     assert lacking is not None
@@ -186,7 +186,7 @@ async def test_all_that_the_doctor_reads_stands_on_one_sheet_in_german(
         answer = await client.get(f"/sessions/{session}/report.pdf")
     pages = pypdfium2.PdfDocument(io.BytesIO(answer.content))
     first = plain(pages[0].get_textpage().get_text_range())
-    for target in ("Was auffällt", "Verändert seit", "Ganggeschwindigkeit", "Verlauf gleiche Bedingung",
+    for there in ("Was auffällt", "Verändert seit", "Ganggeschwindigkeit", "Verlauf gleiche Bedingung",
                   "Kein Wert: 11.03.2026", "Knieflexion", "Fußkontakt", "Abstand von der Norm", "Beurteilung",
                   "Unterschrift", "1 / 4"):  # fmt: skip
-        assert target in first, target
+        assert there in first, there

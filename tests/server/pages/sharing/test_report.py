@@ -211,13 +211,13 @@ async def test_a_server_without_the_library_offers_no_pdf(
     environment = TEMPLATES["en"].env
     monkeypatch.setattr(environment, "cache", None)  # a template keeps the globals it was loaded with
     async with clinic.client("clinician") as client:
-        for target in (True, False):
-            monkeypatch.setitem(environment.globals, "makes_pdf", target)
+        for there in (True, False):
+            monkeypatch.setitem(environment.globals, "makes_pdf", there)
             for page in (*pages, f"/patients/{patient}/course"):
                 answer = await client.get(page)
                 assert answer.status_code == 200
-                assert bool(re.search(r"href=\"[^\"]*\.pdf", answer.text)) is target, page
-                assert (page != pages[0]) or (("choose PDF as the printer" in answer.text) is not target)
+                assert bool(re.search(r"href=\"[^\"]*\.pdf", answer.text)) is there, page
+                assert (page != pages[0]) or (("choose PDF as the printer" in answer.text) is not there)
 
 
 @pytest.mark.slow
@@ -264,9 +264,9 @@ async def test_the_pdf_is_light_a4_with_its_foot_on_every_page_and_nothing_fetch
         assert picture[:, :edge].min() > 250
         assert picture[:, -edge:].min() > 250
     with socket.create_server(("127.0.0.1", 0)) as elsewhere:
-        target = f"http://127.0.0.1:{elsewhere.getsockname()[1]}/"
-        asks = f'<link rel="stylesheet" href="{target}"><style>@import "{target}";</style>'
-        assert render_pdf(f'<head>{asks}</head><body><img src="{target}"><img src="file:///etc/passwd">')
+        there = f"http://127.0.0.1:{elsewhere.getsockname()[1]}/"
+        asks = f'<link rel="stylesheet" href="{there}"><style>@import "{there}";</style>'
+        assert render_pdf(f'<head>{asks}</head><body><img src="{there}"><img src="file:///etc/passwd">')
         assert select.select([elsewhere], [], [], 0.0)[0] == []
 
 
@@ -276,7 +276,7 @@ async def test_the_leaflet_tells_the_person_in_plain_words_what_became_of_the_la
     patient, first = await visit(clinic, "S-5")
     single = await page(clinic, f"/sessions/{first}/leaflet", "viewer")
     assert "12.0 metres in ten seconds" in single
-    assert single.count("There is no earlier number to compare with.") == 3
+    assert single.count("There is no earlier value to compare with.") == 3
     assert "estimate" not in single
     later = {"title": "Walk", "performed_on": "2100-01-02"}
     async with clinic.client("clinician") as client:

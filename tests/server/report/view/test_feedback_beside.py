@@ -80,9 +80,9 @@ def test_the_profile_is_judged_by_the_curves_of_the_strides_that_count() -> None
 
 
 def test_effects_in_words_say_the_change_and_the_limit_it_is_held_against() -> None:
-    inside = SideEffect(0.02, 0.10, "set in the prescription", False, None)
+    within = SideEffect(0.02, 0.10, "set in the prescription", False, None)
     beyond = SideEffect(2.04, 1.6, "MCID", True, None)
-    second, profile = describe_effects(prescription(), GuardState(inside, beyond), METRES)
+    second, profile = describe_effects(prescription(), GuardState(within, beyond), METRES)
     assert (second.kind, second.label) == ("ok", "Step length, right")
     assert (second.text, second.words) == (
         f"+0.02{NBSP}m", f"within 0.10{NBSP}m (set in the prescription)"
@@ -104,8 +104,8 @@ def test_what_cannot_be_judged_says_why() -> None:
         prescription(), GuardState(SideEffect(), SideEffect(0.5, reason="no_limit")), METRES
     )
     assert (few.kind, few.text) == ("none", "–")
-    assert few.words == ("not judged: needs 10 strides at the start and 10 after them, on this side")
-    assert (unlimited.kind, unlimited.change, unlimited.words) == ("none", 0.5, "no limit is prescribed")
+    assert few.words == ("not assessed: needs 10 strides at the start and 10 after them, on this side")
+    assert (unlimited.kind, unlimited.change, unlimited.words) == ("none", 0.5, "no limit prescribed")
 
 
 def retained(now: float | None, end: float | None, name: str = NAME) -> Retention | None:
@@ -150,7 +150,7 @@ def test_a_parameter_without_a_known_error_says_so() -> None:
     result = retained(1.2, 1.1, "stride_time_s")
     assert result is not None
     assert (result.limit, result.limit_source) == (None, None)
-    assert result.verdict == "no measurement error of this parameter is known"
+    assert result.verdict == "the measurement error of this parameter is unknown"
 
 
 def test_retention_needs_both_ends() -> None:

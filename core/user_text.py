@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from html import escape
 from typing import Any, Final
-
-from markupsafe import Markup, escape
 
 
 class UserText(str):
@@ -21,13 +20,13 @@ class UserText(str):
 
     __slots__ = ()
 
-    def __html__(self) -> Markup:
-        """Escape the text; the result is plain markup, which templates can join with their own text."""
-        return escape(str(self))
+    def __html__(self) -> str:
+        """Escape the text; templates that join it with their own words leave the result as it is."""
+        return escape(str(self)).replace("&quot;", "&#34;").replace("&#x27;", "&#39;")
 
-    def __radd__(self, before: str) -> UserText:
+    def __radd__(self, prefix: str) -> UserText:
         """Return user text after concatenation with a preceding text."""
-        return UserText(before + str(self))
+        return UserText(prefix + str(self))
 
 
 def _keep_type(name: str) -> Callable[..., Any]:
@@ -66,14 +65,14 @@ def mark_user_text(value: Any) -> Any:
 
 
 def encode_user_text(value: object) -> str:
-    """Return user text as a plain string: the `enc_hook` of msgspec, which writes exact types only.
+    """Return user text or a message as a plain string: the `enc_hook` of msgspec, which knows exact types.
 
     Raises
     ------
     NotImplementedError
         The value is of another type that msgspec does not know.
     """
-    if isinstance(value, UserText):
+    if isinstance(value, str):
         return str(value)
     raise NotImplementedError(f"Objects of type {type(value).__name__} cannot be encoded.")
 
