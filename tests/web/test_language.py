@@ -97,9 +97,9 @@ def test_no_message_of_the_sources_is_guessed(language: str, monkeypatch: pytest
     catalogue = load_catalogue(language)
     guessed: list[str] = []
     monkeypatch.setattr(SentenceFinder, "find", lambda _, text: guessed.append(text))
-    known = {t for _, t in TEMPLATES if t in catalogue.messages}
-    assert len(known) > 200
-    for template in known:
+    reference = {t for _, t in TEMPLATES if t in catalogue.messages}
+    assert len(reference) > 200
+    for template in reference:
         message = Message(template, **dict.fromkeys(PLACEHOLDER.findall(template), 7))
         text = catalogue.translate(message)
         assert not PLACEHOLDER.search(text)
@@ -122,7 +122,7 @@ def test_a_lookup_is_fast(language: str) -> None:
 @pytest.mark.parametrize(
     ("stored", "translation"),
     [
-        ("shank_l has no data in 56 % of the take.", "shank_l hat in 56 % der Aufnahme keine Daten."),
+        ("shank_l has no data for 56 % of the trial.", "shank_l hat in 56 % der Aufnahme keine Daten."),
         ("not reported: not physiologically plausible", "zurückgehalten: so kann niemand gehen"),
     ],
 )
