@@ -122,7 +122,7 @@ def test_a_lookup_is_fast(language: str) -> None:
 @pytest.mark.parametrize(
     ("stored", "translation"),
     [
-        ("shank_l has no data for 56 % of the trial.", "shank_l hat in 56 % der Aufnahme keine Daten."),
+        ("shank_l has no data in 56 % of the take.", "shank_l hat in 56 % der Aufnahme keine Daten."),
         ("not reported: not physiologically plausible", "zurückgehalten: so kann niemand gehen"),
     ],
 )
