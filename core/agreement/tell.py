@@ -33,14 +33,14 @@ def say_lag(lag: SensorLag) -> str:
 
 def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
     """Notice about a late clock and its correction."""
-    said = say_lag(lag)
+    message = say_lag(lag)
     if not lag.sure:
         return Notice(
             "clocks_disagree",
             Message(
                 "{said}. One joint alone shows it, so nothing was shifted. Synchronise the sensors "
                 "and record again.",
-                said=said,
+                said=message,
             ),
             lag.sensors[0],
         )
@@ -48,14 +48,15 @@ def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
         return Notice(
             "sensor_late",
             Message(
-                "{said}. It was left so, as this analysis was told to. Angles beside it are wrong.", said=said
+                "{said}. It was left so, as this analysis was told to. Angles beside it are wrong.",
+                said=message,
             ),
             lag.sensors[0],
         )
     if abs(lag.lag_s) <= params.warn_s:
         return Notice(
             "sensor_late",
-            Message("{said}; its samples were shifted by that. {KEPT}", said=said, KEPT=KEPT),
+            Message("{said}; its samples were shifted by that. {KEPT}", said=message, KEPT=KEPT),
             lag.sensors[0],
             severity="info",
         )
@@ -63,7 +64,7 @@ def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
         "sensor_late",
         Message(
             "{said}; its samples were shifted by that. Synchronise the sensors before the next take. {KEPT}",
-            said=said,
+            said=message,
             KEPT=KEPT,
         ),
         lag.sensors[0],

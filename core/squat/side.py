@@ -15,11 +15,11 @@ def find_squat_sides(recording: UniformRecording) -> tuple[Side, ...]:
     ------
     EstimationError `segments_missing` if no leg has sensors on shank and thigh, or the pelvis has none.
     """
-    worn = tuple(side for side in SIDES if set(leg_segments(side)) <= set(recording.sensors))
-    if not worn:
+    sides = tuple(side for side in SIDES if set(leg_segments(side)) <= set(recording.sensors))
+    if not sides:
         raise EstimationError(
             "segments_missing",
             "Squats need sensors on the pelvis, and on shank and thigh of each leg that squats; wear or map "
             "them.",
         )
-    return worn
+    return sides

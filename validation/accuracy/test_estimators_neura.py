@@ -141,7 +141,9 @@ def test_l7s_from_three_and_two_sensors_is_within_the_limits() -> None:
     kept: dict[str, list[tuple[float, float]]] = {}
     worn: Worn
     for worn in ("3I", "2I"):
-        poses = l7s_poses(orientations, acceleration, steps, BodyModel.from_height(HEIGHT_M), worn=worn)
+        poses = l7s_poses(
+            orientations, acceleration, steps, BodyModel.from_height(HEIGHT_M), configuration=worn
+        )
         _, found = scores(raw_degrees(dict(poses.q)))
         figures = [
             (

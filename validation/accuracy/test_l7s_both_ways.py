@@ -137,7 +137,7 @@ def estimate(
         free_acceleration(of.calibrated, of.orientations),
         steps_of(of.calibrated),
         body or of.body,
-        worn=worn,
+        configuration=worn,
         both_ways=both_ways,
     )
     q = dict(poses.q)
@@ -269,7 +269,7 @@ def reach_errors(worn: Worn, both_ways: bool) -> tuple[Floats, Floats]:
         free_acceleration(of.calibrated, of.orientations),
         steps_of(of.calibrated),
         of.body,
-        worn=worn,
+        configuration=worn,
         both_ways=both_ways,
     )
     near, bent = [], []

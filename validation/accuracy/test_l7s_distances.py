@@ -99,7 +99,7 @@ def paths(calibrated: CalibratedRecording, orientations: Orientations, body: Bod
     acceleration, still = free_acceleration(calibrated, orientations), steps_of(calibrated)
     found: dict[str, Paths] = {}
     for worn in get_args(Worn):
-        poses = l7s_poses(orientations, acceleration, still, body, worn=worn)
+        poses = l7s_poses(orientations, acceleration, still, body, configuration=worn)
         found[f"L7S-{worn}"] = {s: poses.p[FOOT[s]] for s in SIDES}
     run = run_erkf(calibrated, orientations, body, tuple(FOOT.values()), ErkfParams.people())
     found[OWN] = foot_tracks(run, replace_orientations(run, orientations), body).p
