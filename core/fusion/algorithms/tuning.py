@@ -162,7 +162,7 @@ class GainTuner:
             raise EstimationError(
                 "no_magnetometer",
                 Message(
-                    "{label} is to run with a magnetometer, but {why}.",
+                    "{label} is set to use a magnetometer, but {why}.",
                     label=algorithm_entry.label,
                     why=reason,
                 ),
@@ -177,7 +177,7 @@ class GainTuner:
             if not trial.scored.any():
                 raise SignalError(
                     "no_reference",
-                    Message("{name} has no reference while it moves; leave it out.", name=trial.name),
+                    Message("{name} has no reference during movement; exclude it.", name=trial.name),
                 )
         halves = [("train", t) for t in split.train] + [("validate", t) for t in split.validate]
         self._data = {t.name: t.sha256 for _, t in halves}
@@ -247,7 +247,7 @@ class GainTuner:
         verdict = (
             f"Better: {words}."
             if improved
-            else Message("Not better: {words}. Keep the gains it began with.", words=words)
+            else Message("No improvement: {words}. Keep the initial gains.", words=words)
         )
         if improved and worse:
             verdict += f" Worse on {', '.join(worse)}."
