@@ -84,8 +84,8 @@ def test_every_message_is_in_the_third_language(pseudo: Catalogue) -> None:
 def list_words(page: str) -> list[str]:
     """Words that a page shows, without its scripts and drawings."""
     body = re.sub(r"(?s)<(script|style|svg|template)\b.*?</\1>|<!--.*?-->", " ", page)
-    visible_strips = [html.unescape(text).strip() for text in re.findall(r">([^<>]+)<", body)]
-    return [text for text in visible_strips if has_words(text)]
+    visible_texts = [html.unescape(text).strip() for text in re.findall(r">([^<>]+)<", body)]
+    return [text for text in visible_texts if has_words(text)]
 
 
 async def test_pages_are_in_the_third_language(pseudo: Catalogue, tmp_path: Path) -> None:
