@@ -63,9 +63,9 @@ def test_joined_messages_need_no_text_of_their_own(german: Catalogue) -> None:
 
 
 def test_a_template_that_is_not_there_stays_english(german: Catalogue) -> None:
-    other = Message("The clock of {who} is {ms:.1f} ms late.", who="left foot", ms=1.5)
-    assert german.find(other) is None
-    assert german.translate(other) == other
+    second = Message("The clock of {who} is {ms:.1f} ms late.", who="left foot", ms=1.5)
+    assert german.find(second) is None
+    assert german.translate(second) == second
 
 
 def test_a_sentence_stored_without_its_template_is_guessed() -> None:

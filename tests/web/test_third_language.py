@@ -71,9 +71,9 @@ def test_a_language_is_named_by_its_locale(pseudo: Catalogue) -> None:
 
 
 def test_every_message_is_in_the_third_language(pseudo: Catalogue) -> None:
-    known = {template for _, template in TEMPLATES if template in pseudo.messages}
-    assert len(known) > 200
-    for template in known:
+    known_templates = {template for _, template in TEMPLATES if template in pseudo.messages}
+    assert len(known_templates) > 200
+    for template in known_templates:
         message = Message(template, **dict.fromkeys(PLACEHOLDER.findall(template), 7.5))
         text = pseudo.translate(message)
         assert text.startswith(RIGHT_TO_LEFT)
@@ -84,8 +84,8 @@ def test_every_message_is_in_the_third_language(pseudo: Catalogue) -> None:
 def list_words(page: str) -> list[str]:
     """Words that a page shows, without its scripts and drawings."""
     body = re.sub(r"(?s)<(script|style|svg|template)\b.*?</\1>|<!--.*?-->", " ", page)
-    shown = [html.unescape(text).strip() for text in re.findall(r">([^<>]+)<", body)]
-    return [text for text in shown if has_words(text)]
+    visible_texts = [html.unescape(text).strip() for text in re.findall(r">([^<>]+)<", body)]
+    return [text for text in visible_texts if has_words(text)]
 
 
 async def test_pages_are_in_the_third_language(pseudo: Catalogue, tmp_path: Path) -> None:
