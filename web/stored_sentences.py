@@ -176,7 +176,7 @@ class SentenceFinder:
 
     def _fill_pattern(self, pattern: _Pattern, values: Mapping[str, str]) -> str:
         """Fill a message with untranslated values; numbers are localised, except in user text."""
-        replacements: dict[str, str] = {}
+        said: dict[str, str] = {}
         settled: dict[str, str] = {}
         for n, (name, value) in enumerate(values.items()):
             known = value if name in pattern.verbatim else self._known(value)
@@ -236,9 +236,9 @@ class SentenceFinder:
         """Translate consecutive sentences, jointly if they form one message; `partly` = allow unknown
         ones.
         """
-        parts: list[str] = []
-        is_translated = False
-        while sentences and (len(sentences) > 1 or parts):
+        said: list[str] = []
+        found = False
+        while sentences and (len(sentences) > 1 or said):
             for n in range(len(sentences), 0, -1):
                 whole = " ".join(sentences[:n])
                 known = self._exact(whole)
