@@ -128,9 +128,9 @@ MORE_THAN_ONE: Final = (
     # differences beyond measurement error, in steps a minute or in percent of a stride
     "{value} times its usual",
     # shown or refused because there are several
-    "{takes} takes", "in {still} parts", "{segments} sensors are there", "{chosen} visits fit",
-    "{t_s} days; at most", "{days} days, expected", "{value} samples at {rate} Hz", "{value} samples of {id}",
-    "starts again after {wrap} samples",
+    "in {still} parts", "{segments} sensors are available", "{chosen} visits match",
+    "{t_s} days; at most", "{days} days; expected", "{value} samples at {rate} Hz", "samples of {id}",
+    "{count} samples of {device}", "starts again after {wrap} samples",
     "The file has {size} bytes", "announced with {size} bytes", "{offset} of {size} bytes",
     # "4 left and 1 right strides"
     "{cycle_counts} strides",
