@@ -9,14 +9,15 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from sagittal.core.errors import ArchiveError, FormatError, InputError, ManifestError, Notice
-from sagittal.core.formats import _sniff, bids, live_reader, parquet, table, text
+from sagittal.core.formats import _sniff, bids, live_reader, parquet, table, table_guess, text
 from sagittal.core.formats.aliases import segment_named
 from sagittal.core.formats.archive import EPISODE_MANIFEST, ArchiveLimits, expand
 from sagittal.core.formats.common_time import finish
 from sagittal.core.formats.draft import Draft
+from sagittal.core.formats.json_tree import JsonNode
 from sagittal.core.formats.manifest import Manifest, parse_manifest
 from sagittal.core.formats.source import SourceFile, digest_file, sha256
-from sagittal.core.formats.source_spec import SourceSpec
+from sagittal.core.formats.source_spec import SourceSpec, read_source
 from sagittal.core.formats.vendors import cwa, mapping_xml
 from sagittal.core.formats.vendors.device_motion import SIGN_ASSUMED
 from sagittal.core.formats.vendors.registry import find_vendor, list_formats
@@ -52,6 +53,7 @@ class _Upload:
     problems: list[tuple[str, InputError]] = field(default_factory=list)
     notices: list[Notice] = field(default_factory=list)
     sha256: dict[str, str] = field(default_factory=dict)
+    guessed: bool = False
     sidecars: set[str] = field(default_factory=set)
     """Files that say how another one is read."""
 
@@ -178,6 +180,11 @@ def _take(member: SourceFile, spec: SourceSpec | None, upload: _Upload, *, long:
             upload.drafts += table.read_table(data, member.name, spec)
         elif kind == "empty":
             raise FormatError("empty", f"{member.name} is empty; copy or export it again.")
+        elif kind == "table" and (entry := table_guess.guess_entry(member)) is not None:
+            upload.drafts += table.read_table(data, member.name, read_source(JsonNode(entry, "sources")))
+            upload.guessed = True
+            message = f"{member.name} was read without a manifest: {table_guess.describe_entry(entry)}."
+            upload.notices.append(Notice("table_guessed", message, severity="info"))
         elif kind == "table":
             raise FormatError("manifest_needed", _needs_manifest(member.name, data))
         elif kind == "known":
@@ -305,7 +312,8 @@ def _declared(recording: Recording, manifest: Manifest | None, upload: _Upload) 
         segments |= _worn(upload.drafts)
     taken = {s for s in segments.values() if s is not None}
     for device in dict.fromkeys((*recording.streams, *recording.long)):
-        own = segment_named(device) if manifest and manifest.sources and not manifest.sensors else None
+        described = upload.guessed or (manifest is not None and manifest.sources and not manifest.sensors)
+        own = segment_named(device) if described else None
         if own is not None and device not in segments and own not in taken:
             segments[device] = own
             taken.add(own)

@@ -37,13 +37,16 @@ class Channels:
     Parameters
     ----------
     acc, gyr, mag : three names each, x, y, z; a sensor's signals may be spread over several files.
-    quat : four names in the order the source declares.
+    quat : four names in the order the source declares. linear, gravity : acceleration without gravity, and
+        gravity, which are added up where there is no `acc`.
     """
 
     acc: tuple[str, ...] | None = None
     gyr: tuple[str, ...] | None = None
     mag: tuple[str, ...] | None = None
     quat: tuple[str, ...] | None = None
+    linear: tuple[str, ...] | None = None
+    gravity: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -190,11 +193,12 @@ def _rate(node: JsonNode) -> float | None:
 
 
 def _channels(node: JsonNode) -> Channels:
-    node.only("acc", "gyr", "mag", "quat")
+    node.only("acc", "gyr", "mag", "quat", "linear", "gravity")
     acc = node.names("acc", 3)
     gyr, mag, quat = node.names("gyr", 3), node.names("mag", 3), node.names("quat", 4)
-    if acc is None and gyr is None and mag is None:
+    linear, gravity = node.names("linear", 3), node.names("gravity", 3)
+    if not any((acc, gyr, mag, linear, gravity)):
         raise ManifestError(
             "manifest_bad_value", f"{node.path}.acc is missing; name three columns (x, y, z)."
         )
-    return Channels(acc, gyr, mag, quat)
+    return Channels(acc, gyr, mag, quat, linear, gravity)

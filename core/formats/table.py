@@ -222,7 +222,7 @@ def _check(spec: SourceSpec, source: str) -> None:
         raise ManifestError(
             "unknown_column", f"{where} names no columns; say which columns of {source} are which sensor."
         )
-    if spec.acc_unit is None and any(c.acc for c in spec.columns.values()):
+    if spec.acc_unit is None and any(c.acc or c.linear or c.gravity for c in spec.columns.values()):
         raise ManifestError(
             "unit_missing", f"{where}: acc_unit is missing; expected one of {', '.join(ACC_UNITS)}."
         )
@@ -305,10 +305,14 @@ def _sensor(
     wrap = spec.counter.wrap if spec.counter else None
     gyr = None if channels.gyr is None else table.stack(channels.gyr) * GYR_UNITS[spec.gyr_unit or "rad/s"]
     if channels.acc is None:
-        for part, values in (
-            ("gyr", gyr),
-            ("mag", None if channels.mag is None else table.stack(channels.mag)),
-        ):
+        factor = ACC_UNITS[spec.acc_unit or "m/s2"]
+        parts = {
+            "gyr": gyr,
+            "mag": None if channels.mag is None else table.stack(channels.mag),
+            "linear": None if channels.linear is None else table.stack(channels.linear) * factor,
+            "gravity": None if channels.gravity is None else table.stack(channels.gravity) * factor,
+        }
+        for part, values in parts.items():
             if values is not None:
                 yield Draft(
                     device, source, clock, ticks, values, None, None, None, spec.rate_hz, tuple(notices),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -21,8 +22,10 @@ from sagittal.core.formats.archive import expand, is_gzip, is_zip
 from sagittal.core.formats.draft import Draft
 from sagittal.core.formats.source import SourceFile, stem_of
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, SourceSpec
+from sagittal.core.formats.tables.column_names import is_time_name, names_quantity, read_file_kind, read_name
 from sagittal.core.formats.tables.header import find_titles
 from sagittal.core.formats.tables.layout import LINES, find_layout
+from sagittal.core.formats.tables.time_unit import find_tick, measure_step, read_unit
 from sagittal.core.frames import GRAVITY, Floats
 
 PIECE: Final = 1 << 21
@@ -34,32 +37,14 @@ THE_FILE: Final = "*"
 _CELL: Final = 40
 """Characters of a cell that a preview shows."""
 
-_AXIS: Final = re.compile(r"^(?P<rest>.*?)[\s_./\-:]*(?P<axis>[xyzwXYZW]|[0-3])$")
-_CHANNEL: Final = re.compile(r"(?<=[.:_][xyzwXYZW]) \d{1,2}$")
-"""Number of a channel behind its axis ("ACC.X 1")."""
-_UNIT: Final = re.compile(r"[\[(](?P<unit>[^\])]{1,12})[\])]\s*$")
-_KINDS: Final = (
-    ("free", re.compile(r"free[\s_]*acc|lin(?:ear)?[\s_]*acc|user[\s_]*acc", re.IGNORECASE)),
-    ("acc", re.compile(r"acc(?:el(?:erometer|eration)?)?(?![a-z])", re.IGNORECASE)),
-    (
-        "gyr",
-        re.compile(
-            r"gyr(?:o(?:scope)?)?(?![a-z])|angular[\s_]*(?:velocity|rate)|rate[\s_]*of[\s_]*turn",
-            re.IGNORECASE,
-        ),
-    ),
-    ("mag", re.compile(r"mag(?:n(?:et(?:ometer|ic[\s_]*field)?)?)?(?![a-z])", re.IGNORECASE)),
-    ("quat", re.compile(r"quat(?:ernion)?(?![a-z])|(?:^|[\s_./\-])q$", re.IGNORECASE)),
-)
 _AXES: Final = {
     "acc": ("xyz", "123", "012"),
     "gyr": ("xyz", "123", "012"),
     "mag": ("xyz", "123", "012"),
+    "linear": ("xyz",),
+    "gravity": ("xyz",),
     "quat": ("wxyz", "0123"),
 }
-_TIME: Final = re.compile(
-    r"(?:time(?:[\s_]*stamp)?|t|seconds)(?:[\s_\[(]+(s|ms|us|µs|ns)[\])]?)?", re.IGNORECASE
-)
 _COUNTER: Final = re.compile(
     r"(?:packet[\s_]*)?(?:counter|count)|samples?(?:[\s_]*(?:index|number|no))?|frames?|index", re.IGNORECASE
 )
@@ -68,20 +53,11 @@ _RATE: Final = re.compile(
 )
 _RATES: Final = (20.0, 2000.0)
 """Rates an inertial sensor has: the unit of a clock is the one that gives such a rate."""
-_SAID: Final = {
-    "m/s/s": "m/s2",
-    "m/s^2": "m/s2",
-    "m/s2": "m/s2",
-    "m/s²": "m/s2",
-    "g": "g",
-    "mg": "mg",
-    "deg/s": "deg/s",
-    "dps": "deg/s",
-    "°/s": "deg/s",
-    "rad/s": "rad/s",
-}
+_UNIT_OF: Final = {scale: unit for unit, scale in reversed(TIME_UNITS.items())}
 _NEAR: Final = 0.35
 """How far the median acceleration may be from gravity, as a share of it: walking does not move it further."""
+_WITHOUT_GRAVITY: Final = 3.0
+"""m/s²: a quarter of the samples of an acceleration without gravity is smaller."""
 _MOVING: Final = 0.7
 """m/s²: spread of the length of acceleration above which a body moves."""
 _FASTEST: Final = {True: (28.0, 35.0), False: (1.0, 2.0)}
@@ -132,8 +108,11 @@ def look_into_table(file: SourceFile) -> TableLook | None:
         source["index_column"] = True
     # several columns of time: only a person knows which one belongs to the sensors
     unique = [name for name in names if name in titles]
+    kind, _ = read_file_kind(file.name)
     source |= _clock(unique, values, b"\n".join(lines[:skip]).decode("utf-8", "replace"))
-    source |= _signals(names, titles, values)
+    source |= _signals(names, _fill_titles(lines[skip:rows_from], separator, titles), values.values, kind)
+    if not header and not source["columns"]:
+        source |= _by_values(names, values, source.get("time_column"))
     return TableLook(tuple(names), tuple(tuple(c[:_CELL] for c in row) for row in shown), source)
 
 
@@ -149,6 +128,33 @@ def make_entry(source: Mapping[str, Any], name: str) -> dict[str, Any]:
         for sensor, group in said.items()
     }
     return {**source, "file": name, "columns": columns}
+
+
+def guess_entry(file: SourceFile) -> dict[str, Any] | None:
+    """The entry of `sources` for a table that says everything itself; None where something is left to ask."""
+    look = look_into_table(file)
+    if look is None:
+        return None
+    source = dict(look.source)
+    groups = list(source["columns"].values())
+    kind, device = read_file_kind(file.name)
+    whole = all("acc" in g and "gyr" in g for g in groups)
+    part = kind is not None and list(source["columns"]) == [THE_FILE]
+    acc_known = "acc_unit" in source or not any({"acc", "linear", "gravity"} & set(g) for g in groups)
+    gyr_known = "gyr_unit" in source or not any("gyr" in g for g in groups)
+    timed = "time_column" in source or "rate_hz" in source
+    if not groups or not (whole or part) or not (acc_known and gyr_known and timed):
+        return None
+    if part and not whole:
+        source["columns"] = {segment_in(device) or device: groups[0]}
+    return make_entry(source, file.name)
+
+
+def describe_entry(entry: Mapping[str, Any]) -> str:
+    """What an entry takes a table for, as a sentence."""
+    time = f"time from '{entry['time_column']}'" if "time_column" in entry else f"{entry['rate_hz']:g} Hz"
+    units = ", ".join(entry[key] for key in ("acc_unit", "gyr_unit") if key in entry)
+    return f"{time}, units {units}, sensors {', '.join(entry['columns'])}"
 
 
 def read_sample(file: SourceFile, spec: SourceSpec) -> list[Draft]:
@@ -173,9 +179,7 @@ def _read_head(file: SourceFile) -> bytes | None:
     return text.to_utf8(raw)
 
 
-def _values(
-    data: bytes, rows_from: int, separator: bytes, names: Sequence[str], comma: bool
-) -> dict[str, Floats]:
+def _values(data: bytes, rows_from: int, separator: bytes, names: Sequence[str], comma: bool) -> text.Columns:
     """Columns of the complete lines of a beginning, NaN for non-numeric cells."""
     body = text.after_lines(data, rows_from)
     end = bytes(body).rfind(b"\n") + 1
@@ -185,51 +189,87 @@ def _values(
     try:
         return text.read_columns(
             memoryview(rows), "", separator, names, names, decimal_comma=comma, times=names
-        ).values
-    except FormatError:
-        return {}
-
-
-def _clock(names: Sequence[str], values: Mapping[str, Floats], before: str) -> dict[str, Any]:
-    """Time source: a clock, else a counter, else a rate alone; and the rate if it can be determined."""
-    for name in names:
-        said = _TIME.fullmatch(name)
-        steps = np.diff(values.get(name, np.zeros(0)))
-        steps = steps[np.isfinite(steps)]
-        if said is None or len(steps) < 2 or (step := float(np.median(steps))) <= 0:
-            continue
-        unit = (said[1] or "").lower() or next(
-            (u for u, scale in TIME_UNITS.items() if _RATES[0] <= 1 / (step * scale) < _RATES[1]), ""
         )
-        if unit:
-            return {"time_column": name, "time_unit": unit}
+    except FormatError:
+        return text.Columns({}, ())
+
+
+def _clock(names: Sequence[str], table: text.Columns, before: str) -> dict[str, Any]:
+    """Time source: a clock, else a counter, else a rate alone; and the rate if it can be determined."""
+    values = table.values
     rate = next((float(a or b) for a, b in _RATE.findall(before) if 1.0 <= float(a or b) <= 10_000.0), None)
+    constant: dict[str, Any] = {}
+    for name in names:
+        if name in table.times:
+            return {"time_column": name}
+        column = values.get(name, np.zeros(0))
+        if not is_time_name(name) or len(column) < 3:
+            continue
+        if measure_step(column) is None:
+            constant = constant or {"time_column": name, "time_unit": read_unit(name) or "s"}
+            continue
+        with suppress(ManifestError):
+            tick = find_tick(name, column, rate, "")
+            return {"time_column": name, "time_unit": _UNIT_OF.get(tick, tick)}
     found: dict[str, Any] = {} if rate is None else {"rate_hz": rate}
     for name in names:
         steps = np.diff(values.get(name, np.zeros(0)))
         if _COUNTER.fullmatch(name.rsplit("/", 1)[-1]) and len(steps) > 2 and np.median(steps) == 1.0:
             return {**found, "counter": {"column": name}}
-    return found
+    return found or constant
 
 
-def _signals(names: Sequence[str], titles: Sequence[str], values: Mapping[str, Floats]) -> dict[str, Any]:
+def _fill_titles(header: Sequence[bytes], separator: bytes, titles: Sequence[str]) -> list[str]:
+    """Titles under merged cells: a blank cell of a header line but the last repeats the one to its left."""
+    if len(header) < 2:
+        return list(titles)
+    rows = [text.split(line, separator) for line in header]
+    filled = []
+    for row in rows[:-1]:
+        last, out = "", []
+        for cell in [*row, *[""] * (len(titles) - len(row))]:
+            last = cell or last
+            out.append(last)
+        filled.append(out)
+    below = [*rows[-1], *[""] * (len(titles) - len(rows[-1]))]
+    return [
+        "/".join(p for p in (*(row[i] for row in filled), below[i]) if p) if below[i] else titles[i]
+        for i in range(len(titles))
+    ]
+
+
+def _by_values(names: Sequence[str], table: text.Columns, clock: str | None) -> dict[str, Any]:
+    """Columns of a table without a header: three of the length of gravity, then the rate of turn."""
+    numbers = [n for n in names if n != clock and n not in table.times and n in table.values]
+    for i in range(len(numbers) - 5):
+        columns = {THE_FILE: {"acc": numbers[i : i + 3], "gyr": numbers[i + 3 : i + 6]}}
+        acc = _acc_unit(columns, table.values)
+        if acc is not None and (gyr := _gyr_unit(columns, table.values, acc)) is not None:
+            return {"columns": columns, "acc_unit": acc, "gyr_unit": gyr}
+    return {}
+
+
+def _signals(
+    names: Sequence[str], titles: Sequence[str], values: Mapping[str, Floats], file_kind: str | None
+) -> dict[str, Any]:
     """Columns of every sensor with an acceleration, and their units; repeated titles belong to several
     sensors.
     """
     groups: dict[str, dict[str, dict[str, str]]] = {}
     units: dict[str, set[str]] = {"acc": set(), "gyr": set()}
     seen: Counter[str] = Counter()
-    for name, title in zip(names, titles, strict=True):
-        found = _read_name(title)
+    for name, title in sorted(zip(names, titles, strict=True), key=lambda both: not names_quantity(both[1])):
+        found = read_name(title, file_kind)
         if found is None:
             continue
         sensor, kind, axis, unit = found
-        if name != title:
+        if titles.count(title) > 1:
             seen[title] += 1
             sensor = f"{sensor or 'sensor'} {seen[title]}"
         groups.setdefault(sensor, {}).setdefault(kind, {}).setdefault(axis, name)
-        if unit and kind in units:
-            units[kind].add(unit)
+        like = "acc" if kind in ("linear", "gravity") else kind
+        if unit and like in units:
+            units[like].add(unit)
     columns: dict[str, dict[str, list[str]]] = {}
     for sensor, kinds in groups.items():
         whole = {
@@ -237,14 +277,20 @@ def _signals(names: Sequence[str], titles: Sequence[str], values: Mapping[str, F
             for kind, axes in kinds.items()
             if kind in _AXES and (order := next((o for o in _AXES[kind] if set(o) <= set(axes)), None))
         }
-        if "acc" in whole:
+        if "acc" in whole or (file_kind is not None and whole):
             columns[sensor or THE_FILE] = whole
+    phone = "seconds_elapsed" in names  # Sensor Logger: m/s² and rad/s, "Accelerometer" is without gravity
+    for group in columns.values():
+        if file_kind == "acc" and "acc" in group and _lacks_gravity(group, values, units["acc"]):
+            group["linear"] = group.pop("acc")
     source: dict[str, Any] = {"columns": columns}
     acc = _only(units["acc"], ACC_UNITS) or _acc_unit(columns, values)
+    if acc is None and (phone or any({"linear", "gravity"} & set(c) for c in columns.values())):
+        acc = "m/s2"
     if acc is not None:
         source["acc_unit"] = acc
     if any("gyr" in c for c in columns.values()) and (
-        gyr := _only(units["gyr"], GYR_UNITS) or _gyr_unit(columns, values, acc)
+        gyr := _only(units["gyr"], GYR_UNITS) or ("rad/s" if phone else _gyr_unit(columns, values, acc))
     ):
         source["gyr_unit"] = gyr
     if any("quat" in c for c in columns.values()):
@@ -252,23 +298,16 @@ def _signals(names: Sequence[str], titles: Sequence[str], values: Mapping[str, F
     return source
 
 
-def _read_name(name: str) -> tuple[str, str, str, str] | None:
-    """Sensor, quantity, axis and unit given in the name of a column."""
-    unit = ""
-    plain = name.strip()
-    if said := _UNIT.search(plain):
-        unit, plain = _SAID.get(said["unit"].strip(), ""), plain[: said.start()].strip()
-    plain = _CHANNEL.sub("", plain)
-    if (axis := _AXIS.match(plain)) is None:
-        return None
-    rest = axis["rest"]
-    for kind, pattern in _KINDS:
-        if said := pattern.search(rest):
-            if kind == "free":
-                return None
-            sensor = re.sub(r"[\s_./\-:]+$|^[\s_./\-:]+", "", rest[: said.start()] + " " + rest[said.end() :])
-            return re.sub(r"\s+", " ", sensor).strip(), kind, axis["axis"].lower(), unit
-    return None
+def _lacks_gravity(group: Mapping[str, Sequence[str]], values: Mapping[str, Floats], units: set[str]) -> bool:
+    """Whether an acceleration, in m/s² if its unit is unnamed, is most often far below gravity."""
+    if units - {"m/s2"}:
+        return False
+    norms = _norms({THE_FILE: group}, "acc", values)
+    return (
+        bool(len(norms))
+        and float(np.quantile(norms, 0.25)) < _WITHOUT_GRAVITY
+        and not (not units and abs(float(np.median(norms)) - 1.0) < _NEAR)
+    )
 
 
 def _only(found: set[str], known: Mapping[str, float]) -> str | None:

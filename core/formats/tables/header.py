@@ -96,7 +96,7 @@ def complete_names(spec: SourceSpec, titles: list[str]) -> SourceSpec:
         return tuple(names[at : at + len(group)]) if len(beside) == len(group) and alike else group
 
     columns = {
-        d: Channels(complete(c.acc), complete(c.gyr), complete(c.mag), complete(c.quat))
+        d: Channels(*map(complete, (c.acc, c.gyr, c.mag, c.quat, c.linear, c.gravity)))
         for d, c in spec.columns.items()
     }
     return replace(spec, columns=columns)
@@ -104,7 +104,10 @@ def complete_names(spec: SourceSpec, titles: list[str]) -> SourceSpec:
 
 def list_asked(c: Channels) -> list[tuple[str, str]]:
     """Kind of signal and name of every column of a sensor."""
-    groups = (("acc", c.acc), ("gyr", c.gyr), ("mag", c.mag), ("quat", c.quat))
+    groups = (
+        ("acc", c.acc), ("gyr", c.gyr), ("mag", c.mag), ("quat", c.quat), ("linear", c.linear),
+        ("gravity", c.gravity),
+    )  # fmt: skip
     return [(kind, name) for kind, group in groups for name in group or ()]
 
 

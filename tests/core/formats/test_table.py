@@ -98,7 +98,7 @@ def test_tables_that_share_a_counter_share_the_time() -> None:
 
 
 @pytest.mark.parametrize(
-    ("included", "counter", "code", "words"),
+    ("counts", "counter", "code", "words"),
     [
         (np.arange(300) * 2, {}, "bad_counter", "'n' goes up by 2 from row to row, expected 1"),
         (np.arange(300), {"wrap": 256}, "bad_counter", "counts to 299, but counter.wrap is 256"),
