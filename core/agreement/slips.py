@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -43,6 +43,7 @@ class SensorSlip:
     at_s, within_s : when, and half the width of what is left out. turn_rad : about `axis` (3,) in sensor
         axes: what the sensor shows afterwards = that turn of what it would have shown. sd_rad : of it.
     at_rest : seen by two standings (standings.py), so that the moment is not known well enough to turn back.
+    by : what showed it: joints, or strides of this sensor alone (stride_slips.py), whose turn is whole.
     """
 
     segment: Segment
@@ -52,11 +53,12 @@ class SensorSlip:
     sd_rad: float
     axis: tuple[float, float, float]
     at_rest: bool = False
+    by: Literal["joints", "strides"] = "joints"
 
     @property
     def is_repaired(self) -> bool:
         """Whether what follows is turned back."""
-        return self.segment.startswith(REPAIRED) and not self.at_rest
+        return self.by == "strides" or (self.segment.startswith(REPAIRED) and not self.at_rest)
 
 
 def find_slips(

@@ -137,6 +137,8 @@ REASONS: Final[Mapping[str, str]] = {
     "joint_missing": "not measured: a segment of this joint carries no sensor",
     "estimator_bad": "withheld: the sensors contradict each other here",
     "feet_contradict": "withheld: the contacts of left and right contradict each other",
+    "foot_late": "withheld: the clock of one foot is late",
+    "not_walking": "withheld: nobody walks like this",
     "path_bad": "withheld: the foot's path does not fit its rests on the floor",
     "fixed_by_model": "not measured: the leg model holds it fixed",
     "at_bound": "withheld: the leg model's knee rests on its limit",
