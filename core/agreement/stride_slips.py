@@ -249,7 +249,7 @@ def _scatter(u: Floats, middle: Floats) -> float:
 def _tell_creep(segment: Segment, turn: float) -> Notice:
     return Notice(
         CREEPS,
-        f"The sensor on {segment} turned slowly by {np.degrees(turn):.0f}° over the walk. Levels of its "
-        "angles are doubtful. Fasten it and record again.",
+        f"The sensor on {segment} slipped slowly, by {np.degrees(turn):.0f}° over the walk. Levels of its "
+        "angles are unreliable. Fasten the sensor and record again.",
         segment,
     )

@@ -83,9 +83,9 @@ def judge_echo(pelvis: SensorSignals, events: GaitEvents, rate_hz: float) -> Dou
     return Doubt(
         Notice(
             LATE_FOOT,
-            f"The lower back shows the contacts of the {late} foot {1000 * abs(found.lag_s):.0f} ± "
-            f"{2000 * found.sd_s:.0f} ms early: the clock of that foot is late by so much. What is measured "
-            "between the feet is withheld. Synchronise the sensors and record again.",
+            f"Contacts of the {late} foot shake the lower back {1000 * abs(found.lag_s):.0f} ± "
+            f"{2000 * found.sd_s:.0f} ms before they are timed: the clock of that foot is late. Parameters "
+            "between the feet are suppressed. Synchronise the sensors and record again.",
             FOOT[late],
         ),
         "between_feet",

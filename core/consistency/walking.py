@@ -52,8 +52,8 @@ def judge_alternation(events: GaitEvents) -> Doubt | None:
     return Doubt(
         Notice(
             NOT_WALKING,
-            f"Both feet land together (the right foot at {100 * phase:.0f} % of the left stride): nobody "
-            "walks like this, so no gait parameters are reported. Were the sensors worn?",
+            f"Both feet land together (the right foot at {100 * phase:.0f} % of the left stride). This "
+            "is not walking, so gait parameters are suppressed. Check that the sensors were worn.",
         ),
         "all",
     )
@@ -91,8 +91,8 @@ def judge_tilting(
         Notice(
             NOT_WALKING,
             f"The sensor on {segment} tilts at {np.degrees(tilting):.0f} °/s (median; walking: below "
-            f"{np.degrees(TILTING):.0f}): nobody walks like this, so no gait parameters are reported. Was "
-            "the sensor worn?",
+            f"{np.degrees(TILTING):.0f}). This is not walking, so gait parameters are suppressed. Check "
+            "that the sensor was worn.",
             segment,
         ),
         "all",

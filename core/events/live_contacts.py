@@ -1,7 +1,8 @@
-"""Contacts of the feet as samples come, told in the push in which they are known.
+"""Streaming contact detection, reported in the push in which contacts become known.
 
-The rules of core/events/foot_contact.py; they need neither heading nor the other sensors. A contact is told
-at once, and again when its refined time is known; a foot-off again where its landing shows that it was none.
+The rules of core/events/foot_contact.py; they need neither heading nor the other sensors. A contact is
+reported at once, and again when its refined time is available; a foot-off again if its landing shows that it
+was none.
 """
 
 from __future__ import annotations
@@ -16,16 +17,17 @@ from sagittal.core.events.foot_movement import FootMovement
 from sagittal.core.events.foot_pitch import FootPitchParams
 from sagittal.core.events.result import GaitEvent
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 
 REMEMBERED: Final = 4
 """Events of a foot that may be told again: a foot-off, the contact after it, and a swing that is held."""
 
 
 class KnownContact(NamedTuple):
-    """A contact and the sample, counted from the start of the chain, at which it is told.
+    """A contact and the sample, relative to the start of the chain, at which it is reported.
 
-    Not `final`: its refined time is still to come. Then it is told again, its `first_s` the time it had. So
-    is a foot-off, though final, that the contact after it shows to have been the landing.
+    If not `final`, its refined time is still to come; it is then reported again, with the earlier time in
+    `first_s`. So is a foot-off, even if final, that the following contact shows to have been the landing.
     """
 
     at: int
@@ -34,7 +36,7 @@ class KnownContact(NamedTuple):
 
 
 class ContactDetector:
-    """Initial and terminal contacts of the feet that carry a sensor.
+    """Initial and terminal contacts of the feet with a sensor.
 
     Raises
     ------
@@ -52,7 +54,11 @@ class ContactDetector:
         if rate_hz < pitch.min_rate_hz:
             raise SignalError(
                 "sample_rate_too_low",
-                f"Gait events need at least {pitch.min_rate_hz:g} Hz, the sensors send {rate_hz:g} Hz.",
+                Message(
+                    "Gait events need at least {min_rate_hz:g} Hz, the sensors send {rate_hz:g} Hz.",
+                    min_rate_hz=pitch.min_rate_hz,
+                    rate_hz=rate_hz,
+                ),
             )
         self.sides: tuple[Side, ...] = tuple(s for f in feet for s in SIDES if FOOT[s] == f)
         self._feet = [FootContactState.start(rate_hz, pitch, params) for _ in self.sides]
@@ -62,12 +68,12 @@ class ContactDetector:
     def push(
         self, q: Floats, valid: Bools, motions: Sequence[FootMovement], first: int
     ) -> list[KnownContact]:
-        """Contacts that these samples make known, in the order in which they become known.
+        """Contacts that become known with these samples, in the order of detection.
 
         Parameters
         ----------
-        q : (T, feet, 4) foot to W. valid : (T, feet). motions : of each foot over the same samples.
-        first : the chain's first sample on the axis.
+        q : (T, feet, 4) foot to W. valid : (T, feet). motions : of each foot over the same samples. first :
+            first sample of the chain on the axis.
         """
         found = []
         for i, (side, foot) in enumerate(zip(self.sides, self._feet, strict=True)):

@@ -1,4 +1,4 @@
-"""Which parameters are not reported where a law of consistency is broken."""
+"""Parameters that are suppressed if a consistency law is violated."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ require_entries(BETWEEN_FEET, "core.parameters.between_feet")
 
 
 def withhold_doubtful(parameters: Sequence[Parameter], doubts: Sequence[Doubt]) -> tuple[Parameter, ...]:
-    """The same parameters, without the values that a broken law makes unreliable, for the first such law."""
+    """The same parameters, with the values that a violated law makes unreliable suppressed."""
     for doubt in doubts:
         parameters = tuple(
             summarise_values(p.name, p.side, [], p.unit, doubt.notice.code)
