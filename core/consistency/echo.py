@@ -83,9 +83,10 @@ def judge_echo(pelvis: SensorSignals, events: GaitEvents, rate_hz: float) -> Dou
     return Doubt(
         Notice(
             LATE_FOOT,
-            f"Contacts of the {late} foot shake the lower back {1000 * abs(found.lag_s):.0f} ± "
-            f"{2000 * found.sd_s:.0f} ms before they are timed: the clock of that foot is late. Parameters "
-            "between the feet are suppressed. Synchronise the sensors and record again.",
+            f"Contacts of the {'right' if found.lag_s > 0 else 'left'} foot shake the lower back "
+            f"{1000 * abs(found.lag_s):.0f} ± {2000 * found.sd_s:.0f} ms before they are timed: the clock of "
+            "that foot is late. Parameters between the feet are suppressed. Synchronise the sensors and record "
+            "again.",
             FOOT[late],
         ),
         "between_feet",

@@ -20,9 +20,12 @@ from sagittal.core.rotation import find_lengths
 from sagittal.core.signals.filtering import low_pass
 from sagittal.core.signals.recording import SensorSignals
 
-PHASE: Final = (0.2, 0.8)
-"""Share of a stride at which the other foot lands. Medians of clean recordings lie in 0.42 to 0.64."""
-LEAST_STRIDES: Final = 5
+TOGETHER: Final = 0.15
+"""Share of a stride within which contacts of both feet are one landing. Walking feet land 0.42 to 0.64 of a
+stride apart (medians of clean recordings)."""
+MOST_TOGETHER: Final = 0.8
+"""Largest share of such contacts, of either foot. Contacts of one foot detected twice reach 0.5."""
+LEAST_CONTACTS: Final = 6
 LONGEST_S: Final = 3.0
 TILTING: Final = float(np.radians(50.0))
 """Median rate at which a trunk may tilt while it walks, rad/s, below `SLOW_HZ`. Clean ones reach 28 °/s;
@@ -30,30 +33,36 @@ shaken by hand 61 °/s and more."""
 SLOW_HZ: Final = 3.0
 
 
-def measure_phase(events: GaitEvents) -> tuple[float, int]:
-    """Median share of the left stride at which the right foot lands, and the strides it was read from."""
-    left, right = (np.array(events.times(side, "ic")) for side in SIDES)
-    if len(left) < 2 or not len(right):
-        return float("nan"), 0
-    start, end = left[:-1], left[1:]
-    next_one = np.searchsorted(right, start)
-    there = next_one < len(right)
-    landed = right[np.minimum(next_one, len(right) - 1)]
-    told = there & (landed < end) & (end - start < LONGEST_S)
-    share = ((landed - start) / (end - start))[told]
-    return (float(np.median(share)), len(share)) if len(share) else (float("nan"), 0)
+def measure_coincidence(events: GaitEvents) -> float | None:
+    """Share of contacts at which the other foot lands too, of the foot with fewer; None with few contacts."""
+    shares = []
+    for side, other in zip(SIDES, SIDES[::-1], strict=True):
+        own, opposite = (np.array(events.times(s, "ic")) for s in (side, other))
+        if min(len(own), len(opposite)) < LEAST_CONTACTS:
+            return None
+        strides = np.diff(own)
+        walked = strides[strides < LONGEST_S]
+        if not len(walked):
+            return None
+        after = np.searchsorted(opposite, own)
+        nearest = np.minimum(
+            np.abs(opposite[np.minimum(after, len(opposite) - 1)] - own),
+            np.abs(opposite[np.maximum(after - 1, 0)] - own),
+        )
+        shares.append(float(np.mean(nearest < TOGETHER * np.median(walked))))
+    return min(shares)
 
 
 def judge_alternation(events: GaitEvents) -> Doubt | None:
     """A doubt where both feet land together."""
-    phase, strides = measure_phase(events)
-    if strides < LEAST_STRIDES or PHASE[0] <= phase <= PHASE[1]:
+    together = measure_coincidence(events)
+    if together is None or together <= MOST_TOGETHER:
         return None
     return Doubt(
         Notice(
             NOT_WALKING,
-            f"Both feet land together (the right foot at {100 * phase:.0f} % of the left stride). This "
-            "is not walking, so gait parameters are suppressed. Check that the sensors were worn.",
+            f"Both feet land together at {100 * together:.0f} % of their contacts. This is not walking, so gait "
+            "parameters are suppressed. Check that the sensors were worn.",
         ),
         "all",
     )

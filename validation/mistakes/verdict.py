@@ -24,7 +24,8 @@ JUDGED_BY_SHARE_FROM: Final = 0.10
 """Smaller lengths and speeds are compared with this value."""
 NOT_JUDGED: Final = (
     "turn_", "walking_", "cv", "pci", "asymmetry", "regularity", "harmonic", "smoothness", "step_width",
-    "clearance", "initiation", "circumduction", "toe_out", "progression", "rotation", "drift", "trunk", "sway",
+    "clearance", "initiation", "circumduction", "toe_out", "progression", "rotation", "drift", "trunk",
+    "sway",
 )  # fmt: skip
 """Words in the names of parameters without an accepted limit."""
 

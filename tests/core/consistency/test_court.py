@@ -1,4 +1,4 @@
-"""All laws of the signals on one recording: clean walks break none, and what is broken stays after an edit."""
+"""All signal laws on one recording: clean walks break none; a doubt holds after an edit."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from sagittal.core.consistency.doubt import NOT_WALKING
 from sagittal.core.consistency.walking import (
     judge_alternation,
     judge_tilting,
-    measure_phase,
+    measure_coincidence,
     measure_tilting,
 )
 from sagittal.core.events.result import GaitEvents
@@ -40,11 +40,16 @@ def land_together() -> GaitEvents:
 
 
 def test_feet_that_walk_land_in_turn() -> None:
-    phase, strides = measure_phase(events())
-    assert phase == pytest.approx(0.5, abs=0.03)
-    assert strides > 10
+    assert measure_coincidence(events()) == 0.0
     assert judge_alternation(events()) is None
-    assert judge_alternation(GaitEvents(())) is None
+    assert measure_coincidence(GaitEvents(())) is None
+
+
+def test_contacts_detected_twice_are_a_walk() -> None:
+    doubled = [replace(e, time_s=e.time_s + 0.5) for e in events().events if e.side == "left"]
+    both = replace(events(), events=tuple(sorted((*events().events, *doubled), key=lambda e: e.time_s)))
+    assert measure_coincidence(both) == pytest.approx(0.5, abs=0.1)
+    assert judge_alternation(both) is None
 
 
 def test_feet_that_land_together_have_no_gait_parameters() -> None:
