@@ -84,9 +84,9 @@ def judge_echo(pelvis: SensorSignals, events: GaitEvents, rate_hz: float) -> Dou
         Notice(
             LATE_FOOT,
             f"Contacts of the {'right' if found.lag_s > 0 else 'left'} foot shake the lower back "
-            f"{1000 * abs(found.lag_s):.0f} ± {2000 * found.sd_s:.0f} ms before they are timed: the clock of "
-            "that foot is late. Parameters between the feet are suppressed. Synchronise the sensors and record "
-            "again.",
+            f"{1000 * abs(found.lag_s):.0f} ± {2000 * found.sd_s:.0f} ms before they are timed: the clock "
+            "of that foot is late. Parameters between the feet are suppressed. Synchronise the sensors and "
+            "record again.",
             FOOT[late],
         ),
         "between_feet",

@@ -61,8 +61,8 @@ def judge_alternation(events: GaitEvents) -> Doubt | None:
     return Doubt(
         Notice(
             NOT_WALKING,
-            f"Both feet land together at {100 * together:.0f} % of their contacts. This is not walking, so gait "
-            "parameters are suppressed. Check that the sensors were worn.",
+            f"Both feet land together at {100 * together:.0f} % of their contacts. This is not walking, so "
+            "gait parameters are suppressed. Check that the sensors were worn.",
         ),
         "all",
     )
