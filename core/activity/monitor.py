@@ -100,7 +100,7 @@ def calibrate_on_walks(
                 "walk_too_short",
                 Message(
                     f"From {{start_s:g}} to {{end_s:g}} s only {{count}} {plural(count, 'step', 'steps')} "
-                    "can be judged for '{kind}'; expected {LEAST_STEPS}. Record 20 steps of each without "
+                    "can be assessed for '{kind}'; expected {LEAST_STEPS}. Record 20 steps of each without "
                     "stopping.",
                     start_s=start_s,
                     end_s=end_s,

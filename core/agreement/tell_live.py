@@ -16,7 +16,7 @@ AGAIN: Final = "sensors_agree_again"
 
 RESOLVED: Final = {
     "sensors_exchanged": "The sensors of {sensors} fit where they are worn now.",
-    "sensor_slipped": "The sensor on {sensors} sits as it did before it slipped.",
+    "sensor_slipped": "The sensor on {sensors} is back in its position from before the slip.",
 }
 """Code of a notice → what is said when it no longer holds."""
 

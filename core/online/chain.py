@@ -45,8 +45,8 @@ from sagittal.core.signals.rest import index_window
 from sagittal.core.timeline.columns import find_columns, take_columns, take_mask
 
 NOT_LIVE: Final = (
-    "The sensors that are worn ({sensors}) show no figure while they stream: for one, wear both feet, or the "
-    "pelvis and a whole leg. All is recorded and can be analysed afterwards."
+    "The sensors in use ({sensors}) do not allow a live avatar: this requires both feet, or the pelvis "
+    "and a whole leg. Everything is recorded and can be analysed afterwards."
 )
 BROKEN: Final = (
     "The live filter diverged and the avatar is no longer shown; recording continues. Stand still and "

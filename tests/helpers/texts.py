@@ -14,6 +14,7 @@ from typing import Final
 from babel.messages.catalog import Catalog
 from babel.messages.pofile import read_po, write_po
 
+from sagittal.core.errors import title_of_code
 from sagittal.server.report.view.level import ANATOMICAL, STANDING
 from sagittal.web.language import LANGUAGES, SOURCE, catalogue_path
 from sagittal.web.message_format import has_words
@@ -273,7 +274,7 @@ def titles_of(tree: ast.AST) -> Iterator[str]:
             codes = (a.value for a in call.args if isinstance(a, ast.Constant) and isinstance(a.value, str))
             code = next(codes, "")
             if re.fullmatch(r"[a-z][a-z_]{2,}", code):
-                yield code.replace("_", " ").capitalize()
+                yield title_of_code(code)
 
 
 def _between_tags(told: str) -> list[str]:

@@ -12,7 +12,7 @@ from sagittal.core.frames import FOOT, SIDES, SUFFIX, Side
 from sagittal.core.online.frame import LiveFrame
 from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.server.live import wire
-from sagittal.server.live.messages import Picture
+from sagittal.server.live.messages import Picture, encode_json
 from tests.server import walk
 
 RATE_HZ = 30.0
@@ -75,7 +75,7 @@ def stride(n: int, leg: Leg, *, counted: bool = True, speed_mps: float | None = 
         counted=counted,
         complete=True,
     )
-    return wire.encode(wire.stride(told))
+    return encode_json(wire.stride(told))
 
 
 def suffixed(zero: dict[str, float], side: Side) -> dict[str, float]:

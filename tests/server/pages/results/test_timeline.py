@@ -36,8 +36,8 @@ async def test_numbers_follow_an_edit_and_only_who_may_review_edits(clinic: Clin
         after = await client.get(f"{path}/numbers", headers=asked)
     assert (page.status_code, without.status_code) == (200, 200)
     assert (plain.status_code, plain.headers["location"]) == (303, f"{path}#numbers")
-    assert f"{used} of {every} used" in before.text
-    assert f"{used - 1} of {every} used" in after.text
+    assert f"{used} of {every} included" in before.text
+    assert f"{used - 1} of {every} included" in after.text
     assert "<html" not in before.text
     async with clinic.client("assistant") as client:
         assert (await client.get(path)).status_code == 403
