@@ -14,6 +14,7 @@ from sagittal.core.agreement.params import AgreementParams, JointParams, SlipPar
 from sagittal.core.agreement.repair import leave_out, take_lag_out, turn_back
 from sagittal.core.agreement.slips import SensorSlip, find_slips
 from sagittal.core.agreement.standings import compare_standings
+from sagittal.core.agreement.stride_slips import deny_slip, find_stride_slips
 from sagittal.core.agreement.tell import tell_drift, tell_exchange, tell_lag, tell_left_over, tell_slip
 from sagittal.core.agreement.terms import SensorTerms, find_terms
 from sagittal.core.agreement.windows import JointWindows, compare_at_joint
@@ -111,9 +112,9 @@ def check_agreement(
     params, timeline = params or AgreementParams(), timeline or TimelineParams()
     over_s = params.exchange.over_s
     joints, terms = compare_sensors(recording, params.joints, over_s=over_s)
-    if not joints:
-        return Agreement(recording)
     new_notices: list[Notice] = []
+    if not joints:
+        return _repair_slips(Agreement(recording), joints, terms, params.slips, new_notices)
     exchange = find_exchange(terms, joints, recording.rate_hz, params.joints, params.exchange)
     current = recording
     if exchange.mixed_up or exchange.mirrored:
@@ -136,29 +137,44 @@ def check_agreement(
         same = [w for w in joints if not {w.first, w.second} & set(late)]
         joints, terms = compare_sensors(current, params.joints, unchanged, same, over_s)
         new_notices += [tell_left_over(x) for x in find_sensor_lags(joints, params.lags) if x.told]
-    slips, places = _find_all_slips(current, terms, joints, params.slips)
-    new_notices += [tell_slip(x, params.slips) for x in slips]
-    back = {x.segment: x for x in slips if x.is_repaired and params.slips.repair}
+    shifted = {s: float(x[len(x) // 2]) for s, x in late.items()}
+    reached = Agreement(
+        current, None, exchange, lags, drifts, (), shifted, {}, clocks, {}, measure_misfits(joints)
+    )
+    return _repair_slips(reached, joints, terms, params.slips, new_notices)
+
+
+def _repair_slips(
+    reached: Agreement,
+    joints: Sequence[JointWindows],
+    terms: Terms,
+    params: SlipParams,
+    new_notices: list[Notice],
+) -> Agreement:
+    """Find slipped sensors, correct or exclude their samples; `new_notices` are reported with theirs."""
+    current = reached.recording
+    slips, places = _find_all_slips(current, terms, joints, params)
+    by_strides, seen, slow = find_stride_slips(drop_stuck_sensors(current), {x.segment for x in slips})
+    slips += by_strides
+    places = {**seen, **places}
+    new_notices += [tell_slip(x, params) for x in slips]
+    new_notices += slow
+    back = {x.segment: x for x in slips if x.is_repaired and params.repair}
     turned = {s: turn_back(current.sensors[s], current.t_s, x) for s, x in back.items()}
     doubtful = {x.segment: _find_doubt(x, x.segment in back) for x in slips}
     if new_notices:
         notices = tuple(dict.fromkeys((*current.notices, *new_notices)))
         current = replace(current, sensors={**current.sensors, **turned}, notices=notices)
-    out = {s: x for s, x in doubtful.items() if params.slips.repair and s not in back}
+    out = {s: x for s, x in doubtful.items() if params.repair and s not in back}
     left = {s: leave_out(current.sensors[s], current.t_s, x) for s, x in out.items()}
     whole, current = current, replace(current, sensors={**current.sensors, **left}) if left else current
-    return Agreement(
-        current,
-        whole if left else None,
-        exchange,
-        lags,
-        drifts,
-        slips,
-        {s: float(x[len(x) // 2]) for s, x in late.items()},
-        doubtful,
-        clocks,
-        places,
-        measure_misfits(joints),
+    return replace(
+        reached,
+        recording=current,
+        whole=whole if left else None,
+        slips=slips,
+        doubtful=doubtful,
+        judged_places=places,
     )
 
 
@@ -176,6 +192,7 @@ def _find_all_slips(
     # a joint near the edge of a walk may blame its other sensor, which both standings then clear
     legs = {x.segment[-1] for x in standing_slips}
     slips = tuple(x for x in slips if x.segment[-1] not in legs or x.segment not in stayed)
+    slips = tuple(x for x in slips if not deny_slip(recording, x))
     slips += tuple(x for x in standing_slips if x.segment not in {slip.segment for slip in slips})
     places |= {s: x for s, x in stayed.items() if s not in places or _length(x) > _length(places[s])}
     return slips, places

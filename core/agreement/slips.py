@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -44,6 +44,7 @@ class SensorSlip:
         axes: signals after the slip = this rotation of the signals without it. sd_rad : of it.
     at_rest : detected from two standing periods (standings.py), so that the time is too uncertain for a
         correction.
+    by : evidence: joints, or the strides of this sensor alone (stride_slips.py), whose rotation is complete.
     """
 
     segment: Segment
@@ -53,11 +54,12 @@ class SensorSlip:
     sd_rad: float
     axis: tuple[float, float, float]
     at_rest: bool = False
+    by: Literal["joints", "strides"] = "joints"
 
     @property
     def is_repaired(self) -> bool:
         """Whether later samples are corrected."""
-        return self.segment.startswith(REPAIRED) and not self.at_rest
+        return self.by == "strides" or (self.segment.startswith(REPAIRED) and not self.at_rest)
 
 
 def find_slips(

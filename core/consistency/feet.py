@@ -12,13 +12,13 @@ from typing import Final
 
 import numpy as np
 
+from sagittal.core.consistency.doubt import CONTRADICTED, Doubt
+from sagittal.core.consistency.walking import judge_alternation
 from sagittal.core.errors import Notice
 from sagittal.core.events.bouts import Bout
 from sagittal.core.events.result import GaitEvents, Strides
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Side
 
-CONTRADICTED: Final = "feet_contradict"
-"""Code of the notice, and reason of what is withheld between the feet."""
 COUNT_SHARE: Final = 0.10
 LEAST_CONTACTS: Final = 8
 """Limit of the difference of contacts as a share of the larger number, besides one a bout, and the least
@@ -34,7 +34,7 @@ def judge_feet(
     strides: Strides,
     bouts: Sequence[Bout],
     is_measured: Callable[[Side, Floats], Bools],
-) -> tuple[Notice, ...]:
+) -> tuple[Doubt, ...]:
     """Report contradictions between left and right; nothing if too little walking was recorded to decide.
 
     Parameters
@@ -49,13 +49,16 @@ def judge_feet(
     if min(counts.values()) == 0:
         # one foot without a sensor, or without any contact, is told by who looks for contacts
         return ()
+    together = judge_alternation(events)
+    if together is not None:
+        return (together,)
     lost = more - min(counts.values())
     if more >= LEAST_CONTACTS and lost > len(bouts) + COUNT_SHARE * more:
-        return (_tell_counts(counts),)
+        return (Doubt(_tell_counts(counts), "between_feet"),)
     times = {side: _find_stride_time(strides, side) for side in SIDES}
     left, right = times["left"], times["right"]
     if left is not None and right is not None and abs(left - right) > TIME_SHARE * max(left, right):
-        return (_tell_times(left, right),)
+        return (Doubt(_tell_times(left, right), "between_feet"),)
     return ()
 
 

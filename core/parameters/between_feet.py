@@ -1,10 +1,11 @@
-"""Parameters measured between the contacts of both feet."""
+"""Parameters that are suppressed if a consistency law is violated."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Final
 
+from sagittal.core.consistency.doubt import Doubt
 from sagittal.core.parameters.catalogue import require_entries
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.parameters.variability import summarise_values
@@ -27,11 +28,17 @@ BETWEEN_FEET: Final = frozenset(
 require_entries(BETWEEN_FEET, "core.parameters.between_feet")
 
 
-def withhold_between_feet(parameters: Sequence[Parameter], reason: str) -> tuple[Parameter, ...]:
-    """The same parameters, with the values of those that need the contacts of both feet suppressed."""
-    return tuple(
-        summarise_values(p.name, p.side, [], p.unit, reason)
-        if p.name in BETWEEN_FEET and p.mean is not None
-        else p
-        for p in parameters
-    )
+def withhold_doubtful(parameters: Sequence[Parameter], doubts: Sequence[Doubt]) -> tuple[Parameter, ...]:
+    """The same parameters, with the values that a violated law makes unreliable suppressed."""
+    for doubt in doubts:
+        parameters = tuple(
+            summarise_values(p.name, p.side, [], p.unit, doubt.notice.code)
+            if p.mean is not None and _concerns(doubt, p.name)
+            else p
+            for p in parameters
+        )
+    return tuple(parameters)
+
+
+def _concerns(doubt: Doubt, name: str) -> bool:
+    return doubt.scope == "all" or (doubt.scope == "between_feet" and name in BETWEEN_FEET)

@@ -14,7 +14,8 @@ import numpy as np
 
 from sagittal.core.angles import JointAngles
 from sagittal.core.body.feet import FootTracks
-from sagittal.core.consistency.feet import CONTRADICTED, judge_feet
+from sagittal.core.consistency.doubt import Doubt
+from sagittal.core.consistency.feet import judge_feet
 from sagittal.core.errors import Notice
 from sagittal.core.events.alternation import AlternationParams, measure_foot_lag
 from sagittal.core.events.bouts import Bout, BoutParams, find_bouts
@@ -26,7 +27,7 @@ from sagittal.core.events.strides import count_strides, stride_list
 from sagittal.core.events.turns import Turn
 from sagittal.core.frames import FOOT, Bools, Floats, Segment, Side
 from sagittal.core.parameters import Surface, take_figures
-from sagittal.core.parameters.between_feet import withhold_between_feet
+from sagittal.core.parameters.between_feet import withhold_doubtful
 from sagittal.core.parameters.flats import Flats, find_flats
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.parameters.rows import Column
@@ -54,6 +55,7 @@ class Tracks:
     rests : windows of quiet standing, None if unknown. standing : those of the feet alone, including short
         ones (core/signals/rest.py, STANDING). turns : of the body. steps : of a trunk sensor, if no foot has
         one; they are not editable.
+    doubts : contradictions in the signals (core/consistency); edits do not change them.
     """
 
     t_s: Floats
@@ -72,6 +74,7 @@ class Tracks:
     standing: tuple[Window, ...] = ()
     turns: tuple[Turn, ...] = ()
     steps: Steps | None = None
+    doubts: tuple[Doubt, ...] = ()
 
     @property
     def duration_s(self) -> float:
@@ -133,11 +136,10 @@ def measure_gait(tracks: Tracks, edits: Sequence[Edit] = ()) -> MeasuredGait:
     first = figures.parameters if steps is None else _of_steps(tracks, steps, figures.parameters)
     estimated = () if tracks.angles is None else tracks.angles.estimated
     first = state_uncertainty(first, events, estimated, feet_lag_s=_find_feet_lag(tracks, events))
-    contradictions = judge_feet(events, strides, bouts, lambda side, at: _is_measured(tracks, side, at))
-    if contradictions:
-        first = withhold_between_feet(first, CONTRADICTED)
-        strides = replace(strides, notices=(*strides.notices, *contradictions))
-    parameters = first + bout_parameters(bouts) + turn_parameters(tracks.turns)
+    doubts = tracks.doubts + judge_feet(events, strides, bouts, lambda s, at: _is_measured(tracks, s, at))
+    if doubts:
+        strides = replace(strides, notices=(*strides.notices, *(x.notice for x in doubts)))
+    parameters = withhold_doubtful(first + bout_parameters(bouts) + turn_parameters(tracks.turns), doubts)
     return MeasuredGait(events, strides, parameters, figures.columns, bouts, tracks.turns, steps)
 
 

@@ -23,8 +23,10 @@ from sagittal.core.body.mounting import mount_sensors
 from sagittal.core.body.walking_frame import in_walking_frame
 from sagittal.core.calibration.declared import propose_mountings
 from sagittal.core.calibration.score import score_calibration
+from sagittal.core.consistency.court import judge_sensors
 from sagittal.core.errors import Notice
 from sagittal.core.events.alternation import tell_foot_lag
+from sagittal.core.events.bouts import find_bouts
 from sagittal.core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
 from sagittal.core.events.detection import detect_contacts as detect_foot_contacts
 from sagittal.core.events.foot_movement import measure_foot_movements
@@ -246,8 +248,22 @@ def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
         turns=contacts.turns,
         steps=contacts.steps,
     )
+    tracks = _judge_tracks(analysis, tracks)
     give_memory_back()
     return replace(analysis, tracks=tracks, measured=measure_gait(tracks))
+
+
+def _judge_tracks(analysis: TakeAnalysis, tracks: Tracks) -> Tracks:
+    """The tracks with what the signals of the sensors contradict."""
+    steps = None if tracks.events.events else tracks.steps
+    bouts = (
+        find_bouts(tracks.events, tracks.rests, tracks.bout_params, tracks.standing)
+        if steps is None
+        else steps.bouts
+    )
+    treadmill = analysis.source.protocol == "treadmill"
+    doubts = judge_sensors(analysis.recording, tracks.events, bouts, treadmill=treadmill)
+    return replace(tracks, doubts=doubts) if doubts else tracks
 
 
 def measure_trunk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -269,6 +285,7 @@ def measure_trunk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
         turns=contacts.turns,
         steps=contacts.steps,
     )
+    tracks = _judge_tracks(analysis, tracks)
     return replace(analysis, tracks=tracks, measured=measure_gait(tracks))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from sagittal.core.angles import JointAngles
 from sagittal.core.body.health import find_worst_verdict
 from sagittal.core.body.model import LENGTHS
+from sagittal.core.consistency.doubt import LAWS
 from sagittal.core.frames import SEGMENTS, Floats, Side
 from sagittal.core.norms.controls import mean_curves
 from sagittal.core.norms.scores import CurveMeans, Scores, score_curves
@@ -69,10 +70,11 @@ def _quality(analysis: TakeAnalysis) -> dict[str, object]:
     report = reduce_to_plain(analysis.quality.to_json())
     assert isinstance(report, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
     verdict = None if analysis.poses is None else find_worst_verdict(analysis.poses.health)
-    level = find_shown_level(analysis.quality.level, verdict)
+    broken = [n.message for n in analysis.notices if n.code in LAWS]
+    level = find_shown_level(analysis.quality.level, "warn" if broken and verdict != "bad" else verdict)
     bad = [] if analysis.poses is None else [f.name for f in analysis.poses.health if f.verdict == "bad"]
     judgement = PATH_JUDGED if concern_paths_alone(bad) else JUDGED.get(verdict)
-    reasons = [*analysis.quality.reasons, *([] if judgement is None else [judgement])]
+    reasons = [*analysis.quality.reasons, *broken, *([] if judgement is None else [judgement])]
     return {**report, "level": level, "signals_level": analysis.quality.level, "reasons": reasons}
 
 

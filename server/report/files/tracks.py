@@ -17,6 +17,7 @@ import pyarrow as pa
 from sagittal.core.angles import JointAngles
 from sagittal.core.body.feet import FootTracks
 from sagittal.core.body.model import BodyModel
+from sagittal.core.consistency.doubt import read_doubt
 from sagittal.core.events.bouts import Bout, BoutParams
 from sagittal.core.events.flags import StrideParams
 from sagittal.core.events.result import GaitEvents
@@ -71,6 +72,7 @@ def tracks_parquet(tracks: Tracks) -> bytes:
         "rests": tracks.rests,
         "standing": tracks.standing,
         "turns": [dataclasses.asdict(t) for t in tracks.turns],
+        "doubts": [x.to_json() for x in tracks.doubts],
         "steps": None if tracks.steps is None else _steps_meta(tracks.steps),
         "feet": None
         if feet is None
@@ -116,6 +118,7 @@ def read_tracks(data: bytes, events: GaitEvents, angles: JointAngles | None) -> 
         standing=tuple((a, b) for a, b in meta.get("standing", ())),
         turns=tuple(_made(Turn, t) for t in meta.get("turns", ())),
         steps=None if meta.get("steps") is None else _steps(meta["steps"]),
+        doubts=tuple(read_doubt(x) for x in meta.get("doubts", ())),
     )
 
 

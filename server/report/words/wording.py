@@ -135,6 +135,8 @@ REASONS: Final[Mapping[str, str]] = {
     "few_steps": "not measured: too few consecutive steps",
     "opposite_foot_missing": "not measured: requires sensors on both feet",
     "no_double_support": "not measured: the feet were never on the floor together",
+    "foot_late": "not reported: the clock of one foot is late",
+    "not_walking": "not reported: the movement is not walking",
     "joint_missing": "not measured: a segment of this joint has no sensor",
     "estimator_bad": "not reported: the sensors contradict each other here",
     "feet_contradict": "not reported: left and right contacts contradict each other",

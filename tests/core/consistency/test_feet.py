@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sagittal.core.consistency.feet import CONTRADICTED
+from sagittal.core.consistency.doubt import CONTRADICTED
 from sagittal.core.events.result import GaitEvent
 from sagittal.core.frames import FOOT
 from sagittal.core.parameters.between_feet import BETWEEN_FEET

@@ -1,0 +1,1 @@
+"""Mistakes of a clinic in large numbers: which wrong results are reported, repaired, harmless or silent."""
