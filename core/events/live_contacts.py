@@ -7,30 +7,14 @@ at once, and again when its refined time is known; a foot-off again where its la
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
 
 from sagittal.core.errors import SignalError
-from sagittal.core.events.detection import read_reports
-from sagittal.core.events.foot_contact import FootContactParams, FootContactState, advance_foot_contacts
+from sagittal.core.events.foot_contact import FootContactParams
 from sagittal.core.events.foot_movement import FootMovement
 from sagittal.core.events.foot_pitch import FootPitchParams
-from sagittal.core.events.result import GaitEvent
+from sagittal.core.events.foot_way import FootWayParams
+from sagittal.core.events.live_foot import KnownContact, LiveFoot
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
-
-REMEMBERED: Final = 4
-"""Events of a foot that may be told again: a foot-off, the contact after it, and a swing that is held."""
-
-
-class KnownContact(NamedTuple):
-    """A contact and the sample, counted from the start of the chain, at which it is told.
-
-    Not `final`: its refined time is still to come. Then it is told again, its `first_s` the time it had. So
-    is a foot-off, though final, that the contact after it shows to have been the landing.
-    """
-
-    at: int
-    event: GaitEvent
-    final: bool
 
 
 class ContactDetector:
@@ -47,6 +31,7 @@ class ContactDetector:
         rate_hz: float,
         pitch: FootPitchParams | None = None,
         params: FootContactParams | None = None,
+        ways: FootWayParams | None = None,
     ) -> None:
         pitch = pitch or FootPitchParams()
         if rate_hz < pitch.min_rate_hz:
@@ -54,10 +39,9 @@ class ContactDetector:
                 "sample_rate_too_low",
                 f"Gait events need at least {pitch.min_rate_hz:g} Hz, the sensors send {rate_hz:g} Hz.",
             )
-        self.sides: tuple[Side, ...] = tuple(s for f in feet for s in SIDES if FOOT[s] == f)
-        self._feet = [FootContactState.start(rate_hz, pitch, params) for _ in self.sides]
-        self._latest: list[dict[int, GaitEvent]] = [{} for _ in self.sides]
-        self._rate_hz = rate_hz
+        sides = (s for f in feet for s in SIDES if FOOT[s] == f)
+        self._feet = [LiveFoot(side, rate_hz, pitch, params, ways) for side in sides]
+        self.sides: tuple[Side, ...] = tuple(foot.side for foot in self._feet)
 
     def push(
         self, q: Floats, valid: Bools, motions: Sequence[FootMovement], first: int
@@ -70,13 +54,6 @@ class ContactDetector:
         first : the chain's first sample on the axis.
         """
         found = []
-        for i, (side, foot) in enumerate(zip(self.sides, self._feet, strict=True)):
-            told = advance_foot_contacts(foot, q[:, i], valid[:, i], motions[i].speed, motions[i].acc)
-            if not len(told.kind):
-                continue
-            start_s = first / self._rate_hz
-            for known, final, event in read_reports(told, side, start_s, self._rate_hz, self._latest[i]):
-                found.append(KnownContact(known, event, final))
-            for number in list(self._latest[i])[:-REMEMBERED]:
-                del self._latest[i][number]
+        for i, foot in enumerate(self._feet):
+            found += foot.push(q[:, i], valid[:, i], motions[i], first)
         return sorted(found, key=lambda x: (x.at, x.event.side))

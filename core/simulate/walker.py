@@ -134,6 +134,7 @@ class Walker:
         that look for the largest pitch are early by up to 0.1 s without it
         (docs/science/simulation.md, "Swing foot").
     impact : how hard the feet land, 1 = as most people at 1.2 m/s.
+    tremor_rad, tremor_hz : half of what the feet turn through all the time, and how often.
     """
 
     height_m: float = REFERENCE_HEIGHT_M
@@ -152,6 +153,8 @@ class Walker:
     tibial_rotation_rad: float = 0.0
     lands_rising: bool = True
     impact: float = 1.0
+    tremor_rad: float = 0.0
+    tremor_hz: float = 5.0
     variability: Variability = Variability()
 
     @classmethod
